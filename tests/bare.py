@@ -1,4 +1,4 @@
-"""``python -m tests.bare [N [FILE]]``: MCZ with nothing but Python and NumPy, as in Blender.
+"""``python -m tests.bare [N [FILE]]``: MCZ with Python, NumPy and construct alone, as in Blender.
 
 Every other package is refused, installed or not. N vectors of each codec and each group are decoded
 (all of them without N); FILE is opened, asked, checked, salvaged, converted and written anew.
@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-OWN = {"mcz", "tests", "conformance", "tools", "numpy"}
+OWN = {"mcz", "tests", "conformance", "tools", "numpy", "construct"}
 
 
 class Only(MetaPathFinder):

@@ -357,12 +357,13 @@ def test_heads_by_hand_say_what_the_schemas_say(files: tuple[Path, Path]) -> Non
         with mcz.open(path) as file:
             for name, row in file.container.directory.clips.items():
                 payload = file.container.payload(row.clip)
-                head, fields = clip_head(payload, name), parse(payloads.CLIP, payload, name)
+                head, fields = clip_head(payload, name), parse(payloads.Clip, payload, name)
                 assert (head.name, head.skeleton) == (fields.name, fields.skeleton)
                 assert head.metadata == {pair.key: pair.value for pair in fields.metadata}
-                source = fields.source[0]
+                source = fields.source
+                assert source is not None
                 assert (head.template, head.format) == (source.template, source.format)
                 assert (head.path, head.size) == (source.path, source.size)
                 assert row.cend is not None
                 cend = file.container.payload(row.cend)
-                assert source_sha256(cend, name) == file.container.cend(row).source_sha256[0]
+                assert source_sha256(cend, name) == file.container.whole_cend(row).source_sha256

@@ -28,7 +28,7 @@ def test_nothing_else_is_needed(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["vectors"] == len(bare.chosen(2)) > 100
-    assert found["loaded"] == ["conformance", "mcz", "numpy", "tests"]
+    assert found["loaded"] == ["conformance", "construct", "mcz", "numpy", "tests"]
     assert found["slow"] == []
 
 

@@ -318,4 +318,4 @@ def test_source_counts_and_reads_exactly() -> None:
 
 def test_schemas_refuse_trailing_bytes() -> None:
     with pytest.raises(FormatError):
-        parse(payloads.ALIA, b"\x01a\x00\x01b!", "ALIA")
+        parse(payloads.Alia, b"\x01a\x00\x01b!", "ALIA")

@@ -28,11 +28,12 @@ from mcz.errors import FormatError
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import validate
-from mcz.schema import build, parse, varint
+from mcz.schema import parse, varint
 from mcz.writing.clip_writer import write_clip
 from tests import overlap_codec
 from tests.motions import smooth
 from tests.repair import flipped, flips, joined, parts_of, replaced, use
+from tools.records import built, update
 
 JOINTS = ("hips", "spine", "fixed", "knee")
 
@@ -377,7 +378,7 @@ def test_all_clips_are_cut_alike_and_the_rest_is_kept() -> None:
     out = io.BytesIO()
     writer = Writer(out, head_extension=b"later")
     writer.ancillary(b"abCD", b"before all clips")
-    writer.shared(b"MODL", build(payloads.MODL, {"kind": 77, "data": b"learned"}, "MODL"))
+    writer.shared(b"MODL", built(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
     writer.attachment("notes.txt", b"kept")
     writer.alias("more.txt", payloads.OF_ATTACHMENT, b"notes.txt")
     for name in ("a", "b"):
@@ -483,7 +484,7 @@ def test_a_quality_record_that_makes_no_sense() -> None:
     parts = parts_of(extracted(written(rich()), frames=(1, 9)))
     which = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"QUAL")
     entries = [{"key": "cut-frames", "value": "one"}]
-    payload = build(payloads.QUAL, {"entries": entries, "extension": b"more"}, "QUAL")
+    payload = built(payloads.Qual, {"entries": entries, "extension": b"more"}, "QUAL")
     data = joined(replaced(parts, which, payload))
     assert quality(extracted(data, frames=(1, 2))) == {"cut-frames": "1:2"}
     cut = parts_of(extracted(data, joints=["hips"]))
@@ -673,7 +674,7 @@ def test_sources_of_a_coarser_clip(samples: Path, tmp_path: Path) -> None:
 
 def clip_fields_of(data: bytes) -> Any:
     (payload,) = (p for chunk, p in parts_of(data) if chunk.type == b"CLIP")
-    return parse(payloads.CLIP, payload, "CLIP")
+    return parse(payloads.Clip, payload, "CLIP")
 
 
 def clip_with(data: bytes, *, flags: int = 0, n_frames: int | None = None, **signal: Any) -> bytes:
@@ -682,8 +683,8 @@ def clip_with(data: bytes, *, flags: int = 0, n_frames: int | None = None, **sig
     which = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"CLIP")
     fields = clip_fields_of(data)
     fields.flags, fields.n_frames = flags, fields.n_frames if n_frames is None else n_frames
-    fields.signals[0].update(signal)
-    return joined(replaced(parts, which, build(payloads.CLIP, fields, "CLIP")))
+    update(fields.signals[0], signal)
+    return joined(replaced(parts, which, built(payloads.Clip, fields, "CLIP")))
 
 
 @pytest.mark.parametrize("name", ["skip", "spare"])

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 import conformance
 import mcz
-from mcz.container import payloads
+from mcz.container import index_records
 from mcz.container.chunks import Chunk
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
 from mcz.container.index import index_content, parse_content
 from mcz.container.segments import SegmentHeader
-from mcz.schema import build, parse
+from mcz.schema import parse
+from tools.records import built
 
 NUMBERS = st.integers(0, 2**53 - 1)
 SMALL = st.integers(0, 2**20)
@@ -71,8 +72,8 @@ def test_what_is_built_is_read_by_hand_and_by_schema(held: Directory) -> None:
     assert index_content(again) == content  # from what is packed still
     assert again == held
     assert index_content(again) == content  # and from what was unpacked
-    fields = parse(payloads.INDEX, content, "INDX")
-    assert build(payloads.INDEX, fields, "INDX") == content
+    fields = parse(index_records.Index, content, "INDX")
+    assert built(index_records.Index, fields, "INDX") == content
     assert [row.name for row in fields.clips] == list(held.clips)
 
 
@@ -85,7 +86,7 @@ def test_a_changed_index_is_refused_by_both_or_by_neither(
     content[at] ^= 1 << data.draw(st.integers(0, 7))
     del content[data.draw(st.integers(at, len(content))) :]
     try:
-        parse(payloads.INDEX, bytes(content), "INDX")
+        parse(index_records.Index, bytes(content), "INDX")
     except mcz.MczError:
         with pytest.raises(mcz.MczError):
             parse_content(bytes(content))

@@ -438,9 +438,9 @@ def test_two_groups_have_no_such_packets() -> None:
     data = live(frames(5))
     parts = parts_of(data)
     (which,) = [i for i, (chunk, _) in enumerate(parts) if chunk.type == b"CLIP"]
-    fields = parse(payloads.CLIP, parts[which][1], "CLIP")
-    fields.signals[0].groups = {"kind": payloads.GROUP_CHANNEL, "sizes": None}
-    clip = build(payloads.CLIP, fields, "CLIP")
+    fields = parse(payloads.Clip, parts[which][1], "CLIP")
+    fields.signals[0].groups = payloads.Groups(kind=payloads.GROUP_CHANNEL)
+    clip = build(fields, "CLIP")
     bad = assembled(data, packets_of(data)).replace(
         build_chunk(b"CLIP", parts[which][1]), build_chunk(b"CLIP", clip)
     )
@@ -626,6 +626,7 @@ from mcz import codecs
 from mcz.live.writer import LiveWriter
 from tests import live_codec
 from tests.motions import skeleton
+from tools.records import built
 codecs.CODECS[live_codec.ID] = live_codec.CODEC
 with open(sys.argv[1], "wb", buffering=0) as sink:
     writer = LiveWriter(sink, skeleton(), "stairs")

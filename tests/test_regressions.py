@@ -35,13 +35,14 @@ from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import validate
 from mcz.sample import marker_walk, write_samples
-from mcz.schema import build, parse, varint
+from mcz.schema import parse, varint
 from mcz.transforms import dwt
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import write_clip
 from tests.motions import smooth
 from tests.repair import with_index_content
 from tools.fuzz.repair import joined, pieces_of, with_payload
+from tools.records import built
 from tools.vectors.build.files import Crafter, finished
 from tools.vectors.build.motions import dance
 
@@ -308,7 +309,7 @@ def test_counts_are_checked_before_what_they_count() -> None:
     head = b"\0\0\0\1\0\0\0"  # a skeleton up to its joints
     for joints in (varint(4097), b"\1\0\0\0\0" + varint(16385)):
         with pytest.raises(mcz.LimitError):
-            parse(payloads.SKEL, head + joints, "SKEL", BASE.counts)
+            parse(payloads.Skel, head + joints, "SKEL", BASE.counts)
     template = b"\1\0\1\0\1" + varint(MAX_RUNS + 1)
     with pytest.raises(mcz.LimitError, match="runs"):
         parse_layout(template, b"", 1)
@@ -518,9 +519,9 @@ def edited_clip(data: bytes, edit: Any) -> bytes:
     """The file of one clip whose CLIP has passed through ``edit``."""
     pieces = pieces_of(data)
     (which,) = (n for n, piece in enumerate(pieces) if piece.type == b"CLIP")
-    fields = parse(payloads.CLIP, pieces[which].payload, "CLIP")
+    fields = parse(payloads.Clip, pieces[which].payload, "CLIP")
     edit(fields)
-    return joined(with_payload(pieces, which, build(payloads.CLIP, fields, "CLIP")))
+    return joined(with_payload(pieces, which, built(payloads.Clip, fields, "CLIP")))
 
 
 def test_source_of_a_clip_is_none_of_a_skeleton(tmp_path: Path) -> None:
@@ -533,7 +534,7 @@ def test_source_of_a_clip_is_none_of_a_skeleton(tmp_path: Path) -> None:
     data = joined(with_payload(pieces, which, asf))
 
     def of_skeletons(fields: Any) -> None:
-        fields.source[0].format = FORMATS["asf"].id
+        fields.source.format = FORMATS["asf"].id
 
     data = edited_clip(data, of_skeletons)
     with mcz.open(data) as file, pytest.raises(mcz.FormatError, match="other sort"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -256,9 +257,9 @@ def with_unknown_codec(folder: Path) -> bytes:
     mcz.encode(folder / "walk.bvh", folder / "u.mcz", codec="raw")
     parts = parts_of((folder / "u.mcz").read_bytes())
     which = next(i for i, (piece, _) in enumerate(parts) if piece.type == b"CLIP")
-    fields = parse(payloads.CLIP, parts[which][1], "CLIP")
-    signals = [dict(signal) | {"codec": 1 << 20} for signal in fields.signals]
-    payload = build(payloads.CLIP, dict(fields) | {"signals": signals}, "CLIP")
+    fields = parse(payloads.Clip, parts[which][1], "CLIP")
+    signals = [replace(signal, codec=1 << 20) for signal in fields.signals]
+    payload = build(replace(fields, signals=signals), "CLIP")
     return joined(replaced(parts, which, payload))
 
 

@@ -21,8 +21,8 @@ from mcz.coding.ordinals import kernels as lossless_kernels
 from mcz.container import chunks
 from mcz.formats import FORMATS, amc, c3d_restore, trc
 from mcz.formats.c3d_layout import Kind
-from mcz.formats.layout import TEMPLATE
-from mcz.formats.table_layout import PHRASES, TABLE_TEMPLATE
+from mcz.formats.layout import Template
+from mcz.formats.table_layout import PHRASES, TableTemplate
 from mcz.numbers import Grid, GridFlag, GridKind, printed_base, rules, values_of_texts
 from mcz.schema import parse
 from mcz.transforms.wavelets import MAX_LEVELS
@@ -312,7 +312,7 @@ def test_worked_example_of_a_template() -> None:
     source = motion.source
     assert source is not None
     assert source.detail == b"\0\0\0\0\1\0"
-    fields = parse(TEMPLATE, source.template, "template")
+    fields = parse(Template, source.template, "template")
     said = {row[0]: row[1] for row in table_after(text, "| part | value |")}
     plain = {b"": "empty", b" ": "one blank"}
     gaps = [plain.get(g) or f"`{g.decode()}`".replace("\n", "\\n") for g in fields.gaps]
@@ -343,7 +343,7 @@ def test_worked_example_of_a_table() -> None:
     assert source is not None
     assert source.detail == b"\1" + bytes(6)
     assert source.notes is None
-    (fields,) = parse(TABLE_TEMPLATE, source.template, "template").sections
+    (fields,) = parse(TableTemplate, source.template, "template").sections
     said = {row[0]: row[1] for row in table_after(text, "| part | value |")}
     header = "".join(
         part.replace("\\t", "\t").replace("\\n", "\n") if k % 2 else bytes.fromhex(part).decode()
@@ -351,7 +351,7 @@ def test_worked_example_of_a_table() -> None:
     )
     assert (fields.header, fields.marks, fields.missing) == (header.encode(), 1, b"")
     assert [int(said["signals"])] == fields.signals
-    clock = fields.clock[0]
+    clock = fields.clock
     told = f"FIXED {clock.grid.digits}, numerator {clock.numerator}, "
     assert said["clock"] == f"{told}denominator {clock.denominator}, offset {clock.offset}"
     assert fields.gaps == [b"", b"\t", b"\n"]

@@ -44,6 +44,7 @@ from mcz.reading.report import info, layout
 from mcz.schema import build, parse
 from tests import live_codec
 from tests.repair import as_kind_2, flipped, flips, parts_of, use
+from tools.records import built
 
 NAMES = ("a", "b", "c")
 CODECS = {
@@ -714,8 +715,7 @@ def assembled(chunks: list[list[Packet]], n_frames: int = 0, end: bool = True) -
         out.append(build_header(b"DATA", 0, OPEN_LENGTH))
         out += map(build_packet, packets)
     if end:
-        fields = {"n_frames": n_frames, "source_sha256": [], "value_sha256": [bytes(32)]}
-        cend = build(payloads.CEND, fields | {"extension": b""}, "CEND")
+        cend = build(payloads.Cend(n_frames=n_frames, value_sha256=[bytes(32)]), "CEND")
         out += [build_chunk(b"CEND", cend), build_foot(0, 0)]
     return b"".join(out)
 
@@ -802,9 +802,9 @@ def test_behind_a_gap_among_several_signals_numbers_are_not_known(kind: int) -> 
     opening = pieces(n=1)[0]
     clip = chunks_in(opening.removeprefix(SIGNATURE), 0)[-1]
     payload = opening[clip.payload_offset + len(SIGNATURE) :][: clip.length]
-    fields = parse(payloads.CLIP, payload, "CLIP")
+    fields = parse(payloads.Clip, payload, "CLIP")
     fields.signals.append(fields.signals[0])
-    two = build_chunk(b"CLIP", build(payloads.CLIP, fields, "CLIP"))
+    two = build_chunk(b"CLIP", built(payloads.Clip, fields, "CLIP"))
     other = build_segment(SegmentHeader(1, 0, 1), [bytes([2] * 9)])
     chunk = [
         told(0),

@@ -2,14 +2,16 @@
 
     python tools/spec_tables.py [--check]
 
-A table follows a line ``<!-- table: NAME -->``; NAME is that of a Struct, or of a tuple
-of (name, type, meaning) rows that a loop reads by, in one of ``MODULES``. Structures that are read
+A table follows a line ``<!-- table: NAME -->``; NAME is that of a record, ``JointFields`` or
+``Joint`` being JOINT, or of a tuple of (name, type, meaning) rows that a loop reads by, in one of
+``MODULES``. Structures that are read
 by hand have tables without such a line. The contents list the headings behind them.
 The lines of the traced stream are those of ``tools/spec_trace.py``.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import sys
 from collections.abc import Iterator
@@ -17,15 +19,19 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import construct
+
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # so that it runs as a script
 
 from mcz import numbers, schema
 from mcz.container import payloads
-from mcz.schema import fields
+from mcz.schema import types
+from mcz.schema.records import RecordType
 from tools import spec_trace
 
 MODULES = (
     "mcz.container.payloads",
+    "mcz.container.index_records",
     "mcz.container.copies",
     "mcz.container.index",
     "mcz.container.metadata",
@@ -70,10 +76,24 @@ def structures() -> dict[str, Any]:
     for module_name in MODULES:
         module = import_module(module_name)
         for name, thing in vars(module).items():
-            if isinstance(thing, schema.Struct) or (name.endswith("FIELDS") and _is_rows(thing)):
-                found.setdefault(name, thing)
-                found[f"{module_name.removeprefix('mcz.')}.{name}"] = thing
+            if is_record(thing) and thing.__module__.startswith(module_name):
+                name = table_name(thing)
+            elif not (name.endswith("FIELDS") and _is_rows(thing)):
+                continue
+            found.setdefault(name, thing)
+            found[f"{module_name.removeprefix('mcz.')}.{name}"] = thing
     return found
+
+
+def table_name(record: type[schema.Record]) -> str:
+    """How SPEC.md calls a record."""
+    name = record.__name__.removesuffix("Fields")
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).upper()
+
+
+def is_record(thing: Any) -> bool:
+    is_class = isinstance(thing, type) and issubclass(thing, schema.Record)
+    return is_class and thing is not schema.Record
 
 
 def _is_rows(thing: Any) -> bool:
@@ -85,31 +105,32 @@ def rows(structure: Any) -> Iterator[tuple[str, str, str]]:
     if isinstance(structure, tuple):
         yield from structure
         return
-    for field in structure.fields:
-        yield field.name, type_name(field.item), field.docs
+    for field in dataclasses.fields(structure):
+        yield field.name, type_name(field.metadata["construct"]), field.metadata["docs"]
 
 
 def type_name(field: Any) -> str:
     """How SPEC.md calls a type."""
     if id(field) in NAMED:
         return NAMED[id(field)]
+    if is_record(field):
+        return table_name(field)
     match field:
-        case fields.Struct():
-            names = {id(thing): name for name, thing in structures().items() if "." not in name}
-            return names[id(field)]
-        case fields.Counted():
-            return f"{field.word} {type_name(field.item)}"
-        case fields.Array():
-            return f"{field.count} {type_name(field.item)}"
-        case fields.Bytes():
-            return f"{field.size} bytes"
-        case fields.IfThenElse():
-            return type_name(field.item) + ", or absent"
-        case fields.Number():
-            return {"B": "u8", "f": "binary32", "d": "binary64"}[field.format.format[-1]]
-        case fields.Rest():
-            return "bytes to the end"
-    return type_name(field.item)
+        case RecordType():
+            return table_name(field.record)
+        case types.Optional():
+            return f"optional {type_name(field.subcon)}"
+        case types.Counted():
+            return f"counted {type_name(field.subcon)}"
+        case construct.Array():
+            return f"{field.count} {type_name(field.subcon)}"
+        case construct.Bytes():
+            return f"{field.length} bytes"
+        case construct.IfThenElse():
+            return type_name(field.thensubcon) + ", or absent"
+        case construct.FormatField():
+            return {"B": "u8", "f": "binary32", "d": "binary64"}[field.fmtstr[-1]]
+    return "bytes to the end" if field is construct.GreedyBytes else type_name(field.subcon)
 
 
 def table(structure: Any) -> str:

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
+from construct import Float64l, If, Int8ul, this
 from numpy.typing import NDArray
 
 from mcz.codecs.basis_models import MAX_POINTS, Basis, Head, find_bases
@@ -18,7 +18,7 @@ from mcz.codecs.contract import ID_SIZE, Layout, Span
 from mcz.codecs.steps import ratio_of
 from mcz.coding.space_kernels import Transform
 from mcz.errors import FormatError
-from mcz.schema import Bytes, ExprValidator, Float64l, If, Int8ul, OneOf, Struct, counted
+from mcz.schema import Checked, Exactly, Record, bounded, counted, field, one_of
 from mcz.transforms.dct import dct_matrix
 
 Floats = NDArray[np.float64]
@@ -29,21 +29,26 @@ COSINES, LEARNED = 0, 1  # basis
 LEAST_STEP, GREATEST_STEP = 2.0**-100, 2.0**100
 N_COORDINATES = 3
 
-Step = ExprValidator(Float64l, lambda obj, ctx: LEAST_STEP <= obj <= GREATEST_STEP)  # SPACE-09
+Step = bounded(Float64l, LEAST_STEP, GREATEST_STEP)  # SPACE-09
 
-SPACE = Struct(
-    "flags"
-    / ExprValidator(Int8ul, lambda obj, ctx: obj < 16)
-    * "bit 0: x, y and z apart; 1: has weights; 2: the model has a mean; 3: it has courses",
-    "basis" / OneOf(Int8ul, (COSINES, LEARNED)) * "0 cosines, 1 the bases of a model",
-    "model"
-    / If(lambda ctx: ctx.basis == LEARNED or ctx.flags & (MEAN | COURSES), Bytes(ID_SIZE))
-    * "id of the MODL, of kind 1",
-    "step" / Step * "quantizer step, 2^-100 to 2^100",
-    "weights"
-    / If(lambda ctx: ctx.flags & WEIGHTED, counted(Int8ul, 2**14))
-    * "of each channel the code of its weight; only where bit 1 of flags is set",
-)
+
+class SpaceFields(Record):
+    """Transform of a frame into coefficients, in headers."""
+
+    flags: int = field(
+        Checked(Int8ul, lambda obj, ctx: obj < 16),
+        "bit 0: x, y and z apart; 1: has weights; 2: the model has a mean; 3: it has courses",
+    )
+    basis: int = field(one_of(Int8ul, (COSINES, LEARNED)), "0 cosines, 1 the bases of a model")
+    model: bytes | None = field(
+        If((this.basis == LEARNED) | (this.flags & (MEAN | COURSES)), Exactly(ID_SIZE)),
+        "id of the MODL, of kind 1",
+    )
+    step: float = field(Step, "quantizer step, 2^-100 to 2^100")
+    weights: list[int] | None = field(
+        If(this.flags & WEIGHTED, counted(Int8ul, 2**14)),
+        "of each channel the code of its weight; only where bit 1 of flags is set",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +94,7 @@ def columns_of(n_channels: int, *, apart: bool) -> Ints:
     return channels[None]
 
 
-def space_of(name: str, fields: Any, layout: Layout) -> Space:
+def space_of(name: str, fields: SpaceFields, layout: Layout) -> Space:
     """The Space that the fields of SPACE say; raises FormatError or UnsupportedError."""
     apart, n_channels = bool(fields.flags & APART), layout.n_channels
     if apart and n_channels % N_COORDINATES:  # SPACE-02
@@ -119,7 +124,7 @@ def space_of(name: str, fields: Any, layout: Layout) -> Space:
     )
 
 
-def uses_of(fields: Any) -> tuple[bytes, ...]:
+def uses_of(fields: SpaceFields) -> tuple[bytes, ...]:
     """The ids of the models that the fields of SPACE name."""
     return () if fields.model is None else (bytes(fields.model),)
 
@@ -140,7 +145,7 @@ def _check_heads(
         raise FormatError(f"{name}: a mean of {shape} for {n_channels} channels")
 
 
-def _weights(name: str, fields: Any, n_channels: int) -> Floats:
+def _weights(name: str, fields: SpaceFields, n_channels: int) -> Floats:
     if fields.weights is None:
         return np.ones(n_channels)
     if len(fields.weights) != n_channels:  # SPACE-11

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,15 @@ from mcz.codecs.contract import Layout, Model, SignalSource, id_of
 from mcz.codecs.gaps import fill_gaps
 from mcz.codecs.parameters import Parameter, choice, in_range, integer, number
 from mcz.codecs.segments import skeleton_of
-from mcz.codecs.space import APART, COSINES, LEARNED, N_COORDINATES, WEIGHTED, columns_of
+from mcz.codecs.space import (
+    APART,
+    COSINES,
+    LEARNED,
+    N_COORDINATES,
+    WEIGHTED,
+    SpaceFields,
+    columns_of,
+)
 from mcz.codecs.steps import code_of, ratio_of
 from mcz.codecs.weights import RULES, weights_of
 from mcz.errors import (
@@ -73,7 +81,7 @@ def changes(block: Floats) -> Floats:
 class Choice:
     """What is chosen: the fields of SPACE, and the models that they name."""
 
-    fields: dict[str, Any]
+    fields: SpaceFields
     models: tuple[Model, ...] = ()
     known: tuple[Model, ...] = ()
 
@@ -154,13 +162,13 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
     ``in_time`` is what the codec does over time before it goes on in space. Raises OptionError
     where the one that is named does not fit.
     """
-    fields: dict[str, Any] = {
-        "flags": (APART if sample.apart else 0) | (WEIGHTED if sample.codes else 0),
-        "basis": COSINES,
-        "model": None,
-        "step": step,
-        "weights": list(sample.codes) if sample.codes else None,
-    }
+    fields = SpaceFields(
+        flags=(APART if sample.apart else 0) | (WEIGHTED if sample.codes else 0),
+        basis=COSINES,
+        model=None,
+        step=step,
+        weights=list(sample.codes) if sample.codes else None,
+    )
     frames = sample.frames
     if not frames.shape[1]:
         return Choice(fields)
@@ -217,10 +225,10 @@ def at_hand(sample: Sample) -> str:
     return "known" if fits else "cosines"
 
 
-def _with(fields: dict[str, Any], model: Model | None = None, known: Model | None = None) -> Choice:
+def _with(fields: SpaceFields, model: Model | None = None, known: Model | None = None) -> Choice:
     used = model or known
     assert used is not None
-    fields = fields | {"basis": LEARNED, "model": id_of(used)}
+    fields = replace(fields, basis=LEARNED, model=id_of(used))
     return Choice(fields, (model,) if model else (), (known,) if known else ())
 
 

@@ -21,7 +21,7 @@ def joined_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> by
     parts = []
     left, digest = row.size, b""
     for number, chunk in enumerate(row.parts):
-        fields = parse(payloads.ATTA, payload_of(chunk), chunk.label)
+        fields = parse(payloads.Atta, payload_of(chunk), chunk.label)
         expected = (row.name, number, len(row.parts), row.size)
         # ATTA-01, ATTA-02
         if (fields.name, fields.part, fields.n_parts, fields.size) != expected:

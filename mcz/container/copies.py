@@ -90,8 +90,8 @@ def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
     )
     packed = deflate(content)
     encoding = payloads.DEFLATED if len(packed) < len(content) else payloads.STORED
-    fields = {"encoding": encoding, "size": len(content), "data": packed if encoding else content}
-    return build(payloads.COPY, fields, "COPY")
+    data = packed if encoding else content
+    return build(payloads.Copy(encoding=encoding, size=len(content), data=data), "COPY")
 
 
 def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
@@ -99,7 +99,7 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
 
     Raises FormatError where they are not in file order, or not before the COPY.
     """
-    fields = parse(payloads.COPY, payload, chunk.label)
+    fields = parse(payloads.Copy, payload, chunk.label)
     check(f"chunk {chunk.label}: bytes of the copies", fields.size, limit)  # LIMIT-16
     content = decoded(fields.data, fields.encoding, fields.size, chunk.label)
     copies: list[Copy] = []
@@ -108,7 +108,7 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
         try:
             copy, at = _read_copy(content, at, chunk)
         except FormatError as error:
-            error.args = (f"chunk {chunk.label}: {error}",)
+            error.add(where=f"chunk {chunk.label}")
             raise
         if not end <= copy.offset <= copy.stop <= chunk.offset:  # COPY-03
             raise FormatError(

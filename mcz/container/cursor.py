@@ -25,7 +25,7 @@ class Cursor:
         try:
             value, self.at = read_varint(data, at)
         except FormatError as error:
-            error.args = (f"{self.where}: {error}",)
+            error.add(where=self.where)
             raise
         return value
 

@@ -196,7 +196,7 @@ class Directory:
 
 def parse_head(payload: bytes) -> Profile:
     """The profile of the file; raises UnsupportedError where it needs a newer reader."""
-    head = parse(payloads.HEAD, payload, "HEAD")
+    head = parse(payloads.Head, payload, "HEAD")
     ours = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
     needed = head.needs_major, head.needs_minor  # HEAD-04
     if not payloads.LEAST_NEEDED <= needed <= ours:  # HEAD-01, HEAD-02, HEAD-03

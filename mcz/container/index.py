@@ -50,8 +50,8 @@ ALIASED = (payloads.OF_CLIP, payloads.OF_SKELETON, payloads.OF_ATTACHMENT)
 def build_index(directory: Directory) -> bytes:
     """The whole INDX chunk."""
     content = index_content(directory)
-    fields = {"size": len(content), "data": deflate(content)}
-    return build_chunk(b"INDX", build(payloads.INDX, fields, "INDX"))
+    record = payloads.Indx(size=len(content), data=deflate(content))
+    return build_chunk(b"INDX", build(record, "INDX"))
 
 
 def index_content(directory: Directory) -> bytes:
@@ -117,7 +117,7 @@ def packed_segments(clip: ClipRow) -> tuple[bytes, int, int]:
 
 def parse_index(payload: bytes, limit: int) -> Directory:
     """The Directory in the payload of an INDX; ``limit`` bounds its inflated size."""
-    outer = parse(payloads.INDX, payload, "INDX")
+    outer = parse(payloads.Indx, payload, "INDX")
     check("INDX: inflated size", outer.size, limit)
     return parse_content(inflate(outer.data, outer.size, "INDX"))
 

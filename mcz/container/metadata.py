@@ -102,8 +102,7 @@ def build_metas(records: Sequence[Record], *, short: bool = False) -> Iterator[b
 
 def _payload(content: bytes, short: bool) -> bytes:
     encoding, data = smallest(content, short=short)
-    fields = {"encoding": encoding, "size": len(content), "data": data}
-    return build(payloads.META, fields, "META")
+    return build(payloads.Meta(encoding=encoding, size=len(content), data=data), "META")
 
 
 def record_bytes(record: Record) -> bytes:
@@ -125,7 +124,7 @@ def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
     Raises FormatError, and LimitError where they would be longer than an index may be.
     """
     where = f"chunk {chunk.label}"
-    fields = parse(payloads.META, payload, where)
+    fields = parse(payloads.Meta, payload, where)
     check(f"{where}: bytes of the records", fields.size, metadata_limit(file_bytes))
     content = decoded(fields.data, fields.encoding, fields.size, where)
     read, records = Cursor(content, where), []

@@ -6,7 +6,6 @@ SPEC.md, "Conventions" and "SKEL", is normative.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 from mcz.annexes import annex_bytes
 from mcz.container import payloads
@@ -48,16 +47,16 @@ def unpacked(payload: bytes, where: str, profile: Profile) -> bytes:
     try:
         size, start = read_varint(payload, at + 1)
     except FormatError as error:
-        error.args = (f"{where}: {error}",)
+        error.add(where=where)
         raise
     check(f"{where}: bytes", size, profile.text_bytes)  # SKEL-09
     rest = inflate(payload[start:], size, where, words=words())
     return payload[:at] + bytes((payload[at] & ~PACKED,)) + rest
 
 
-def parse_skel(payload: bytes, where: str, profile: Profile) -> Any:
+def parse_skel(payload: bytes, where: str, profile: Profile) -> payloads.Skel:
     """The fields of SKEL, packed or not."""
-    return parse(payloads.SKEL, unpacked(payload, where, profile), where, profile.counts)
+    return parse(payloads.Skel, unpacked(payload, where, profile), where, profile.counts)
 
 
 def _flags_at(payload: bytes, where: str) -> int:

@@ -1,4 +1,4 @@
-"""The payload schemas of the chunks. SPEC.md has one table for each; a test compares them.
+"""The records of the chunks. SPEC.md has one table for each; a test compares them.
 
 Not that of DATA, which is bulk and read by hand: ``segments.py``; ``packets.py`` where it is open.
 
@@ -7,275 +7,343 @@ Open structures end in ``extension``, which readers ignore and rewriting keeps.
 
 from __future__ import annotations
 
-from mcz.numbers import GRID
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+
+from construct import GreedyBytes, If, Int8ul, this
+
+from mcz.numbers import GRID, Grid
 from mcz.schema import (
     EXTENSION,
     FINITE,
+    POSITIVE,
     SIZED,
     TEXT,
     UVARINT,
-    Bytes,
-    ExprValidator,
-    GreedyBytes,
-    IfThenElse,
-    Int8ul,
-    OneOf,
-    Pass,
-    Struct,
+    Exactly,
+    Record,
+    bounded,
     counted,
+    field,
+    flags,
+    one_of,
     optional,
-    this,
 )
 
 FORMAT_MAJOR, FORMAT_MINOR = 0, 9
 LEAST_NEEDED = 0, 2  # 0.1 had another CLIP and INDX
 
-POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)
-
-
-def flags(*names: str) -> ExprValidator:
-    """One byte of flags, bit 0 first; the bits without a name are reserved and must be 0."""
-    return ExprValidator(Int8ul, lambda obj, ctx: obj < 1 << len(names))  # CONV-14
-
-
-ID = Bytes(16)
-SHA256 = Bytes(32)
+ID = Exactly(16)
+SHA256 = Exactly(32)
 VECTOR = FINITE[3]
+Vector = list[float] | tuple[float, float, float]
 
-HEAD = Struct(
-    "major" / Int8ul * "format version of the writer, major",
-    "minor" / Int8ul * "format version of the writer, minor",
-    "needs_major" / Int8ul * "least format version that reads the container, major",
-    "needs_minor" / Int8ul * "least format version that reads the container, minor",
-    "profile" / Int8ul * "profile id: 0 base, 1 archive",
-    "extension" / EXTENSION * "ignored, kept",
-)
 
-CHANNEL = Struct(
-    "kind" / Int8ul * "channel kind of the registry; 0: plain scalar",
-    "name" / TEXT * "name, empty where the kind says it all",
-    "unit" / TEXT * "unit, empty where the kind and the skeleton say it",
-)
+class Head(Record):
+    """HEAD, the first chunk."""
+
+    major: int = field(Int8ul, "format version of the writer, major")
+    minor: int = field(Int8ul, "format version of the writer, minor")
+    needs_major: int = field(Int8ul, "least format version that reads the container, major")
+    needs_minor: int = field(Int8ul, "least format version that reads the container, minor")
+    profile: int = field(Int8ul, "profile id: 0 base, 1 archive")
+    extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
+
+
+class Channel(Record):
+    """A channel of a joint or of a signal."""
+
+    kind: int = field(Int8ul, "channel kind of the registry; 0: plain scalar")
+    name: str = field(TEXT, "name, empty where the kind says it all", default="")
+    unit: str = field(TEXT, "unit, empty where the kind and the skeleton say it", default="")
+
 
 JOINT_FLAGS = ("adds to offset", "has offset", "has axis")
 ADDS_TO_OFFSET, HAS_OFFSET, HAS_AXIS = 1, 2, 4
-JOINT = Struct(
-    "name" / TEXT * "name of the joint",
-    "parent" / UVARINT * "index of the parent + 1; 0 for a root",
-    "flags" / flags(*JOINT_FLAGS) * "bit 0: positions add to offset; 1: has offset; 2: has axis",
-    "offset"
-    / IfThenElse(this.flags & HAS_OFFSET, VECTOR, Pass)
-    * "3 binary64, parent's origin to own; zero where absent",
-    "axis"
-    / IfThenElse(this.flags & HAS_AXIS, VECTOR, Pass)  # CONV-17
-    * "3 binary64, Euler angles of the local axes; zero where absent",
-    "axis_order"
-    / IfThenElse(this.flags & HAS_AXIS, OneOf(Int8ul, range(6)), Pass)
-    * "0 XYZ, 1 XZY, 2 YXZ, 3 YZX, 4 ZXY, 5 ZYX; XYZ where absent",
-    "tails" / counted(VECTOR) * "3 binary64 each, own origin to the end of a bone",
-    "channels" / counted(CHANNEL, kind="channels") * "the joint's channels, in column order",
-)
 
-SKELETON_SOURCE = Struct(
-    "template" / ID * "id of the SRCE chunk that holds the text",
-    "format" / Int8ul * "source format id",
-    "size" / UVARINT * "bytes of the source file",
-    "sha256" / SHA256 * "hash of the source file",
-)
 
-SKEL = Struct(
-    "name" / TEXT * "name of the skeleton",
-    "flags"
-    / flags("intrinsic")  # packed.py has cleared bit 1
-    * "bit 0: rotations apply about the turned axes; 1: packed",
-    "unit_cm" / optional(FINITE) * "0 or 1 binary64: one length unit in cm; none: unknown",
-    "angle_unit" / OneOf(Int8ul, range(3)) * "0 unknown, 1 degrees, 2 radians",
-    "up_axis" / OneOf(Int8ul, range(4)) * "0 unknown, 1 x, 2 y, 3 z",
-    "base" / optional(ID) * "0 or 1: id of the SKEL that this one was derived from",
-    "source" / optional(SKELETON_SOURCE) * "0 or 1: how to restore the skeleton's own file",
-    "joints" / counted(JOINT, kind="joints") * "the joints, parents before children",
-    "extension" / EXTENSION * "ignored, kept",
-)
+class Joint(Record):
+    """A joint of SKEL."""
+
+    name: str = field(TEXT, "name of the joint")
+    parent: int = field(UVARINT, "index of the parent + 1; 0 for a root")
+    flags: int = field(
+        flags(*JOINT_FLAGS), "bit 0: positions add to offset; 1: has offset; 2: has axis", default=0
+    )
+    offset: Vector | None = field(
+        If(this.flags & HAS_OFFSET, VECTOR),
+        "3 binary64, parent's origin to own; zero where absent",
+        default=None,
+    )
+    axis: Vector | None = field(
+        If(this.flags & HAS_AXIS, VECTOR),  # CONV-17
+        "3 binary64, Euler angles of the local axes; zero where absent",
+        default=None,
+    )
+    axis_order: int | None = field(
+        If(this.flags & HAS_AXIS, one_of(Int8ul, range(6))),
+        "0 XYZ, 1 XZY, 2 YXZ, 3 YZX, 4 ZXY, 5 ZYX; XYZ where absent",
+        default=None,
+    )
+    tails: list[Vector] = field(
+        counted(VECTOR), "3 binary64 each, own origin to the end of a bone", default=[]
+    )
+    channels: list[Channel] = field(
+        counted(Channel, kind="channels"), "the joint's channels, in column order", default=[]
+    )
+
+
+class SkeletonSource(Record):
+    """The file that a skeleton came of, in SKEL."""
+
+    template: bytes = field(ID, "id of the SRCE chunk that holds the text")
+    format: int = field(Int8ul, "source format id")
+    size: int = field(UVARINT, "bytes of the source file")
+    sha256: bytes = field(SHA256, "hash of the source file")
+
+
+INTRINSIC = 1  # packed.py has cleared bit 1
+
+
+class Skel(Record):
+    """SKEL, a skeleton."""
+
+    name: str = field(TEXT, "name of the skeleton")
+    flags: int = field(
+        flags("intrinsic"), "bit 0: rotations apply about the turned axes; 1: packed"
+    )
+    unit_cm: float | None = field(
+        optional(FINITE), "0 or 1 binary64: one length unit in cm; none: unknown", default=None
+    )
+    angle_unit: int = field(one_of(Int8ul, range(3)), "0 unknown, 1 degrees, 2 radians", default=0)
+    up_axis: int = field(one_of(Int8ul, range(4)), "0 unknown, 1 x, 2 y, 3 z", default=0)
+    base: bytes | None = field(
+        optional(ID), "0 or 1: id of the SKEL that this one was derived from", default=None
+    )
+    source: SkeletonSource | None = field(
+        optional(SkeletonSource), "0 or 1: how to restore the skeleton's own file", default=None
+    )
+    joints: list[Joint] = field(
+        counted(Joint, kind="joints"), "the joints, parents before children"
+    )
+    extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
+
 
 STORED, DEFLATED, AFTER_WORDS = 0, 1, 2
-ENCODING = OneOf(Int8ul, (STORED, DEFLATED, AFTER_WORDS))  # CONV-15
-SRCE = Struct(
-    "format" / Int8ul * "source format id",
-    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
-    "size" / UVARINT * "bytes of the template",
-    "data" / GreedyBytes * "the template, encoded",
-)
+ENCODING = one_of(Int8ul, (STORED, DEFLATED, AFTER_WORDS))  # CONV-15
 
-MODL = Struct(
-    "kind" / UVARINT * "model kind of the registry",
-    "data" / GreedyBytes * "the model; its kind says how to read it",
-)
 
-ATTA = Struct(
-    "name" / TEXT * "relative path of the attached file",
-    "part" / UVARINT * "number of this part, from 0",
-    "n_parts" / POSITIVE * "parts of the file, at least 1, all in one run",
-    "size" / UVARINT * "bytes of the whole file",
-    "sha256" / SHA256 * "hash of the whole file",
-    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
-    "part_size" / UVARINT * "bytes of this part, decoded",
-    "data" / GreedyBytes * "this part, encoded",
-)
+class Srce(Record):
+    """SRCE, the template of a source."""
+
+    format: int = field(Int8ul, "source format id")
+    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
+    size: int = field(UVARINT, "bytes of the template")
+    data: bytes = field(GreedyBytes, "the template, encoded")
+
+
+class Modl(Record):
+    """MODL, a model that codecs refer to."""
+
+    kind: int = field(UVARINT, "model kind of the registry")
+    data: bytes = field(GreedyBytes, "the model; its kind says how to read it")
+
+
+class Atta(Record):
+    """ATTA, a part of an attached file."""
+
+    name: str = field(TEXT, "relative path of the attached file")
+    part: int = field(UVARINT, "number of this part, from 0")
+    n_parts: int = field(POSITIVE, "parts of the file, at least 1, all in one run")
+    size: int = field(UVARINT, "bytes of the whole file")
+    sha256: bytes = field(SHA256, "hash of the whole file")
+    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
+    part_size: int = field(UVARINT, "bytes of this part, decoded")
+    data: bytes = field(GreedyBytes, "this part, encoded")
+
 
 OF_CLIP, OF_SKELETON, OF_ATTACHMENT = 0, 1, 2
-ALIA = Struct(
-    "name" / TEXT * "relative path of the file",
-    "of"
-    / OneOf(Int8ul, (OF_CLIP, OF_SKELETON, OF_ATTACHMENT))
-    * "0 clip, 1 skeleton, 2 attachment",
-    "target" / SIZED * "name of the clip or attachment, or id of the SKEL",
-)
 
-CLIP_SOURCE = Struct(
-    "template" / ID * "id of the SRCE chunk",
-    "format" / Int8ul * "source format id",
-    "detail" / SIZED * "what the template leaves open for this clip",
-    "path" / TEXT * "relative path of the source file, with forward slashes",
-    "size" / UVARINT * "bytes of the source file",
-)
 
-GRID_RUN = Struct(
-    "n_channels" / POSITIVE * "channels in a row that share the grid, at least 1",  # CLIP-06
-    "grid" / GRID * "number grid",
-)
+class Alia(Record):
+    """ALIA, another file with the content of one that is there."""
+
+    name: str = field(TEXT, "relative path of the file")
+    of: int = field(
+        one_of(Int8ul, (OF_CLIP, OF_SKELETON, OF_ATTACHMENT)), "0 clip, 1 skeleton, 2 attachment"
+    )
+    target: bytes = field(SIZED, "name of the clip or attachment, or id of the SKEL")
+
+
+class ClipSource(Record):
+    """The file that a clip came of, in CLIP."""
+
+    template: bytes = field(ID, "id of the SRCE chunk")
+    format: int = field(Int8ul, "source format id")
+    detail: bytes = field(SIZED, "what the template leaves open for this clip")
+    path: str = field(TEXT, "relative path of the source file, with forward slashes")
+    size: int = field(UVARINT, "bytes of the source file")
+
+
+class GridRun(Record):
+    """The number grid of channels in a row, in SIGNAL."""
+
+    # CLIP-06
+    n_channels: int = field(POSITIVE, "channels in a row that share the grid, at least 1")
+    grid: Grid = field(GRID, "number grid")
+
+
+def grid_runs(grids: Sequence[Grid]) -> list[GridRun]:
+    """The runs of the grids of all channels."""
+    found = ((grid, len(list(run))) for grid, run in groupby(grids))
+    return [GridRun(n_channels=count, grid=grid) for grid, count in found]
+
 
 GROUP_ALL, GROUP_JOINT, GROUP_CHANNEL, GROUP_LISTED = range(4)
-GROUPS = Struct(
-    "kind" / OneOf(Int8ul, range(4)) * "0 all channels, 1 per joint, 2 per channel, 3 listed",
-    "sizes"
-    / IfThenElse(this.kind == GROUP_LISTED, counted(UVARINT), Pass)
-    * "channels of each group, in column order; only where kind is 3",
-)
+
+
+class Groups(Record):
+    """The partition of a signal's channels, in SIGNAL."""
+
+    kind: int = field(
+        one_of(Int8ul, range(4)), "0 all channels, 1 per joint, 2 per channel, 3 listed"
+    )
+    sizes: list[int] | None = field(
+        If(this.kind == GROUP_LISTED, counted(UVARINT)),
+        "channels of each group, in column order; only where kind is 3",
+        default=None,
+    )
+
 
 OWN_CHANNELS = 1
-SIGNAL = Struct(
-    "name" / TEXT * "name of the signal",
-    "flags" / flags("own channels") * "bit 0: has channels of its own, not the skeleton's",
-    "channels"
-    / IfThenElse(this.flags & OWN_CHANNELS, counted(CHANNEL), Pass)
-    * "the signal's own channels",
-    "samples_per_frame" / POSITIVE * "rows a frame, at least 1",  # CLIP-12
-    "skip" / UVARINT * "stored frames before the first that is shown",
-    "spare" / UVARINT * "stored frames after the last that is shown",
-    "grids" / counted(GRID_RUN) * "number grids, in column order",
-    "codec" / UVARINT * "codec id",
-    "codec_version" / UVARINT * "codec version",
-    "header" / SIZED * "the codec's own header",
-    "groups" / GROUPS * "partition of the channels",
-    "n_resolutions" / ExprValidator(Int8ul, lambda obj, ctx: obj >= 1) * "resolutions, at least 1",
-    "extension" / SIZED * "ignored, kept",
-)
+
+
+class Signal(Record):
+    """A signal of CLIP."""
+
+    name: str = field(TEXT, "name of the signal")
+    flags: int = field(
+        flags("own channels"), "bit 0: has channels of its own, not the skeleton's", default=0
+    )
+    channels: list[Channel] | None = field(
+        If(this.flags & OWN_CHANNELS, counted(Channel)), "the signal's own channels", default=None
+    )
+    samples_per_frame: int = field(POSITIVE, "rows a frame, at least 1", default=1)  # CLIP-12
+    skip: int = field(UVARINT, "stored frames before the first that is shown", default=0)
+    spare: int = field(UVARINT, "stored frames after the last that is shown", default=0)
+    grids: list[GridRun] = field(counted(GridRun), "number grids, in column order")
+    codec: int = field(UVARINT, "codec id")
+    codec_version: int = field(UVARINT, "codec version")
+    header: bytes = field(SIZED, "the codec's own header")
+    groups: Groups = field(Groups, "partition of the channels")
+    n_resolutions: int = field(bounded(Int8ul, 1, 255), "resolutions, at least 1", default=1)
+    extension: bytes = field(SIZED, "ignored, kept", default=b"")
+
 
 CLIP_FLAGS = ("open", "rounded rate")
 OPEN_CLIP, ROUNDED_RATE = 1, 2
-METADATA = Struct("key" / TEXT * "key of the registry, or x-...", "value" / TEXT * "text")
-CLIP = Struct(
-    "name" / TEXT * "name of the clip, unique in the file, not empty",
-    "flags" / flags(*CLIP_FLAGS) * "bit 0: n_frames is open; 1: the frame rate is rounded",
-    "skeleton" / ID * "id of the SKEL chunk",
-    "n_frames" / UVARINT * "frames; 0 while open",
-    "rate_numerator" / UVARINT * "frame rate, numerator; 0: unknown",
-    "rate_denominator" / POSITIVE * "frame rate, denominator, at least 1",  # CLIP-14
-    "metadata" / counted(METADATA) * "pairs of key and value",
-    "source" / optional(CLIP_SOURCE) * "0 or 1: how to restore the source file",
-    "signals" / counted(SIGNAL) * "the signals, at least 1, the motion first",
-    "extension" / EXTENSION * "ignored, kept",
-)
 
-CEND = Struct(
-    "n_frames" / UVARINT * "frames of the clip",
-    "source_sha256" / optional(SHA256) * "0 or 1: hash of the source file",
-    "value_sha256" / counted(SHA256) * "hash of each signal's canonical array",
-    "extension" / EXTENSION * "ignored, kept",
-)
 
-COPY = Struct(
-    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
-    "size" / UVARINT * "bytes of the copies, decoded",
-    "data" / GreedyBytes * "the copies, encoded",
-)
+class Metadata(Record):
+    """A pair of metadata."""
 
-META = Struct(
-    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
-    "size" / UVARINT * "bytes of the records, decoded",
-    "data" / GreedyBytes * "the records, encoded",
-)
+    key: str = field(TEXT, "key of the registry, or x-...")
+    value: str = field(TEXT, "text")
 
-QUAL = Struct(
-    "entries" / counted(METADATA) * "metric id or setting, and its value as text",
-    "extension" / EXTENSION * "ignored, kept",
-)
 
-GRID_CHANGE = Struct(
-    "channel" / UVARINT * "channel, counted within the group",
-    "grid" / GRID * "its grid in this segment",
-)
-EXCEPTION = Struct(
-    "row" / UVARINT * "rows after the exception before, or after the segment's first row",
-    "channel" / UVARINT * "channel, counted within the group",
-    "text" / SIZED * "the token",
-)
-GROUP_NOTES = Struct(
-    "grid_changes" / counted(GRID_CHANGE) * "grids that differ from the clip's",
-    "exceptions" / counted(EXCEPTION) * "tokens that the grid does not print, sorted",
-)
+def metadata_records(pairs: Mapping[str, str]) -> list[Metadata]:
+    """The pairs as CLIP and QUAL have them."""
+    return [Metadata(key=key, value=value) for key, value in pairs.items()]
 
-INDEXED_CHUNK = Struct(
-    "type" / Bytes(4) * "chunk type",
-    "id" / ID * "id of the chunk",
-    "offset" / UVARINT * "offset of the chunk",
-    "length" / UVARINT * "bytes of its payload",
-)
-INDEXED_PART = Struct(
-    "offset" / UVARINT * "offset of the chunk",
-    "length" / UVARINT * "bytes of its payload",
-)
-INDEXED_ATTACHMENT = Struct(
-    "name" / TEXT * "relative path of the attached file",
-    "size" / UVARINT * "bytes of the whole file",
-    "parts" / counted(INDEXED_PART) * "its ATTA chunks, in order, at least 1",
-)
-INDEXED_SIGNAL = Struct(
-    "n_channels" / UVARINT * "channels",
-    "samples_per_frame" / UVARINT * "rows a frame",
-    "skip" / UVARINT * "as in CLIP",
-    "spare" / UVARINT * "as in CLIP",
-    "codec" / UVARINT * "codec id",
-    "codec_version" / UVARINT * "codec version",
-)
-INDEXED_ANCILLARY = Struct(
-    "type" / Bytes(4) * "chunk type",
-    "offset" / UVARINT * "offset of the chunk",
-    "length" / UVARINT * "bytes of its payload",
-)
-INDEXED_CLIP = Struct(
-    "name" / TEXT * "name of the clip",
-    "skeleton" / ID * "id of its SKEL chunk",
-    "n_frames" / UVARINT * "frames",
-    "rate_numerator" / UVARINT * "frame rate, numerator; 0: unknown",
-    "rate_denominator" / UVARINT * "frame rate, denominator",
-    "signals" / counted(INDEXED_SIGNAL) * "its signals",
-    "offset" / UVARINT * "offset of the CLIP chunk",
-    "length" / UVARINT * "bytes of its payload",
-    "segments" / SIZED * "its segments, seven varints each",
-    "cend_gap" / UVARINT * "bytes between the last segment (or CLIP) and CEND",
-    "cend_length" / UVARINT * "bytes of the payload of CEND",
-    "ancillary" / counted(INDEXED_ANCILLARY) * "ancillary chunks between CEND and the next clip",
-)
-INDEX = Struct(
-    "head" / SIZED * "payload of HEAD",
-    "shared" / counted(INDEXED_CHUNK) * "SKEL, MODL and SRCE chunks, the first of each id",
-    "attachments" / counted(INDEXED_ATTACHMENT) * "attached files",
-    "aliases" / counted(ALIA) * "copies of the ALIA chunks",
-    "clips" / counted(INDEXED_CLIP) * "the clips, in file order",
-    "extension" / EXTENSION * "ignored",
-)
-INDX = Struct(
-    "size" / UVARINT * "bytes of the index, inflated",
-    "data" / GreedyBytes * "the index, as raw deflate",
-)
+
+def metadata_pairs(records: Sequence[Metadata]) -> dict[str, str]:
+    """The pairs that CLIP or QUAL has."""
+    return {record.key: record.value for record in records}
+
+
+class Clip(Record):
+    """CLIP, all that is known of a clip before its data."""
+
+    name: str = field(TEXT, "name of the clip, unique in the file, not empty")
+    flags: int = field(
+        flags(*CLIP_FLAGS), "bit 0: n_frames is open; 1: the frame rate is rounded", default=0
+    )
+    skeleton: bytes = field(ID, "id of the SKEL chunk")
+    n_frames: int = field(UVARINT, "frames; 0 while open")
+    rate_numerator: int = field(UVARINT, "frame rate, numerator; 0: unknown")
+    rate_denominator: int = field(POSITIVE, "frame rate, denominator, at least 1")  # CLIP-14
+    metadata: list[Metadata] = field(counted(Metadata), "pairs of key and value", default=[])
+    source: ClipSource | None = field(
+        optional(ClipSource), "0 or 1: how to restore the source file", default=None
+    )
+    signals: list[Signal] = field(counted(Signal), "the signals, at least 1, the motion first")
+    extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
+
+
+class Cend(Record):
+    """CEND, all that is known of a clip behind its data."""
+
+    n_frames: int = field(UVARINT, "frames of the clip")
+    source_sha256: bytes | None = field(
+        optional(SHA256), "0 or 1: hash of the source file", default=None
+    )
+    value_sha256: list[bytes] = field(counted(SHA256), "hash of each signal's canonical array")
+    extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
+
+
+class Copy(Record):
+    """COPY, copies of small chunks."""
+
+    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
+    size: int = field(UVARINT, "bytes of the copies, decoded")
+    data: bytes = field(GreedyBytes, "the copies, encoded")
+
+
+class Meta(Record):
+    """META, metadata of clips that lie before it."""
+
+    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
+    size: int = field(UVARINT, "bytes of the records, decoded")
+    data: bytes = field(GreedyBytes, "the records, encoded")
+
+
+class Qual(Record):
+    """QUAL, the quality that a clip was measured to have."""
+
+    entries: list[Metadata] = field(
+        counted(Metadata), "metric id or setting, and its value as text"
+    )
+    extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
+
+
+class GridChange(Record):
+    """A grid that differs from the clip's, in GROUP_NOTES."""
+
+    channel: int = field(UVARINT, "channel, counted within the group")
+    grid: Grid = field(GRID, "its grid in this segment")
+
+
+class OddToken(Record):
+    """A token that its grid does not print, in GROUP_NOTES."""
+
+    row: int = field(UVARINT, "rows after the exception before, or after the segment's first row")
+    channel: int = field(UVARINT, "channel, counted within the group")
+    text: bytes = field(SIZED, "the token")
+
+
+class GroupNotes(Record):
+    """The notes stream of a group in a segment."""
+
+    grid_changes: list[GridChange] = field(
+        counted(GridChange), "grids that differ from the clip's", default=[]
+    )
+    exceptions: list[OddToken] = field(
+        counted(OddToken), "tokens that the grid does not print, sorted", default=[]
+    )
+
+
+class Indx(Record):
+    """INDX, what a file holds and where."""
+
+    size: int = field(UVARINT, "bytes of the index, inflated")
+    data: bytes = field(GreedyBytes, "the index, as raw deflate")

@@ -100,7 +100,7 @@ class Container:
         self.runs = Runs()
         self.index: Foot | None = None
         self._said = Remembered()
-        self._skeletons: dict[bytes, tuple[Any, Skeleton]] = {}
+        self._skeletons: dict[bytes, tuple[payloads.Skel, Skeleton]] = {}
         self.directory = self._salvage() if salvage else self._open()
         self.profile: Profile = parse_head(self.directory.head)
 
@@ -212,12 +212,11 @@ class Container:
         self.source = better.with_more({end: chunk})
         self.directory.shared[kind, payload_id(payload)] = Chunk(kind, 0, end, len(payload))
 
-    def shared(self, kind: bytes, id_: bytes, schema: Any) -> Any:
-        """The fields of the MODL or SRCE with this id, its hash checked."""
-        payload, label = self._shared_payload(kind, id_)
-        return parse(schema, payload, label, self.profile.counts)
+    def model(self, id_: bytes) -> payloads.Modl:
+        """The MODL with this id, its hash checked."""
+        return parse(payloads.Modl, *self._shared_payload(b"MODL", id_))
 
-    def _skel(self, id_: bytes) -> Any:
+    def _skel(self, id_: bytes) -> payloads.Skel:
         return parse_skel(*self._shared_payload(b"SKEL", id_), self.profile)
 
     def _shared_payload(self, kind: bytes, id_: bytes) -> tuple[bytes, str]:
@@ -233,11 +232,11 @@ class Container:
         """The skeleton in the SKEL with this id, its own source file not read."""
         return self._skeleton(id_)[1]
 
-    def skeleton_fields(self, id_: bytes) -> Any:
+    def skeleton_fields(self, id_: bytes) -> payloads.Skel:
         """The fields of the SKEL with this id, its hash checked."""
         return self._skeleton(id_)[0]
 
-    def _skeleton(self, id_: bytes) -> tuple[Any, Skeleton]:
+    def _skeleton(self, id_: bytes) -> tuple[payloads.Skel, Skeleton]:
         """Both; the last ones are kept, since the clips of a file share them."""
         if id_ not in self._skeletons:
             fields = self._skel(id_)
@@ -250,16 +249,16 @@ class Container:
 
     def template(self, id_: bytes, format_id: int) -> bytes:
         """The template in the SRCE with this id."""
-        fields = self.shared(b"SRCE", id_, payloads.SRCE)
+        fields = parse(payloads.Srce, *self._shared_payload(b"SRCE", id_))
         if fields.format != format_id:  # CLIP-03, SKEL-04
             raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
         check(f"SRCE {id_.hex()}: bytes", fields.size, self.profile.text_bytes)
         check_decoded(f"SRCE {id_.hex()}", fields.size, self.max_decoded)
         return decoded(fields.data, fields.encoding, fields.size, f"SRCE {id_.hex()}")
 
-    def clip(self, row: ClipRow) -> Any:
+    def clip(self, row: ClipRow) -> payloads.Clip:
         """The fields of CLIP, compared with what the index says of them."""
-        fields = parse(payloads.CLIP, self.payload(row.clip), row.clip.label)
+        fields = parse(payloads.Clip, self.payload(row.clip), row.clip.label)
         signals = signal_rows(fields, row.clip.label)
         rate = fields.rate_numerator, fields.rate_denominator
         n_frames = fields.n_frames  # CLIP-17
@@ -276,11 +275,18 @@ class Container:
             raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
         return fields
 
-    def cend(self, row: ClipRow) -> Any:
+    def whole_cend(self, row: ClipRow) -> payloads.Cend:
+        """The fields of CEND; raises FormatError where a damaged file has none."""
+        record = self.cend(row)
+        if record is None:
+            raise FormatError(f"clip {row.name!r} has no CEND")
+        return record
+
+    def cend(self, row: ClipRow) -> payloads.Cend | None:
         """The fields of CEND; None where a salvaged clip has none."""
         if row.cend is None:
             return None
-        fields = parse(payloads.CEND, self.payload(row.cend), row.cend.label)
+        fields = parse(payloads.Cend, self.payload(row.cend), row.cend.label)
         if fields.n_frames != row.n_frames:
             raise FormatError(f"{row.cend.label}: {fields.n_frames} frames, not {row.n_frames}")
         return fields

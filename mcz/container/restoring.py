@@ -230,8 +230,8 @@ def restore_from_index(source: ByteSource, found: Found) -> list[str]:
         if name not in directory.aliases:
             directory.aliases[name] = of, target
             notes.append(f"the alias {name!r} is lost; it is taken from the index")
-            fields = {"name": name, "of": of, "target": target}
-            alias = build_chunk(b"ALIA", build(payloads.ALIA, fields, "ALIA"))
+            record = payloads.Alia(name=name, of=of, target=target)
+            alias = build_chunk(b"ALIA", build(record, "ALIA"))
             found.broken = [b for b in found.broken if not is_like(source, b[0], alias)]
     if not directory.head:
         notes.append("no HEAD; the file is read as one of this version")

@@ -207,14 +207,14 @@ class Walker:
         elif chunk.type == b"SRCE":
             self.templates[id_] = strict.check_template(payload, chunk.label, self.profile)
         else:
-            parse(payloads.MODL, payload, chunk.label)
+            parse(payloads.Modl, payload, chunk.label)
             self.model_bytes += len(payload)
             # LIMIT-06
             check(f"chunk {chunk.label}: all models", self.model_bytes, self.profile.model_bytes)
 
     def _attachment(self, chunk: Chunk) -> None:
         self._outside(chunk)
-        fields = parse(payloads.ATTA, self._payload(chunk), chunk.label)
+        fields = parse(payloads.Atta, self._payload(chunk), chunk.label)
         rows = self.found.directory.attachments
         if self.strict:
             strict.check_path(fields.name, chunk.label)
@@ -235,7 +235,7 @@ class Walker:
 
     def _alias(self, chunk: Chunk) -> None:
         self._outside(chunk)
-        fields = parse(payloads.ALIA, self._payload(chunk), chunk.label)
+        fields = parse(payloads.Alia, self._payload(chunk), chunk.label)
         if fields.name in self.found.directory.aliases:  # GRAM-08
             raise FormatError(f"chunk {chunk.label}: a second alias {fields.name!r}")
         if self.strict:
@@ -247,7 +247,7 @@ class Walker:
         self._outside(chunk)
         self.clip, self.first = None, []
         self.bounds.begin()
-        fields = parse(payloads.CLIP, self._payload(chunk), chunk.label)
+        fields = parse(payloads.Clip, self._payload(chunk), chunk.label)
         if not fields.name or fields.name in self.found.directory.clips:  # CLIP-01, GRAM-06
             raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
         if not fields.signals:  # CLIP-05
@@ -302,7 +302,7 @@ class Walker:
     def _end_clip(self, chunk: Chunk) -> None:
         if self.clip is None:
             raise FormatError(f"{chunk.label} is outside a clip")
-        fields = parse(payloads.CEND, self._payload(chunk), chunk.label)
+        fields = parse(payloads.Cend, self._payload(chunk), chunk.label)
         self.bounds.check(self.clip.name, "CEND", chunk.offset, chunk.size)
         self.clip.n_frames, self.clip.cend = fields.n_frames, chunk
         self._close_clip()

@@ -53,23 +53,27 @@ def check_skeleton(
     """Check a SKEL; return whether it has a source file of its own."""
     fields = parse_skel(payload, where, profile)
     parse_skeleton(fields, profile, where)
-    for base in fields.base:
-        _refer(directory, b"SKEL", base, where)  # SKEL-02
-    for source in fields.source:
-        _check_source(source, where, directory, templates, OF_CLIPS)
+    if fields.base is not None:
+        _refer(directory, b"SKEL", fields.base, where)  # SKEL-02
+    if fields.source is not None:
+        _check_source(fields.source, where, directory, templates, OF_CLIPS)
     return bool(fields.source)
 
 
 def check_template(payload: bytes, where: str, profile: Profile) -> int:
     """Check a SRCE; return its source format."""
-    fields = parse(payloads.SRCE, payload, where)
+    fields = parse(payloads.Srce, payload, where)
     check(f"{where}: bytes", fields.size, profile.text_bytes)
     decoded(fields.data, fields.encoding, fields.size, where)
     return int(fields.format)
 
 
 def _check_source(
-    source: Any, where: str, directory: Directory, templates: Templates, others: frozenset[int]
+    source: payloads.ClipSource | payloads.SkeletonSource,
+    where: str,
+    directory: Directory,
+    templates: Templates,
+    others: frozenset[int],
 ) -> None:
     """``others``: the formats that are known to be of the other sort."""
     id_ = bytes(source.template)
@@ -80,13 +84,15 @@ def _check_source(
         raise FormatError(f"{where}: source format {source.format} is of the other sort of source")
 
 
-def check_clip(fields: Any, where: str, directory: Directory, templates: Templates) -> bool:
+def check_clip(
+    fields: payloads.Clip, where: str, directory: Directory, templates: Templates
+) -> bool:
     """Check what CLIP refers to and names; return whether it has a source file."""
     _refer(directory, b"SKEL", fields.skeleton, where)  # GRAM-02
-    for source in fields.source:
-        _check_source(source, where, directory, templates, OF_SKELETONS)
-        if source.path:
-            check_path(source.path, where)
+    if fields.source is not None:
+        _check_source(fields.source, where, directory, templates, OF_SKELETONS)
+        if fields.source.path:
+            check_path(fields.source.path, where)
     keys = [pair.key for pair in fields.metadata]
     if len(keys) != len(set(keys)):  # CLIP-02, CLIP-21
         raise FormatError(f"{where}: a key of the metadata occurs twice: {sorted(keys)}")

@@ -25,7 +25,7 @@ def check_ancillary(
 ) -> None:
     """Check ``chunk`` of a file of ``file_bytes``; ``found`` lies before it. Raises FormatError."""
     if chunk.type == b"QUAL":
-        parse(payloads.QUAL, payload, chunk.label)  # QUAL-02
+        parse(payloads.Qual, payload, chunk.label)  # QUAL-02
     elif chunk.type == META:
         if not found.directory.clips:  # META-01
             raise FormatError(f"chunk {chunk.label} lies before the first clip")

@@ -63,10 +63,14 @@ def payload_id(payload: bytes) -> bytes:
 
 def build_head(profile: Profile) -> bytes:
     """The payload of a HEAD that this writer writes."""
-    version = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
-    names = ("major", "minor", "needs_major", "needs_minor")
-    fields = dict(zip(names, version * 2, strict=True))
-    return build(payloads.HEAD, fields | {"profile": profile.id, "extension": b""}, "HEAD")
+    head = payloads.Head(
+        major=payloads.FORMAT_MAJOR,
+        minor=payloads.FORMAT_MINOR,
+        needs_major=payloads.FORMAT_MAJOR,
+        needs_minor=payloads.FORMAT_MINOR,
+        profile=profile.id,
+    )
+    return build(head, "HEAD")
 
 
 UNINDEXED = 8192  # bytes of a short file that is walked as fast as its index is read
@@ -134,36 +138,30 @@ class Writer:
         """Write a SRCE and return its id."""
         check("template: bytes", len(template), self.profile.text_bytes)
         encoding, data = smallest(template, short=self.short)
-        fields = {
-            "format": format_id,
-            "encoding": encoding,
-            "size": len(template),
-            "data": data,
-        }
-        return self.shared(b"SRCE", build(payloads.SRCE, fields, "SRCE"))
+        record = payloads.Srce(format=format_id, encoding=encoding, size=len(template), data=data)
+        return self.shared(b"SRCE", build(record, "SRCE"))
 
     def attachment(self, name: str, data: bytes) -> None:
         """Write a whole file, opaque, in parts of 1 MiB."""
         self._between_clips("ATTA")
         self._new_name(name, self.directory.attachments)
         n_parts = max(1, -(-len(data) // ATTACHMENT_PART))
-        common = {
-            "name": name,
-            "n_parts": n_parts,
-            "size": len(data),
-            "sha256": hashlib.sha256(data).digest(),
-        }
+        digest = hashlib.sha256(data).digest()
         row = AttachmentRow(name, len(data), [])
         for part in range(n_parts):
             piece = data[part * ATTACHMENT_PART :][:ATTACHMENT_PART]
             encoding, packed = smallest(piece, short=self.short)
-            fields = common | {
-                "part": part,
-                "encoding": encoding,
-                "part_size": len(piece),
-                "data": packed,
-            }
-            row.parts.append(self.chunk(b"ATTA", build(payloads.ATTA, fields, "ATTA")))
+            record = payloads.Atta(
+                name=name,
+                part=part,
+                n_parts=n_parts,
+                size=len(data),
+                sha256=digest,
+                encoding=encoding,
+                part_size=len(piece),
+                data=packed,
+            )
+            row.parts.append(self.chunk(b"ATTA", build(record, "ATTA")))
         self.directory.attachments[name] = row
 
     def attachment_parts(self, name: str, size: int, parts: Sequence[bytes]) -> None:
@@ -177,8 +175,7 @@ class Writer:
         """Write that the file ``name`` is identical to something that this file holds."""
         self._between_clips("ALIA")
         self._new_name(name, self.directory.aliases)
-        fields = {"name": name, "of": of, "target": target}
-        self.chunk(b"ALIA", build(payloads.ALIA, fields, "ALIA"))
+        self.chunk(b"ALIA", build(payloads.Alia(name=name, of=of, target=target), "ALIA"))
         self.directory.aliases[name] = (of, target)
 
     def ancillary(self, kind: bytes, payload: bytes, *, safe_to_copy: bool = True) -> None:
@@ -188,22 +185,20 @@ class Writer:
         if self._clip is None and self.directory.clips:
             self.directory.clips[next(reversed(self.directory.clips))].ancillary.append(chunk)
 
-    def begin_clip(self, fields: Mapping[str, Any], n_channels: Sequence[int]) -> None:
-        """Write CLIP from its fields; ``n_channels`` of each signal is for the index."""
+    def begin_clip(self, record: payloads.Clip, n_channels: Sequence[int]) -> None:
+        """Write CLIP; ``n_channels`` of each signal is for the index."""
         self._between_clips("CLIP")
-        name = fields["name"]
+        name = record.name
         if not name:
             raise MotionError("a clip needs a name")
         self._new_name(name, self.directory.clips)
-        chunk = self.chunk(b"CLIP", build(payloads.CLIP, fields, f"clip {name!r}"))
+        chunk = self.chunk(b"CLIP", build(record, f"clip {name!r}"))
         signals = tuple(
-            SignalRow(
-                n, s["samples_per_frame"], s["codec"], s["codec_version"], s["skip"], s["spare"]
-            )
-            for n, s in zip(n_channels, fields["signals"], strict=True)
+            SignalRow(n, s.samples_per_frame, s.codec, s.codec_version, s.skip, s.spare)
+            for n, s in zip(n_channels, record.signals, strict=True)
         )
-        rate = fields["rate_numerator"], fields["rate_denominator"]
-        self._clip = ClipRow(name, fields["skeleton"], 0, *rate, signals, chunk)
+        rate = record.rate_numerator, record.rate_denominator
+        self._clip = ClipRow(name, record.skeleton, 0, *rate, signals, chunk)
 
     def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
         """Write one segment as a closed DATA, or as a packet while a DATA is open."""
@@ -261,14 +256,14 @@ class Writer:
         clip = self._in_clip("CEND")
         if self._next_packet is not None:
             self.close_data()
-        fields = {
-            "n_frames": n_frames,
-            "source_sha256": [source_sha256] if source_sha256 else [],
-            "value_sha256": list(value_sha256),
-            "extension": extension,
-        }
+        record = payloads.Cend(
+            n_frames=n_frames,
+            source_sha256=source_sha256 or None,
+            value_sha256=list(value_sha256),
+            extension=extension,
+        )
         clip.n_frames = n_frames
-        clip.cend = self.chunk(b"CEND", build(payloads.CEND, fields, "CEND"))
+        clip.cend = self.chunk(b"CEND", build(record, "CEND"))
         self.directory.clips[clip.name] = clip
         self._clip = None
 

@@ -174,5 +174,5 @@ def _is_last_part(source: ByteSource, chunk: Chunk) -> bool:
     """Whether ``chunk`` ends a thing: of an attachment only the last part does."""
     if chunk.type != b"ATTA":
         return True
-    fields = parse(payloads.ATTA, read_payload(source, chunk, chunk.size), chunk.label)
+    fields = parse(payloads.Atta, read_payload(source, chunk, chunk.size), chunk.label)
     return bool(fields.part + 1 == fields.n_parts)

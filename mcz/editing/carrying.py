@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import (
@@ -88,10 +87,10 @@ class Carrier:
         while wanted and (b"SKEL", wanted) not in self.writer.directory.shared:
             payload = self.stored(b"SKEL", wanted)
             fields = parse_skel(payload, "SKEL", self.container.profile)
-            for source in fields.source:
-                self.shared(b"SRCE", bytes(source.template))
+            if fields.source is not None:
+                self.shared(b"SRCE", fields.source.template)
             chain.append(payload)
-            wanted = bytes(fields.base[0]) if fields.base else None
+            wanted = fields.base
         for payload in reversed(chain):
             self.writer.shared(b"SKEL", payload)
 
@@ -215,20 +214,19 @@ def _moved(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> Seg
     return replace(segment, offset=segment.offset + shift - less)
 
 
-def _renamed(part: bytes, name: str | None) -> bytes:
-    fields = parse(payloads.ATTA, part, "ATTA")
-    return build(payloads.ATTA, dict(fields) | {"name": name}, "ATTA")
+def _renamed(part: bytes, name: str) -> bytes:
+    return build(replace(parse(payloads.Atta, part, "ATTA"), name=name), "ATTA")
 
 
 def _changed(payload: bytes, where: str, change: Change) -> bytes:
     """The CLIP ``payload`` with what ``change`` says."""
-    fields: dict[str, Any] = dict(parse(payloads.CLIP, payload, where))
+    record = parse(payloads.Clip, payload, where)
     if change.name is not None:
-        fields["name"] = change.name
-    if change.path is not None and fields["source"]:
-        fields["source"] = [dict(fields["source"][0]) | {"path": change.path}]
+        record.name = change.name
+    if change.path is not None and record.source:
+        record.source.path = change.path
     if change.rate is not None:
-        fields["rate_numerator"] = change.rate.numerator
-        fields["rate_denominator"] = change.rate.denominator
-        fields["flags"] &= ~payloads.ROUNDED_RATE
-    return build(payloads.CLIP, fields, where)
+        record.rate_numerator = change.rate.numerator
+        record.rate_denominator = change.rate.denominator
+        record.flags &= ~payloads.ROUNDED_RATE
+    return build(record, where)

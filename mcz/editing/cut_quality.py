@@ -9,7 +9,7 @@ from typing import Any
 from mcz.editing.cutting import ClipCut
 
 
-def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> list[dict[str, str]]:
+def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
     """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
 
     Where these say of a former cut what cannot be, it is taken for none.
@@ -20,15 +20,14 @@ def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> list[dict[str, str]]:
             now[key] = value
         elif not key.startswith("cut-"):
             now[f"uncut_{key}"] = value
-    return [{"key": key, "value": value} for key, value in now.items()]
+    return now
 
 
 def recoded_quality(
     cut: ClipCut, old: Mapping[str, str], now: dict[str, str], _: Sequence[Any]
 ) -> dict[str, str]:
     """The entries for a clip that was cut and coded anew; ``now`` are those of this coding."""
-    before = {entry["key"]: entry["value"] for entry in cut_quality(cut, old)}
-    before = {key: value for key, value in before.items() if not key.startswith("param.")}
+    before = {k: v for k, v in cut_quality(cut, old).items() if not k.startswith("param.")}
     return before | {"cut-recoded": "yes"} | now
 
 

@@ -5,9 +5,8 @@ SPEC.md, "Cutting without re-encoding", is normative. ``extraction.py`` writes w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from mcz.clock import START, numbering_of, parts_need_start
 from mcz.codecs.contract import Codec
@@ -202,9 +201,9 @@ def _kept_rows(info: SignalInfo, start: int, stop: int) -> tuple[SegmentRow, ...
     return info.rows[first : hits[-1] + 1]
 
 
-def clip_fields(cut: ClipCut, skeleton: bytes, fields: Any) -> dict[str, Any]:
-    """The fields of the CLIP of the cut clip, its source not yet changed; ``fields``: of before."""
-    metadata = {pair.key: pair.value for pair in fields.metadata}
+def clip_record(cut: ClipCut, skeleton: bytes, record: payloads.Clip) -> payloads.Clip:
+    """The CLIP of the cut clip, its source not yet changed; ``record``: that of before."""
+    metadata = payloads.metadata_pairs(record.metadata)
     if not cut.has_all_frames:
         numbers = cut.clip.frame_numbers[cut.start : cut.stop]
         given = metadata.pop(KEY, None) is not None or cut.start > 0
@@ -213,16 +212,29 @@ def clip_fields(cut: ClipCut, skeleton: bytes, fields: Any) -> dict[str, Any]:
         add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
     if cut.joints is not None or parts_need_start(cut.clip.frame_numbers, metadata):
         keep_times(cut, metadata)
-    return dict(fields) | {
-        "flags": fields.flags & ~payloads.OPEN_CLIP,
-        "skeleton": skeleton,
-        "n_frames": cut.n_frames,
-        "metadata": metadata,
-        "source": list(fields.source),
-        "signals": [
-            _signal_fields(part, own) for part, own in zip(cut.signals, fields.signals, strict=True)
+    return replace(
+        record,
+        flags=record.flags & ~payloads.OPEN_CLIP,
+        skeleton=skeleton,
+        n_frames=cut.n_frames,
+        metadata=_sorted_records(metadata),
+        signals=[
+            _signal_record(part, own) for part, own in zip(cut.signals, record.signals, strict=True)
         ],
-    }
+    )
+
+
+def _sorted_records(metadata: Mapping[str, str]) -> list[payloads.Metadata]:
+    return payloads.metadata_records(dict(sorted(metadata.items())))
+
+
+def note_source(record: payloads.Clip, text: str, cut: ClipCut | None = None) -> None:
+    """Add ``text`` to the ``source-note`` of a clip; ``cut``: whose times its numbers must tell."""
+    metadata = payloads.metadata_pairs(record.metadata)
+    if cut is not None:
+        keep_times(cut, metadata)
+    add_note(metadata, "source-note", text)
+    record.metadata = _sorted_records(metadata)
 
 
 def keep_times(cut: ClipCut, metadata: dict[str, str]) -> None:
@@ -245,7 +257,7 @@ def add_note(metadata: dict[str, str], key: str, text: str) -> None:
         metadata[key] = f"{old}; {text}" if old else text
 
 
-def _signal_fields(part: SignalCut, fields: Any) -> dict[str, Any]:
+def _signal_record(part: SignalCut, record: payloads.Signal) -> payloads.Signal:
     info = part.info
     header = info.header
     n_stored = sum(row.header.n_frames for row in part.rows)
@@ -253,28 +265,19 @@ def _signal_fields(part: SignalCut, fields: Any) -> dict[str, Any]:
     if not stored_all and info.codec.cut is not None:
         stop = part.rows[-1].header.stop if part.rows else part.base
         header = info.codec.cut(header, info.layout, part.base, stop, part.groups)
-    groups = dict(fields.groups)
-    if groups["sizes"] is not None:
-        groups["sizes"] = [len(info.layout.groups[group]) for group in part.groups]
+    sizes = record.groups.sizes
+    if sizes is not None:
+        sizes = [len(info.layout.groups[group]) for group in part.groups]
     columns = [column for group in part.groups for column in info.layout.groups[group]]
-    return dict(fields) | {
-        "skip": part.skip,
-        "spare": part.spare,
-        "grids": _grid_runs([info.grids[column] for column in columns]),
-        "header": header,
-        "groups": groups,
-        "n_resolutions": fields.n_resolutions - part.dropped,
-    }
-
-
-def _grid_runs(grids: Sequence[Any]) -> list[dict[str, Any]]:
-    runs: list[dict[str, Any]] = []
-    for grid in grids:
-        if runs and runs[-1]["grid"] == grid:
-            runs[-1]["n_channels"] += 1
-        else:
-            runs.append({"n_channels": 1, "grid": grid})
-    return runs
+    return replace(
+        record,
+        skip=part.skip,
+        spare=part.spare,
+        grids=payloads.grid_runs([info.grids[column] for column in columns]),
+        header=header,
+        groups=replace(record.groups, sizes=sizes),
+        n_resolutions=record.n_resolutions - part.dropped,
+    )
 
 
 class _Numbers(dict[int, int]):
@@ -332,4 +335,4 @@ def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int], profile: Pr
     for index, joint in enumerate(fields.joints):
         if index not in joints:
             joint.channels = []
-    return build(payloads.SKEL, dict(fields) | {"base": [id_], "source": []}, "skeleton")
+    return build(replace(fields, base=id_, source=None), "skeleton")

@@ -37,11 +37,10 @@ from mcz.editing.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
     SignalCut,
-    add_note,
-    clip_fields,
+    clip_record,
     cut_segment,
     cut_skeleton,
-    keep_times,
+    note_source,
     plan_cut,
 )
 from mcz.errors import FormatError, MotionError, OptionError
@@ -144,14 +143,14 @@ def extract(
 
 
 def with_stated_rate(
-    writer: Writer, motion: Motion, held: Mapping[str, Any], clip: Clip
-) -> tuple[Motion, Mapping[str, Any]]:
-    """``motion`` and its CLIP_SOURCE ``held`` with a template that states the rate of ``clip``."""
+    writer: Writer, motion: Motion, held: payloads.ClipSource, clip: Clip
+) -> tuple[Motion, payloads.ClipSource]:
+    """``motion`` and its ``held`` source with a template that states the rate of ``clip``."""
     changed = stating_rate(motion, clip.frame_numbers)
     if changed is motion or changed.source is None:
         return motion, held
-    template = writer.template(held["format"], changed.source.template)
-    return changed, dict(held) | {"template": template}
+    template = writer.template(held.format, changed.source.template)
+    return changed, replace(held, template=template)
 
 
 class Copier:
@@ -166,7 +165,7 @@ class Copier:
     ) -> None:
         self.file, self.progress = file, progress
         self.container: Container = file.container
-        head = parse(payloads.HEAD, self.container.directory.head, "HEAD")
+        head = parse(payloads.Head, self.container.directory.head, "HEAD")
         self.writer = Writer(
             stream,
             profile=self.container.profile,
@@ -228,23 +227,23 @@ class Copier:
             self._anew(cut)
             return
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
-        fields = self.fields_of(cut)
+        record = self.record_of(cut)
         payload = self.skeleton(clip.skeleton_id)
         skeleton = payload_id(payload)
         if cut.joints is not None:
             payload = cut_skeleton(payload, skeleton, cut.joints, self.container.profile)
             skeleton = self.writer.shared(b"SKEL", payload)
-        whole = dict(fields) | {"skeleton": skeleton}
-        new = whole if cut.is_whole else clip_fields(cut, skeleton, fields)
-        source, hashes = self.finish_fields(cut, new)
-        new["name"] = self.name_of(cut)
+        whole = replace(record, skeleton=skeleton)
+        new = whole if cut.is_whole else clip_record(cut, skeleton, record)
+        source, hashes = self.finish_record(cut, new)
+        new.name = self.name_of(cut)
         n_channels = [
             sum(len(part.info.layout.groups[group]) for group in part.groups)
             for part in cut.signals
         ]
         self.writer.begin_clip(new, n_channels)
         self.inside(row)
-        self._segments(cut, noted=bool(new["source"]))
+        self._segments(cut, noted=bool(new.source))
         cend = self.container.cend(row)
         extension = b"" if cend is None else bytes(cend.extension)
         self.writer.end_clip(cut.n_frames, source, hashes, extension)
@@ -281,64 +280,59 @@ class Copier:
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
         return record
 
-    def fields_of(self, cut: ClipCut) -> Any:
-        """The fields of the CLIP that is cut."""
+    def record_of(self, cut: ClipCut) -> payloads.Clip:
+        """The CLIP that is cut."""
         return self.container.clip(self.container.directory.clips[cut.clip.name])
 
     def name_of(self, cut: ClipCut) -> str:
         """What the clip is called from now on."""
         return cut.clip.name
 
-    def finish_fields(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
+    def finish_record(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
         """Source and metadata of the new CLIP; return the hashes of the source and the signals."""
         if cut.is_whole:
-            cend = self.container.cend(self.container.directory.clips[cut.clip.name])
-            if cend is None:  # of a damaged file
-                raise FormatError(f"clip {cut.clip.name!r} has no CEND")
-            source, hashes = b"".join(map(bytes, cend.source_sha256)), list(cend.value_sha256)
+            cend = self.container.whole_cend(self.container.directory.clips[cut.clip.name])
+            source, hashes = cend.source_sha256 or b"", list(cend.value_sha256)
         else:
             source, hashes = self._decoded(cut, new)
-            if not new["source"]:
+            if new.source is None:
                 self._without_units(cut, new)
-            pairs = new["metadata"]
-            new["metadata"] = [{"key": key, "value": pairs[key]} for key in sorted(pairs)]
-        for held in new["source"]:
-            self.carrier.shared(b"SRCE", bytes(held["template"]))
+        if new.source is not None:
+            self.carrier.shared(b"SRCE", new.source.template)
         return source, hashes
 
-    def _without_units(self, cut: ClipCut, new: dict[str, Any]) -> None:
+    def _without_units(self, cut: ClipCut, new: payloads.Clip) -> None:
         """Words whose meaning only the source told are words, and not in the unit of that."""
-        for info, fields in zip(cut.clip.signals, new["signals"], strict=True):
+        for info, signal in zip(cut.clip.signals, new.signals, strict=True):
             if cut.clip.is_scaled(info.index):
-                fields["channels"] = [dict(own) | {"unit": ""} for own in fields["channels"]]
-                add_note(new["metadata"], "source-note", f"{info.name}: words as they were stored")
+                signal.channels = [replace(own, unit="") for own in signal.channels or ()]
+                note_source(new, f"{info.name}: words as they were stored")
                 said = f"what the words of its signal {info.name} mean, as its source file was cut"
                 self.found.left_out.append(f"clip {cut.clip.name}: {said}")
 
-    def _decoded(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
+    def _decoded(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
         """The hashes of what is left, decoded once, and the source file that it has now."""
-        held, metadata = new["source"], new["metadata"]
+        held = new.source
         if held and cut.joints is not None:
-            new["source"] = []
-            add_note(metadata, "source-note", WITHOUT_SOURCE)
+            new.source = None
+            note_source(new, WITHOUT_SOURCE)
             self.found.left_out.append(f"clip {cut.clip.name}: its source file, as joints were cut")
         elif held:
             motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
             hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
             if motion.source is None:  # of a damaged file; the template may say why
-                self.container.template(bytes(held[0]["template"]), held[0]["format"])
+                self.container.template(held.template, held.format)
                 raise FormatError("it cannot be put together")
-            motion, held[0] = with_stated_rate(self.writer, motion, held[0], cut.clip)
+            motion, held = with_stated_rate(self.writer, motion, held, cut.clip)
             assert motion.source is not None
             try:
                 data = FORMATS[motion.source.format].write(motion)
             except MotionError as error:
-                new["source"] = []
-                keep_times(cut, metadata)
-                add_note(metadata, "source-note", f"the source file was left out: {error}")
+                new.source = None
+                note_source(new, f"the source file was left out: {error}", cut)
                 self.found.left_out.append(f"clip {cut.clip.name}: its source file, as {error}")
                 return b"", hashes
-            new["source"] = [dict(held[0]) | {"size": len(data)}]
+            new.source = replace(held, size=len(data))
             return hashlib.sha256(data).digest(), hashes
         return b"", [self._value_hash(cut, part) for part in cut.signals]
 
@@ -365,12 +359,14 @@ class Copier:
         """The quality record, changed where something was cut, and the other ancillary chunks."""
         records = [chunk for chunk in row.ancillary if chunk.type == b"QUAL"]
         if not cut.is_whole:
-            fields: dict[str, Any] = {"entries": [], "extension": b""}
+            record = payloads.Qual(entries=[])
             if records:
                 payload = self.container.payload(records[0])
-                fields = dict(parse(payloads.QUAL, payload, records[0].label))
-            fields["entries"] = cut_quality(cut, {e.key: e.value for e in fields["entries"]})
-            self.writer.ancillary(b"QUAL", build(payloads.QUAL, fields, "quality record"))
+                record = parse(payloads.Qual, payload, records[0].label)
+            record.entries = payloads.metadata_records(
+                cut_quality(cut, {entry.key: entry.value for entry in record.entries})
+            )
+            self.writer.ancillary(b"QUAL", build(record, "quality record"))
         for chunk in row.ancillary:
             if cut.is_whole or chunk.type != b"QUAL":
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))

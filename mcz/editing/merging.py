@@ -194,8 +194,8 @@ def _of_clip(clip: Clip) -> Callable[[], Any]:
     """What is the same in two clips of which one can stand for the other."""
 
     def content() -> Any:
-        hashes = clip.container.cend(clip.container.directory.clips[clip.name])
-        digests = [bytes(digest) for digest in (*hashes.source_sha256, *hashes.value_sha256)]
+        hashes = clip.container.whole_cend(clip.container.directory.clips[clip.name])
+        digests = [hashes.source_sha256, *hashes.value_sha256]
         path = clip.source.path if clip.source is not None else ""
         return clip.skeleton_id, clip.frame_rate, path, dict(clip.metadata), digests
 
@@ -206,7 +206,7 @@ def _of_attachment(file: File, name: str) -> Callable[[], Any]:
     def content() -> Any:
         container = file.container
         part = container.directory.attachments[name].parts[0]
-        fields = parse(payloads.ATTA, container.payload(part), part.label)
+        fields = parse(payloads.Atta, container.payload(part), part.label)
         return fields.size, bytes(fields.sha256)
 
     return content

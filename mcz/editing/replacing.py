@@ -27,7 +27,7 @@ from mcz.container.locks import lock
 from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
 from mcz.editing.anew import check_anew, settings_of, source_file
-from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
+from mcz.editing.cutting import ClipCut, cut_segment, note_source, plan_cut
 from mcz.editing.extraction import Copier, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.errors import (
@@ -165,7 +165,7 @@ class _Beside:
     def add(self, flag: int, stream: bytes) -> None:
         self.size += len(stream)
         if flag == GROUP_NOTES and stream:
-            notes = parse(payloads.GROUP_NOTES, stream, "group notes")
+            notes = parse(payloads.GroupNotes, stream, "group notes")
             self.n_exceptions += len(notes.exceptions)
 
 
@@ -193,37 +193,35 @@ class _Editor(Copier):
             super().clip(cut)
             return
         row = self.container.directory.clips[cut.clip.name]
-        fields = dict(self.container.clip(row))
+        record = self.container.clip(row)
         self.skeleton(cut.clip.skeleton_id)
-        source = self._source(fields)
-        for held in fields["source"]:
-            self.carrier.shared(b"SRCE", bytes(held["template"]))
-        self.writer.begin_clip(fields, [part.info.layout.n_channels for part in cut.signals])
+        source = self._source(record)
+        if record.source is not None:
+            self.carrier.shared(b"SRCE", record.source.template)
+        self.writer.begin_clip(record, [part.info.layout.n_channels for part in cut.signals])
         self.inside(row)
-        self._edited_segments(cut, noted=bool(fields["source"]))
-        cend = self.container.cend(row)
+        self._edited_segments(cut, noted=bool(record.source))
+        cend = self.container.whole_cend(row)
         signal = self.recoded.decoded.signals[0]
         hashes = [value_hash(signal.values, signal.mask), *cend.value_sha256[1:]]
         self.writer.end_clip(cut.n_frames, source, hashes, bytes(cend.extension))
         self._edited_quality(row)
 
-    def _source(self, fields: dict[str, Any]) -> bytes:
-        """Put the size of the new source file into the fields of CLIP; return its hash."""
-        motion, held = self.recoded.decoded, fields["source"]
-        if motion.source is None or not held:
+    def _source(self, record: payloads.Clip) -> bytes:
+        """Put the size of the new source file into CLIP; return its hash."""
+        motion, held = self.recoded.decoded, record.source
+        if motion.source is None or held is None:
             return b""
         clip = self.file.clips[self.name]
-        motion, held[0] = with_stated_rate(self.writer, motion, held[0], clip)
+        motion, held = with_stated_rate(self.writer, motion, held, clip)
         try:
             data = source_file(motion)
         except MotionError as error:
-            metadata = {pair.key: pair.value for pair in fields["metadata"]}
-            add_note(metadata, "source-note", f"the source file was left out: {error}")
-            fields["metadata"] = [{"key": k, "value": metadata[k]} for k in sorted(metadata)]
-            fields["source"] = []
+            note_source(record, f"the source file was left out: {error}")
+            record.source = None
             self.found.left_out.append(f"clip {self.name}: its source file, as {error}")
             return b""
-        fields["source"] = [dict(held[0]) | {"size": len(data)}]
+        record.source = dataclasses.replace(held, size=len(data))
         return hashlib.sha256(data).digest()
 
     def _edited_segments(self, cut: ClipCut, *, noted: bool) -> None:
@@ -279,14 +277,13 @@ class _Editor(Copier):
         """The quality record with what is known of the new values, and the other chunks."""
         records = [chunk for chunk in row.ancillary if chunk.type == CHUNK]
         if records or not self.recoded.info.codec.lossless:
-            fields: dict[str, Any] = {"entries": [], "extension": b""}
+            record = payloads.Qual(entries=[])
             if records:
                 payload = self.container.payload(records[0])
-                fields = dict(parse(payloads.QUAL, payload, records[0].label))
-            old = {entry.key: entry.value for entry in fields["entries"]}
-            entries = self._entries(old).items()
-            fields["entries"] = [{"key": key, "value": value} for key, value in entries]
-            self.writer.ancillary(CHUNK, build(payloads.QUAL, fields, "quality record"))
+                record = parse(payloads.Qual, payload, records[0].label)
+            old = {entry.key: entry.value for entry in record.entries}
+            record.entries = payloads.metadata_records(self._entries(old))
+            self.writer.ancillary(CHUNK, build(record, "quality record"))
         for chunk in row.ancillary:
             if chunk.type != CHUNK:
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))

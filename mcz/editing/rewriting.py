@@ -102,8 +102,8 @@ def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
     while wanted and (b"SKEL", wanted) not in found:
         fields = container.skeleton_fields(wanted)
         found.add((b"SKEL", wanted))
-        found |= {(b"SRCE", bytes(source.template)) for source in fields.source}
-        wanted = bytes(fields.base[0]) if fields.base else None
+        found |= {(b"SRCE", bytes(source.template)) for source in [fields.source] if source}
+        wanted = fields.base
     return found
 
 
@@ -149,7 +149,7 @@ def source_path(file: File, name: str) -> str:
 def writer_like(stream: Any, files: Iterable[File]) -> Writer:
     """A Writer of a new file that has what the first of ``files`` has, and holds what all hold."""
     files = list(files)
-    head = parse(payloads.HEAD, files[0].container.directory.head, "HEAD")
+    head = parse(payloads.Head, files[0].container.directory.head, "HEAD")
     profiles: list[Profile] = [file.container.profile for file in files]
     return Writer(
         stream,

@@ -11,20 +11,20 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
 from mcz.container.packed import parse_skel
 from mcz.container.writer import payload_id
-from mcz.editing.cutting import ClipCut, add_note
+from mcz.editing.cutting import ClipCut, note_source
 from mcz.editing.extraction import Copier, Extraction
 from mcz.editing.recovering import Recovery
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
 from mcz.reading.file import File
 from mcz.reading.signal_info import SignalInfo
-from mcz.schema import Fields, build
+from mcz.schema import build
 from mcz.writing.clip_writer import Progress
 
 Run = tuple[int, int]  # frames a <= f < b
@@ -126,12 +126,12 @@ class Repairer(Copier):
             name += "+"
         return name
 
-    def fields_of(self, cut: ClipCut) -> Any:
-        fields = super().fields_of(cut)
+    def record_of(self, cut: ClipCut) -> payloads.Clip:
+        record = super().record_of(cut)
         if not isinstance(cut.clip, SomeSignals):
-            return fields
-        signals = [fields.signals[index] for index in cut.clip.kept]
-        return Fields(fields, signals=signals, source=[])
+            return record
+        signals = [record.signals[index] for index in cut.clip.kept]
+        return replace(record, signals=signals, source=None)
 
     def _quality(self, cut: ClipCut, row: ClipRow) -> None:
         """Figures are of the motion."""
@@ -194,7 +194,7 @@ class Repairer(Copier):
             chain[wanted] = None
             with suppress(FormatError):
                 bases = self.container.skeleton_fields(wanted).base
-                wanted = bytes(bases[0]) if bases else None
+                wanted = bases
         for one in reversed(chain):
             with suppress(FormatError) if one != id_ else nullcontext():
                 self._skeletons[one] = self._after_its_base(one)
@@ -203,7 +203,7 @@ class Repairer(Copier):
     def _after_its_base(self, id_: bytes) -> bytes:
         """Copy a skeleton, whose base is copied; return its payload."""
         fields = self.container.skeleton_fields(id_)
-        kept = {base: self._skeletons.get(base) for base in map(bytes, fields.base)}
+        kept = {base: self._skeletons.get(base) for base in [fields.base] if base}
         try:
             if any(payload is None or payload_id(payload) != id_ for id_, payload in kept.items()):
                 raise FormatError("its base is not what it was")
@@ -213,9 +213,10 @@ class Repairer(Copier):
         except FormatError as error:
             self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
         stored, where = self.carrier.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
-        changed = dict(parse_skel(stored, where, self.container.profile))
         bases = [payload_id(payload) for payload in kept.values() if payload is not None]
-        payload = build(payloads.SKEL, changed | {"base": bases, "source": []}, "skeleton")
+        record = parse_skel(stored, where, self.container.profile)
+        record.base, record.source = (bases[0] if bases else None), None
+        payload = build(record, "skeleton")
         self.writer.shared(b"SKEL", payload)
         return payload
 
@@ -233,38 +234,32 @@ class Repairer(Copier):
         here = self.repair.clips if of == payloads.OF_CLIP else self.repair.attachments
         return target.decode("utf-8", "replace") in here
 
-    def finish_fields(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
+    def finish_record(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
         if isinstance(cut.clip, SomeSignals):
-            add_note(new["metadata"], "source-note", NOTE_OF_SIGNALS)
+            note_source(new, NOTE_OF_SIGNALS)
         try:
-            if self._degree(cut) >= WITHOUT_SOURCE_FILE and new["source"]:
+            if self._degree(cut) >= WITHOUT_SOURCE_FILE and new.source:
                 raise FormatError("what it gives is not what the clip says")
-            found = super().finish_fields(cut, new)
+            found = super().finish_record(cut, new)
         except FormatError as error:
-            if not new["source"]:
+            if new.source is None:
                 raise
             found = self._without_source(cut, new, error)
-        if isinstance(cut, WholeRun) and cut.name != cut.clip.name and new["source"]:
-            held = new["source"][0]
-            if held["path"]:
-                path = PurePosixPath(held["path"])
-                named = path.with_name(f"{path.stem}.{cut.start}-{cut.stop}{path.suffix}")
-                new["source"] = [held | {"path": str(named)}]
+        is_renamed = isinstance(cut, WholeRun) and cut.name != cut.clip.name
+        if is_renamed and new.source and new.source.path:
+            path = PurePosixPath(new.source.path)
+            named = path.with_name(f"{path.stem}.{cut.start}-{cut.stop}{path.suffix}")
+            new.source = replace(new.source, path=str(named))
         return found
 
     def _without_source(
-        self, cut: ClipCut, new: dict[str, Any], error: FormatError
+        self, cut: ClipCut, new: payloads.Clip, error: FormatError
     ) -> tuple[bytes, list[bytes]]:
         """The same of a clip whose template is lost, and with it what the file was like."""
         text = about_clip(cut.clip.name, f"its source file: {error}")
         if text not in self.repair.lost:
             self.repair.lost.append(text)
-        metadata = new["metadata"]
-        if cut.is_whole:  # a list of records
-            metadata = {pair["key"]: pair["value"] for pair in metadata}
-        new["source"], new["metadata"] = [], metadata
-        add_note(metadata, "source-note", NOTE)
-        _, hashes = super().finish_fields(cut, new)
-        if cut.is_whole:
-            new["metadata"] = [{"key": key, "value": metadata[key]} for key in sorted(metadata)]
+        new.source = None
+        note_source(new, NOTE)
+        _, hashes = super().finish_record(cut, new)
         return b"", hashes

@@ -212,8 +212,9 @@ def _source_error(clip: Clip) -> str:
     """Why the source of a clip cannot be put together, as far as its template is to blame."""
     row = clip.container.directory.clips[clip.name]
     try:
-        for held in clip.container.clip(row).source:
-            clip.container.template(bytes(held.template), held.format)
+        source = clip.container.clip(row).source
+        if source is not None:
+            clip.container.template(source.template, source.format)
     except MczError as error:
         return str(error)
     return ""

@@ -36,7 +36,7 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
     for name, held in container.directory.attachments.items():
         with suppress(FormatError):
             part = held.parts[0]
-            digest = bytes(parse(payloads.ATTA, container.payload(part), part.label).sha256)
+            digest = bytes(parse(payloads.Atta, container.payload(part), part.label).sha256)
             contents.setdefault(digest, (payloads.OF_ATTACHMENT, name.encode()))
             paths.setdefault(name, digest)
     by_target = {target: digest for digest, target in contents.items()}

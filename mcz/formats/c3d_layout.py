@@ -1,7 +1,7 @@
 """What a C3D file holds beside its data, as a template and a detail.
 
-SPEC.md, "Source reconstruction", is normative and has the tables of C3D_TEMPLATE, C3D_DETAIL,
-C3D_FIELD and C3D_OUTPUTS_TEMPLATE.
+SPEC.md, "Source reconstruction", is normative and has the tables of C3dTemplate, C3dDetail,
+C3dField and C3dOutputsTemplate.
 """
 
 from __future__ import annotations
@@ -12,13 +12,25 @@ from enum import IntEnum
 from fractions import Fraction
 
 import numpy as np
+from construct import Int8ul
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError, LimitError
 from mcz.formats.c3d_outputs import Split, split_of
 from mcz.formats.c3d_parameters import DEC, INTEL, SGI, Order
 from mcz.formats.c3d_shape import COUNTED, ROTATION_WORDS
-from mcz.schema import SIZED, UVARINT, ExprValidator, Int8ul, OneOf, Struct, build, counted, parse
+from mcz.schema import (
+    SIZED,
+    UVARINT,
+    Checked,
+    Record,
+    bounded,
+    build,
+    counted,
+    field,
+    one_of,
+    parse,
+)
 
 FORMAT, OUTPUTS_FORMAT = "c3d", "c3d-outputs"  # names in the registry of source formats
 MAX_ZEROS = 2**20  # that a detail counts instead of holding them
@@ -41,40 +53,58 @@ class Kind(IntEnum):
         return 4 if self in (Kind.COUNT_FLOAT, Kind.FIRST_LONG, Kind.LAST_LONG) else 2
 
 
-_WORD = ExprValidator(UVARINT, lambda obj, ctx: obj <= COUNTED)  # C3D-05
+_WORD = bounded(UVARINT, 0, COUNTED)  # C3D-05
 
-C3D_FIELD = Struct(
-    "at" / UVARINT * "offset in head, not before the end of the field before",
-    "kind" / OneOf(Int8ul, tuple(Kind)) * "what the field says",  # C3D-09
-)
-C3D_TEMPLATE = Struct(
-    "processor" / OneOf(Int8ul, (INTEL, DEC, SGI)) * "84 Intel, 85 DEC, 86 SGI",  # C3D-01
-    "word" / OneOf(Int8ul, (2, 4)) * "bytes of a word of the data: 2 integers, 4 floats",  # C3D-02
-    "points" / _WORD * "points",
-    "channels" / _WORD * "analog channels",
-    "subframes" / ExprValidator(_WORD, lambda obj, ctx: obj >= 1) * "analog samples a frame",
-    "unsigned"
-    / ExprValidator(Int8ul, lambda obj, ctx: obj <= 1)  # C3D-03
-    * "1: analog words are 0 to 65535; 0: they have a sign, or word is 4",
-    "rotations" / _WORD * "rotations; 0 where word is 2",
-    # C3D-06
-    "ratio" / ExprValidator(_WORD, lambda obj, ctx: obj >= 1) * "samples a frame of a rotation",
-    "head" / SIZED * "the file up to the data section, fields filled with zeros",
-    "fields" / counted(C3D_FIELD) * "the fields of head, in order",
-    "gap" / SIZED * "bytes between the data section and the rotations; empty without rotations",
-    "tail" / SIZED * "bytes behind the data",
-)
-C3D_OUTPUTS_TEMPLATE = Struct(
-    "outputs" / counted(UVARINT) * "points that are points, then outputs, and so on in turn",
-    "file" / C3D_TEMPLATE * "the file",
-)
-C3D_DETAIL = Struct(
-    "n_frames" / UVARINT * "frames of the source file",
-    "first" / UVARINT * "number of its first frame",
-    "values" / SIZED * "bytes of all fields, one after the other",
-    "tail" / SIZED * "more bytes behind the data",
-    "zeros" / UVARINT * "zero bytes behind all that",
-)
+
+class C3dField(Record):
+    """A field of the head of a C3D that differs by clip."""
+
+    at: int = field(UVARINT, "offset in head, not before the end of the field before")
+    kind: int = field(one_of(Int8ul, tuple(Kind)), "what the field says")  # C3D-09
+
+
+class C3dTemplate(Record):
+    """Template of C3D."""
+
+    processor: int = field(one_of(Int8ul, (INTEL, DEC, SGI)), "84 Intel, 85 DEC, 86 SGI")  # C3D-01
+    word: int = field(
+        one_of(Int8ul, (2, 4)), "bytes of a word of the data: 2 integers, 4 floats"
+    )  # C3D-02
+    points: int = field(_WORD, "points")
+    channels: int = field(_WORD, "analog channels")
+    subframes: int = field(Checked(_WORD, lambda obj, ctx: obj >= 1), "analog samples a frame")
+    unsigned: int = field(
+        bounded(Int8ul, 0, 1), "1: analog words are 0 to 65535; 0: they have a sign, or word is 4"
+    )  # C3D-03
+    rotations: int = field(_WORD, "rotations; 0 where word is 2")
+    ratio: int = field(
+        Checked(_WORD, lambda obj, ctx: obj >= 1), "samples a frame of a rotation"
+    )  # C3D-06
+    head: bytes = field(SIZED, "the file up to the data section, fields filled with zeros")
+    fields: list[C3dField] = field(counted(C3dField), "the fields of head, in order")
+    gap: bytes = field(
+        SIZED, "bytes between the data section and the rotations; empty without rotations"
+    )
+    tail: bytes = field(SIZED, "bytes behind the data")
+
+
+class C3dOutputsTemplate(Record):
+    """Template of C3D with model outputs."""
+
+    outputs: list[int] = field(
+        counted(UVARINT), "points that are points, then outputs, and so on in turn"
+    )
+    file: C3dTemplate = field(C3dTemplate, "the file")
+
+
+class C3dDetail(Record):
+    """Detail of C3D."""
+
+    n_frames: int = field(UVARINT, "frames of the source file")
+    first: int = field(UVARINT, "number of its first frame")
+    values: bytes = field(SIZED, "bytes of all fields, one after the other")
+    tail: bytes = field(SIZED, "more bytes behind the data")
+    zeros: int = field(UVARINT, "zero bytes behind all that")
 
 
 class FrameClock:
@@ -101,10 +131,10 @@ def clock_of(template: bytes) -> FrameClock:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A template and a detail, parsed; see C3D_TEMPLATE and C3D_DETAIL.
+    """A template and a detail, parsed; see C3dTemplate and C3dDetail.
 
     ``head`` here has the fields in place; ``tail`` is all that lies behind the data; ``outputs`` is
-    that of C3D_OUTPUTS_TEMPLATE, () where all points are points.
+    that of C3dOutputsTemplate, () where all points are points.
     """
 
     order: Order
@@ -150,34 +180,30 @@ class Layout:
         tail = self.tail.rstrip(b"\0")
         tail += bytes(max(0, len(self.tail) - len(tail) - MAX_ZEROS))
         shared = len(tail) > MAX_SHARED_TAIL
-        template = {
-            "processor": self.order.processor,
-            "word": self.word,
-            "points": self.n_points,
-            "channels": self.n_channels,
-            "subframes": self.subframes,
-            "unsigned": int(self.unsigned),
-            "rotations": self.n_rotations,
-            "ratio": self.ratio,
-            "head": bytes(head),
-            "fields": [{"at": at, "kind": kind} for at, kind in self.fields],
-            "gap": self.gap,
-            "tail": tail if shared else b"",
-        }
-        detail = {
-            "n_frames": self.n_frames,
-            "first": self.first,
-            "values": values,
-            "tail": b"" if shared else tail,
-            "zeros": len(self.tail) - len(tail),
-        }
-        schema = C3D_TEMPLATE
-        if self.outputs:
-            schema, template = C3D_OUTPUTS_TEMPLATE, {"outputs": self.outputs, "file": template}
-        return (
-            build(schema, template, "source template"),
-            build(C3D_DETAIL, detail, "source detail"),
+        file = C3dTemplate(
+            processor=self.order.processor,
+            word=self.word,
+            points=self.n_points,
+            channels=self.n_channels,
+            subframes=self.subframes,
+            unsigned=int(self.unsigned),
+            rotations=self.n_rotations,
+            ratio=self.ratio,
+            head=bytes(head),
+            fields=[C3dField(at=at, kind=kind) for at, kind in self.fields],
+            gap=self.gap,
+            tail=tail if shared else b"",
         )
+        detail = C3dDetail(
+            n_frames=self.n_frames,
+            first=self.first,
+            values=values,
+            tail=b"" if shared else tail,
+            zeros=len(self.tail) - len(tail),
+        )
+        outputs = list(self.outputs)
+        template = C3dOutputsTemplate(outputs=outputs, file=file) if outputs else file
+        return build(template, "source template"), build(detail, "source detail")
 
 
 def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
@@ -187,7 +213,7 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
     """
     outputs: tuple[int, ...] = ()
     if source_format == OUTPUTS_FORMAT:
-        parsed = parse(C3D_OUTPUTS_TEMPLATE, template, "source template")
+        parsed = parse(C3dOutputsTemplate, template, "source template")
         shared, outputs = parsed.file, tuple(parsed.outputs)
         if 0 in outputs[1:]:  # C3D-17
             raise FormatError("source template: a run of no points")
@@ -196,8 +222,8 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
                 f"source template: runs of {sum(outputs)} points, but there are {shared.points}"
             )
     else:
-        shared = parse(C3D_TEMPLATE, template, "source template")
-    own = parse(C3D_DETAIL, detail, "source detail")
+        shared = parse(C3dTemplate, template, "source template")
+    own = parse(C3dDetail, detail, "source detail")
     if own.zeros > MAX_ZEROS:  # C3D-13
         raise LimitError(f"source detail: {own.zeros} zeros, limit {MAX_ZEROS}")
     if shared.word == 4 and shared.unsigned:  # C3D-04
@@ -212,11 +238,11 @@ def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
         if not end <= entry.at <= len(head) - kind.size:  # C3D-10, C3D-11
             raise FormatError(f"source template: a field at {entry.at}, {end} or more expected")
         end = entry.at + kind.size
-        head[entry.at : end] = own["values"][taken : taken + kind.size]
+        head[entry.at : end] = own.values[taken : taken + kind.size]
         taken += kind.size
         fields.append((entry.at, kind))
-    if taken != len(own["values"]) or len(head) != len(shared.head):  # C3D-12
-        raise FormatError(f"source detail: {len(own['values'])} bytes of fields, not {taken}")
+    if taken != len(own.values) or len(head) != len(shared.head):  # C3D-12
+        raise FormatError(f"source detail: {len(own.values)} bytes of fields, not {taken}")
     return Layout(
         Order(shared.processor),
         shared.word,

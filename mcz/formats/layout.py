@@ -2,7 +2,7 @@
 
 The text of a frame follows a *pattern*: runs of columns, each token behind the run's gap, and a
 tail. AMC and BVH share this; SPEC.md, "Source reconstruction", is normative and has the tables of
-TEMPLATE, DETAIL and NOTES.
+Template, Detail and NOTES.
 """
 
 from __future__ import annotations
@@ -15,7 +15,18 @@ import numpy as np
 
 from mcz.errors import FormatError, LimitError
 from mcz.kernels.types import Bytes, Ints
-from mcz.schema import SIZED, SVARINT, UVARINT, ExprValidator, Struct, build, counted, parse
+from mcz.schema import (
+    SIZED,
+    SVARINT,
+    UVARINT,
+    Checked,
+    Record,
+    bounded,
+    build,
+    counted,
+    field,
+    parse,
+)
 
 FRAME_NUMBER = -1  # the column of the frame number
 MAX_PATTERNS = 1024
@@ -28,37 +39,55 @@ WORDS, FULL, BLANKS, FREE = -1, 0, 1, 2  # what the tokens of a row are: text_ke
 
 
 # SRC-12
-_WIDTH = ExprValidator(SVARINT, lambda obj, ctx: -MAX_WIDTH <= obj <= MAX_WIDTH and obj != -1)
-BIT = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)  # SRC-13
+_WIDTH = Checked(SVARINT, lambda obj, ctx: -MAX_WIDTH <= obj <= MAX_WIDTH and obj != -1)
+BIT = bounded(UVARINT, 0, 1)  # SRC-13
 
-RUN = Struct(
-    "gap" / UVARINT * "number of the gap that precedes every token of the run",
-    "column" / UVARINT * "first column: 0 the frame number, c + 1 channel c",
-    "n_columns" / UVARINT * "columns of the run, at least 1; 1 where column is 0",
-    "width" / _WIDTH * "padding: 0 none, 1 blank for no sign, w > 1 right, w < -1 left justified",
-)
-PATTERN = Struct(
-    "runs" / counted(RUN, kind="runs") * "the tokens of a frame, in order",
-    "tail" / UVARINT * "number of the gap that ends the frame",
-)
-TEMPLATE = Struct(
-    # SRC-03
-    "header" / counted(SIZED, 2) * "text before the frames; the frame count stands between 2 parts",
-    "gaps" / counted(SIZED, MAX_GAPS) * "gaps, numbered from 0",
-    "patterns"
-    / counted(PATTERN, MAX_PATTERNS)
-    * "none, or the most common pattern, which is number 0",
-)
-DETAIL = Struct(
-    "count" / SIZED * "frame count as printed; empty: the number of rows in decimal",
-    "rows" / UVARINT * "number of rows for which count holds; 0 where count is empty",
-    "gaps" / counted(SIZED, MAX_GAPS) * "further gaps, numbered on from the template's",
-    "patterns"
-    / counted(PATTERN, MAX_PATTERNS)
-    * "further patterns, numbered on from the template's",
-    "ends" / BIT * "1: ending stands in place of the last row's tail; 0: the tail does",
-    "ending" / SIZED * "what follows the last token; empty where ends is 0",
-)
+
+class RunFields(Record):
+    """Tokens of a frame behind equal gaps, in PATTERN."""
+
+    gap: int = field(UVARINT, "number of the gap that precedes every token of the run")
+    column: int = field(UVARINT, "first column: 0 the frame number, c + 1 channel c")
+    n_columns: int = field(UVARINT, "columns of the run, at least 1; 1 where column is 0")
+    width: int = field(
+        _WIDTH, "padding: 0 none, 1 blank for no sign, w > 1 right, w < -1 left justified"
+    )
+
+
+class PatternFields(Record):
+    """Layout of a frame's text."""
+
+    runs: list[RunFields] = field(
+        counted(RunFields, kind="runs"), "the tokens of a frame, in order"
+    )
+    tail: int = field(UVARINT, "number of the gap that ends the frame")
+
+
+class Template(Record):
+    """Template of AMC and BVH."""
+
+    header: list[bytes] = field(
+        counted(SIZED, 2), "text before the frames; the frame count stands between 2 parts"
+    )  # SRC-03
+    gaps: list[bytes] = field(counted(SIZED, MAX_GAPS), "gaps, numbered from 0")
+    patterns: list[PatternFields] = field(
+        counted(PatternFields, MAX_PATTERNS), "none, or the most common pattern, which is number 0"
+    )
+
+
+class Detail(Record):
+    """Detail of AMC and BVH, and of a section of a table."""
+
+    count: bytes = field(SIZED, "frame count as printed; empty: the number of rows in decimal")
+    rows: int = field(UVARINT, "number of rows for which count holds; 0 where count is empty")
+    gaps: list[bytes] = field(
+        counted(SIZED, MAX_GAPS), "further gaps, numbered on from the template's"
+    )
+    patterns: list[PatternFields] = field(
+        counted(PatternFields, MAX_PATTERNS), "further patterns, numbered on from the template's"
+    )
+    ends: int = field(BIT, "1: ending stands in place of the last row's tail; 0: the tail does")
+    ending: bytes = field(SIZED, "what follows the last token; empty where ends is 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +153,7 @@ def runs_of(items: Iterable[tuple[bytes, int, int]]) -> tuple[Run, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A template and a detail, parsed: see TEMPLATE and DETAIL; ``ending`` None: the usual tail."""
+    """A template and a detail, parsed: see Template and Detail; ``ending`` None: the usual tail."""
 
     header: tuple[bytes, ...]
     patterns: tuple[Pattern, ...] = ()
@@ -135,24 +164,30 @@ class Layout:
     def build(self) -> tuple[bytes, bytes]:
         """The bytes of the template and of the detail; LimitError for too many runs."""
         shared, own = numbered_patterns(self.patterns)
-        template = {"header": self.header, **shared}
-        return build(TEMPLATE, template, "source template"), build(
-            DETAIL, self.detail_fields(own), "source detail"
+        template = Template(header=list(self.header), gaps=shared.gaps, patterns=shared.patterns)
+        return build(template, "source template"), build(self.detail(own), "source detail")
+
+    def detail(self, own: Numbered) -> Detail:
+        """The detail, whose gaps and patterns are ``own``."""
+        return Detail(
+            count=self.count,
+            rows=self.rows,
+            gaps=own.gaps,
+            patterns=own.patterns,
+            ends=int(self.ending is not None),
+            ending=self.ending or b"",
         )
 
-    def detail_fields(self, own: dict[str, Any]) -> dict[str, Any]:
-        """The fields of DETAIL; ``own``: its gaps and patterns."""
-        return {
-            "count": self.count,
-            "rows": self.rows,
-            **own,
-            "ends": int(self.ending is not None),
-            "ending": self.ending or b"",
-        }
+
+class Numbered(NamedTuple):
+    """The gaps and patterns of a template or a detail."""
+
+    gaps: list[bytes]
+    patterns: list[PatternFields]
 
 
-def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Gaps and patterns of a template and of a detail, as fields; LimitError for too many runs."""
+def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[Numbered, Numbered]:
+    """Gaps and patterns of a template and of a detail; LimitError for too many runs."""
     if sum(len(pattern.runs) for pattern in patterns) > MAX_RUNS:
         raise LimitError(f"the frames are laid out in more than {MAX_RUNS} runs of columns")
     gaps: dict[bytes, int] = {}
@@ -162,28 +197,27 @@ def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[dict[str, Any], dict
         fields.append(_pattern_fields(pattern, gaps))
         n_shared = n_shared or len(gaps)
     numbered = list(gaps)
-    shared = {"gaps": numbered[:n_shared], "patterns": fields[:1]}
-    return shared, {"gaps": numbered[n_shared:], "patterns": fields[1:]}
+    return Numbered(numbered[:n_shared], fields[:1]), Numbered(numbered[n_shared:], fields[1:])
 
 
-def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> dict[str, Any]:
-    """The fields of PATTERN; numbers its gaps in ``gaps``."""
+def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> PatternFields:
+    """The fields of a pattern; numbers its gaps in ``gaps``."""
     runs = [
-        {
-            "gap": gaps.setdefault(run.gap, len(gaps)),
-            "column": run.column + 1,
-            "n_columns": run.n_columns,
-            "width": run.width,
-        }
+        RunFields(
+            gap=gaps.setdefault(run.gap, len(gaps)),
+            column=run.column + 1,
+            n_columns=run.n_columns,
+            width=run.width,
+        )
         for run in pattern.runs
     ]
-    return {"runs": runs, "tail": gaps.setdefault(pattern.tail, len(gaps))}
+    return PatternFields(runs=runs, tail=gaps.setdefault(pattern.tail, len(gaps)))
 
 
 def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
     """The layout of a clip of ``n_channels`` channels; raises FormatError on bad bytes."""
-    shared = parse(TEMPLATE, template, "source template", {"runs": MAX_RUNS})
-    own = parse(DETAIL, detail, "source detail", {"runs": MAX_RUNS})
+    shared = parse(Template, template, "source template", {"runs": MAX_RUNS})
+    own = parse(Detail, detail, "source detail", {"runs": MAX_RUNS})
     if len(shared.header) not in (1, 2):  # SRC-03
         raise FormatError(f"source template: {len(shared.header)} parts of a header (1 or 2)")
     return parsed_patterns(tuple(shared.header), shared, own, n_channels)

@@ -1,6 +1,6 @@
 """What departs frame by frame in the layout of a text file: the notes of AMC and BVH sources.
 
-SPEC.md, "Source reconstruction", is normative and has the table of NOTES.
+SPEC.md, "Source reconstruction", is normative and has the table of Notes.
 """
 
 from __future__ import annotations
@@ -17,24 +17,36 @@ from numpy.typing import NDArray
 
 from mcz.errors import FormatError
 from mcz.formats.layout import MAX_PATTERNS
-from mcz.schema import SIZED, UVARINT, Struct, build, counted, parse
+from mcz.schema import SIZED, UVARINT, Record, build, counted, field, parse
 
 Ints = NDArray[np.int64]
 
 FRAME_NUMBER_TEXT = re.compile(rb"[-+]?[0-9]{1,32}")
 
-PATTERN_RUN = Struct(
-    "n_rows" / UVARINT * "rows one after the other, at least 1",
-    "pattern" / UVARINT * "number of their pattern",
-)
-NUMBER_TEXT = Struct(
-    "row" / UVARINT * "rows after the text before, or after the segment's first row",
-    "text" / SIZED * "the frame number as printed",
-)
-NOTES = Struct(
-    "patterns" / counted(PATTERN_RUN) * "patterns of the rows; all rows after them have pattern 0",
-    "texts" / counted(NUMBER_TEXT) * "frame numbers printed in another way than as plain decimal",
-)
+
+class PatternRun(Record):
+    """Rows with one pattern, in NOTES."""
+
+    n_rows: int = field(UVARINT, "rows one after the other, at least 1")
+    pattern: int = field(UVARINT, "number of their pattern")
+
+
+class NumberText(Record):
+    """A frame number that is printed oddly, in NOTES."""
+
+    row: int = field(UVARINT, "rows after the text before, or after the segment's first row")
+    text: bytes = field(SIZED, "the frame number as printed")
+
+
+class Notes(Record):
+    """Frame notes of AMC and BVH."""
+
+    patterns: list[PatternRun] = field(
+        counted(PatternRun), "patterns of the rows; all rows after them have pattern 0"
+    )
+    texts: list[NumberText] = field(
+        counted(NumberText), "frame numbers printed in another way than as plain decimal"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,11 +69,8 @@ class RowNotes:
         runs = [(b - a, int(patterns[a])) for a, b in _runs(patterns)]
         if runs[-1][1] == 0:
             runs.pop()
-        fields = {
-            "patterns": [{"n_rows": n, "pattern": pattern} for n, pattern in runs],
-            "texts": _spaced(texts),
-        }
-        return build(NOTES, fields, "source notes")
+        patterns_of_rows = [PatternRun(n_rows=n, pattern=pattern) for n, pattern in runs]
+        return build(Notes(patterns=patterns_of_rows, texts=_spaced(texts)), "source notes")
 
     def part(self, start: int, stop: int) -> RowNotes:
         """The notes of rows start <= r < stop alone, numbered from 0."""
@@ -74,20 +83,20 @@ def _runs(values: Ints) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _spaced(texts: Sequence[tuple[int, bytes]]) -> list[dict[str, Any]]:
-    """Fields with the distance of each row to the one before."""
+def _spaced(texts: Sequence[tuple[int, bytes]]) -> list[NumberText]:
+    """Texts with the distance of each row to the one before."""
     fields = []
     before = 0
     for row, text in texts:
-        fields.append({"row": row - before, "text": text})
+        fields.append(NumberText(row=row - before, text=text))
         before = row
     return fields
 
 
 def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
-    """The notes of (start, stop, NOTES) parts, the inverse of ``cut``; rows between are usual.
+    """The notes of (start, stop, Notes) parts, the inverse of ``cut``; rows between are usual.
 
-    Raises FormatError where a part is not NOTES of ``stop - start`` rows.
+    Raises FormatError where a part is not Notes of ``stop - start`` rows.
     """
     n_rows = max((stop for _, stop, _ in parts), default=0)
     patterns = np.zeros(n_rows, np.int64)
@@ -96,7 +105,7 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
         if not data:
             continue
         where = f"source notes of rows {start} to {stop}"
-        fields = parse(NOTES, data, where)
+        fields = parse(Notes, data, where)
         for first, last, pattern in checked_runs(fields.patterns, stop - start, where):
             patterns[start + first : start + last] = pattern
         found = checked_texts(fields.texts, stop - start, where)

@@ -16,14 +16,15 @@ from mcz.clock import SAME_RATE
 from mcz.errors import SourceError
 from mcz.formats.c3d import rate_of
 from mcz.formats.c3d_events import event_times
-from mcz.formats.c3d_layout import C3D_OUTPUTS_TEMPLATE, C3D_TEMPLATE
+from mcz.formats.c3d_layout import C3dOutputsTemplate, C3dTemplate
 from mcz.formats.c3d_parameters import FLOAT, INTEGER, find_parameters, parse_parameters
-from mcz.formats.layout import MAX_RUNS, TEMPLATE
+from mcz.formats.layout import MAX_RUNS, Template
 from mcz.formats.rates import frame_rate, frame_time
 from mcz.formats.table_layout import (
     PHRASES,
-    TABLE_TEMPLATE,
     Clock,
+    ClockFields,
+    TableTemplate,
     parsed_clock,
     with_phrases,
 )
@@ -59,7 +60,7 @@ class Restated(NamedTuple):
 
 def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
     """A template of BVH at another rate; None where it states none."""
-    fields = parse(TEMPLATE, template, WHERE, {"runs": MAX_RUNS})
+    fields = parse(Template, template, WHERE, {"runs": MAX_RUNS})
     parts = [bytes(part) for part in fields.header]
     found = _FRAME_TIME.search(parts[-1]) if parts else None
     if found is None:
@@ -67,31 +68,28 @@ def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
     stated, _ = frame_rate(found[1].decode("latin-1"))
     text = _like(found[1], 1 / rate, lambda text: _is_time_of(text, rate))
     parts[-1] = _replaced(parts[-1], found.span(1), text or frame_time(rate).encode())
-    return Restated(stated or NONE, build(TEMPLATE, dict(fields) | {"header": parts}, WHERE))
+    return Restated(stated or NONE, build(replace(fields, header=parts), WHERE))
 
 
 def restate_c3d(template: bytes, rate: Fraction) -> Restated | None:
     """A template of C3D at another rate; None where it states none."""
-    return _of_c3d(C3D_TEMPLATE, template, rate, lambda fields, head: dict(fields) | head)
+    fields = parse(C3dTemplate, template, WHERE)
+    found = _restated_head(fields, rate)
+    return found and Restated(found.rate, build(replace(fields, head=found.template), WHERE))
 
 
 def restate_outputs(template: bytes, rate: Fraction) -> Restated | None:
     """A template of C3D with outputs of models at another rate; None where it states none."""
+    fields = parse(C3dOutputsTemplate, template, WHERE)
+    found = _restated_head(fields.file, rate)
+    if found is None:
+        return None
+    file = replace(fields.file, head=found.template)
+    return Restated(found.rate, build(replace(fields, file=file), WHERE))
 
-    def with_head(fields: Any, head: dict[str, bytes]) -> dict[str, Any]:
-        return dict(fields) | {"file": dict(fields.file) | head}
 
-    return _of_c3d(C3D_OUTPUTS_TEMPLATE, template, rate, with_head)
-
-
-def _of_c3d(
-    schema: Any,
-    template: bytes,
-    rate: Fraction,
-    with_head: Callable[[Any, dict[str, bytes]], dict[str, Any]],
-) -> Restated | None:
-    fields = parse(schema, template, WHERE)
-    shared = fields.file if schema is C3D_OUTPUTS_TEMPLATE else fields
+def _restated_head(shared: C3dTemplate, rate: Fraction) -> Restated | None:
+    """The head of a C3D at another rate, as it is where that cannot be stated."""
     head = bytearray(shared.head)
     try:
         order, start = find_parameters(bytes(head))
@@ -106,19 +104,19 @@ def _of_c3d(
         if found is None or found.type not in (FLOAT, INTEGER):
             continue
         if found.type == INTEGER and (value.denominator > 1 or value > 0xFFFF):
-            return Restated(stated, template)
+            return Restated(stated, shared.head)
         text = order.build_real(float(value)) if found.type == FLOAT else b""
         text = text or order.build_integer(int(value))
         head[found.at : found.at + len(text)] = text
     for at in event_times(bytes(head), parameters) if stated else ():
         time = order.real(bytes(head[at : at + 4]), 0) * float(stated / rate)
         head[at : at + 4] = order.build_real(time)
-    return Restated(stated, build(schema, with_head(fields, {"head": bytes(head)}), WHERE))
+    return Restated(stated, bytes(head))
 
 
 def restate_table(template: bytes, rate: Fraction) -> Restated | None:
     """A template of a table at another rate; None where neither a clock nor a header states one."""
-    fields = parse(TABLE_TEMPLATE, template, WHERE, {"runs": MAX_RUNS})
+    fields = parse(TableTemplate, template, WHERE, {"runs": MAX_RUNS})
     first = next((section for section in fields.sections if 0 in section.signals), None)
     if first is None:
         return None
@@ -130,14 +128,13 @@ def restate_table(template: bytes, rate: Fraction) -> Restated | None:
     sections = []
     for section in fields.sections:
         header = _in_header(_text(section), factor)
-        made: dict[str, Any] = {"header": with_phrases(header) if section.marks else header}
+        header = with_phrases(header) if section.marks else header
         own = parsed_clock(section)
         scaled = None if own is None else _scaled(own, factor)
         if own is not None and scaled is None:
             return Restated(stated, template)
-        made["clock"] = [] if scaled is None else [scaled]
-        sections.append(dict(section) | made)
-    return Restated(stated, build(TABLE_TEMPLATE, {"sections": sections}, WHERE))
+        sections.append(replace(section, header=header, clock=scaled))
+    return Restated(stated, build(TableTemplate(sections=sections), WHERE))
 
 
 def _text(section: Any) -> bytes:
@@ -170,7 +167,7 @@ def _in_header(header: bytes, factor: Fraction) -> bytes:
     return header
 
 
-def _scaled(clock: Clock, factor: Fraction) -> dict[str, Any] | None:
+def _scaled(clock: Clock, factor: Fraction) -> ClockFields | None:
     """A clock whose times are divided by ``factor``; None where its terms are too large.
 
     It prints more decimals, up to ``DECIMALS``, where the times need them.
@@ -186,8 +183,7 @@ def _scaled(clock: Clock, factor: Fraction) -> dict[str, Any] | None:
     offset = round((first + half) * denominator)
     if max(numerator, denominator, abs(offset)) >= 2**52:
         return None
-    terms = {"numerator": numerator, "denominator": denominator, "offset": offset}
-    return {"grid": grid, **terms}
+    return ClockFields(grid=grid, numerator=numerator, denominator=denominator, offset=offset)
 
 
 def _like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> bytes:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import log10
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +18,25 @@ from mcz.clock import SAME_RATE
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import (
     BIT,
-    DETAIL,
     MAX_GAPS,
     MAX_PATTERNS,
     MAX_RUNS,
-    PATTERN,
+    Detail,
     Layout,
+    PatternFields,
     numbered_patterns,
     parsed_patterns,
 )
 from mcz.numbers import GRID, Grid, GridKind
 from mcz.schema import (
+    POSITIVE,
     SIZED,
     SVARINT,
     UVARINT,
-    ExprValidator,
-    Struct,
+    Record,
     build,
     counted,
+    field,
     optional,
     parse,
 )
@@ -78,31 +78,50 @@ DECIMALS = (GridKind.FIXED, GridKind.TRIMMED)  # of times that follow from frame
 _MARKS = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f]")
 _PHRASES = re.compile(b"|".join(map(re.escape, sorted(PHRASES.values(), key=len, reverse=True))))
 _MARK_OF = {phrase: bytes((mark,)) for mark, phrase in PHRASES.items()}
-_POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)  # TABLE-03
+_POSITIVE = POSITIVE  # TABLE-03
 
-CLOCK = Struct(
-    "grid" / GRID * "grid that prints the times, FIXED or TRIMMED",
-    "numerator" / UVARINT * "what a frame number counts",
-    "denominator" / _POSITIVE * "what that is divided by, at least 1",
-    "offset" / SVARINT * "what is added before",
-)
-SECTION = Struct(
-    "signals" / counted(UVARINT) * "numbers of the signals that its columns come from, at least 1",
-    "header" / SIZED * "text before the rows",
-    "marks" / BIT * "1: control codes of the header are marks; 0: they are text",
-    "missing" / SIZED * "what stands where a value is invalid",
-    "clock" / optional(CLOCK) * "0 or 1: times that follow from the frame numbers",
-    "gaps" / counted(SIZED, MAX_GAPS) * "gaps, numbered from 0",
-    "patterns"
-    / counted(PATTERN, MAX_PATTERNS)
-    * "none, or the most common pattern, which is number 0",
-)
-TABLE_TEMPLATE = Struct(
-    "sections" / counted(SECTION, MAX_SECTIONS) * "the sections in the order of the file, 1 to 64",
-)
-TABLE_DETAIL = Struct(
-    "details" / counted(DETAIL, MAX_SECTIONS) * "what each section leaves open, as many",
-)
+
+class ClockFields(Record):
+    """Times that follow from frame numbers, in SECTION."""
+
+    grid: Grid = field(GRID, "grid that prints the times, FIXED or TRIMMED")
+    numerator: int = field(UVARINT, "what a frame number counts")
+    denominator: int = field(_POSITIVE, "what that is divided by, at least 1")
+    offset: int = field(SVARINT, "what is added before")
+
+
+class SectionFields(Record):
+    """A section of a table."""
+
+    signals: list[int] = field(
+        counted(UVARINT), "numbers of the signals that its columns come from, at least 1"
+    )
+    header: bytes = field(SIZED, "text before the rows")
+    marks: int = field(BIT, "1: control codes of the header are marks; 0: they are text")
+    missing: bytes = field(SIZED, "what stands where a value is invalid")
+    clock: ClockFields | None = field(
+        optional(ClockFields), "0 or 1: times that follow from the frame numbers"
+    )
+    gaps: list[bytes] = field(counted(SIZED, MAX_GAPS), "gaps, numbered from 0")
+    patterns: list[PatternFields] = field(
+        counted(PatternFields, MAX_PATTERNS), "none, or the most common pattern, which is number 0"
+    )
+
+
+class TableTemplate(Record):
+    """Template of tables."""
+
+    sections: list[SectionFields] = field(
+        counted(SectionFields, MAX_SECTIONS), "the sections in the order of the file, 1 to 64"
+    )
+
+
+class TableDetail(Record):
+    """Detail of tables."""
+
+    details: list[Detail] = field(
+        counted(Detail, MAX_SECTIONS), "what each section leaves open, as many"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +132,15 @@ class Clock:
     numerator: int
     denominator: int
     offset: int
+
+    def fields(self) -> ClockFields:
+        """The clock as a template has it."""
+        return ClockFields(
+            grid=self.grid,
+            numerator=self.numerator,
+            denominator=self.denominator,
+            offset=self.offset,
+        )
 
     def ordinals(self, numbers: Sequence[int]) -> list[int]:
         """The ordinal of every time; FormatError for one far beyond every grid."""
@@ -178,28 +206,26 @@ def build_table(sections: Sequence[Section]) -> tuple[bytes, bytes]:
     templates, details = [], []
     for section in sections:
         shared, own = numbered_patterns(section.rows.patterns)
-        names = ("grid", "numerator", "denominator", "offset")
-        clock = section.clock
         templates.append(
-            {
-                "signals": section.signals,
-                "header": section.header,
-                "marks": int(section.marked),
-                "missing": section.missing,
-                "clock": [{name: getattr(clock, name) for name in names}] if clock else [],
-                **shared,
-            }
+            SectionFields(
+                signals=list(section.signals),
+                header=section.header,
+                marks=int(section.marked),
+                missing=section.missing,
+                clock=section.clock.fields() if section.clock else None,
+                gaps=shared.gaps,
+                patterns=shared.patterns,
+            )
         )
-        details.append(section.rows.detail_fields(own))
-    return build(TABLE_TEMPLATE, {"sections": templates}, "source template"), build(
-        TABLE_DETAIL, {"details": details}, "source detail"
-    )
+        details.append(section.rows.detail(own))
+    template = build(TableTemplate(sections=templates), "source template")
+    return template, build(TableDetail(details=details), "source detail")
 
 
 def parse_table(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Section]:
     """The sections of a table of signals that have ``sizes`` channels; FormatError on bad bytes."""
-    shared = parse(TABLE_TEMPLATE, template, "source template", {"runs": MAX_RUNS}).sections
-    own = parse(TABLE_DETAIL, detail, "source detail", {"runs": MAX_RUNS}).details
+    shared = parse(TableTemplate, template, "source template", {"runs": MAX_RUNS}).sections
+    own = parse(TableDetail, detail, "source detail", {"runs": MAX_RUNS}).details
     if not shared or len(shared) != len(own):  # TABLE-07
         raise FormatError(f"source template: {len(shared)} sections, {len(own)} details")
     numbers = [number for fields in shared for number in fields.signals]
@@ -208,11 +234,11 @@ def parse_table(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Se
     return [_section(*fields, sizes) for fields in zip(shared, own, strict=False)]
 
 
-def _section(shared: Any, own: Any, sizes: Sequence[int]) -> Section:
+def _section(shared: SectionFields, own: Detail, sizes: Sequence[int]) -> Section:
     if not shared.signals:  # TABLE-08
         raise FormatError("source template: a section without signals")
     clock = parsed_clock(shared)
-    n_columns = sum(sizes[number] for number in shared.signals) + 1 + len(shared.clock)  # TABLE-01
+    n_columns = sum(sizes[number] for number in shared.signals) + 1 + bool(shared.clock)  # TABLE-01
     rows = parsed_patterns((shared.header,), shared, own, n_columns)
     signals = tuple(shared.signals)
     return Section(signals, shared.header, bool(shared.marks), shared.missing, clock, rows)
@@ -220,15 +246,16 @@ def _section(shared: Any, own: Any, sizes: Sequence[int]) -> Section:
 
 def clock_of(template: bytes) -> Clock | None:
     """The clock of the section that the motion is in; FormatError on bad bytes."""
-    shared = parse(TABLE_TEMPLATE, template, "source template", {"runs": MAX_RUNS}).sections
+    shared = parse(TableTemplate, template, "source template", {"runs": MAX_RUNS}).sections
     section = next((fields for fields in shared if 0 in fields.signals), None)
     return parsed_clock(section) if section is not None else None
 
 
-def parsed_clock(shared: Any) -> Clock | None:
-    if not shared.clock:
+def parsed_clock(shared: SectionFields) -> Clock | None:
+    """The clock of a section, None where it has none; FormatError for a grid without decimals."""
+    fields = shared.clock
+    if fields is None:
         return None
-    fields = shared.clock[0]
     if fields.grid.kind not in DECIMALS:  # TABLE-02
         raise FormatError(f"source template: times on a grid {fields.grid.kind.name}")
     return Clock(fields.grid, fields.numerator, fields.denominator, fields.offset)

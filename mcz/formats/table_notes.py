@@ -1,31 +1,42 @@
 """What departs row by row in the sections of a table: the frame notes of tables.
 
-SPEC.md, "Template of tables", is normative and has the table of SECTION_NOTES.
+SPEC.md, "Template of tables", is normative and has the table of SectionNotesFields.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from mcz.errors import FormatError
-from mcz.formats.notes import NUMBER_TEXT, PATTERN_RUN, RowNotes, checked_runs, checked_texts
+from mcz.formats.notes import NumberText, PatternRun, RowNotes, checked_runs, checked_texts
 from mcz.formats.table_layout import MAX_SECTIONS
-from mcz.schema import UVARINT, ExprValidator, Struct, build, counted, parse
+from mcz.schema import POSITIVE, Record, build, counted, field, parse
 
-_POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)  # TABLE-09
+_POSITIVE = POSITIVE  # TABLE-09
 
-SECTION_NOTES = Struct(
-    "rows_per_frame" / _POSITIVE * "rows a frame of the section, at least 1",
-    "patterns" / counted(PATTERN_RUN) * "patterns of the rows; all rows after them have pattern 0",
-    "texts" / counted(NUMBER_TEXT) * "frame numbers printed in another way than as plain decimal",
-)
-TABLE_NOTES = Struct(
-    "sections" / counted(SECTION_NOTES, MAX_SECTIONS) * "notes of the first sections, in order",
-)
+
+class SectionNotesFields(Record):
+    """Frame notes of a section."""
+
+    rows_per_frame: int = field(_POSITIVE, "rows a frame of the section, at least 1")
+    patterns: list[PatternRun] = field(
+        counted(PatternRun), "patterns of the rows; all rows after them have pattern 0"
+    )
+    texts: list[NumberText] = field(
+        counted(NumberText), "frame numbers printed in another way than as plain decimal"
+    )
+
+
+class TableNotesFields(Record):
+    """Frame notes of tables."""
+
+    sections: list[SectionNotesFields] = field(
+        counted(SectionNotesFields, MAX_SECTIONS), "notes of the first sections, in order"
+    )
 
 
 @dataclass(slots=True)
@@ -37,25 +48,25 @@ class SectionNotes:
     """
 
     n_each: int
-    runs: list[tuple[int, int, int]] = field(default_factory=list)
-    texts: list[tuple[int, bytes]] = field(default_factory=list)
+    runs: list[tuple[int, int, int]] = dataclasses.field(default_factory=list)
+    texts: list[tuple[int, bytes]] = dataclasses.field(default_factory=list)
 
-    def cut(self, start: int, stop: int) -> dict[str, Any]:
-        """The fields of SECTION_NOTES of the frames start <= f < stop."""
+    def cut(self, start: int, stop: int) -> SectionNotesFields:
+        """The notes of the frames start <= f < stop."""
         first, last = start * self.n_each, stop * self.n_each
         patterns, at = [], first
         for a, b, pattern in self.runs:
             a, b = max(a, first), min(b, last)
             if a < b:
-                patterns += [{"n_rows": a - at, "pattern": 0}] if a > at else []
-                patterns.append({"n_rows": b - a, "pattern": pattern})
+                patterns += [PatternRun(n_rows=a - at, pattern=0)] if a > at else []
+                patterns.append(PatternRun(n_rows=b - a, pattern=pattern))
                 at = b
         texts, before = [], first
         for row, text in self.texts:
             if first <= row < last:
-                texts.append({"row": row - before, "text": text})
+                texts.append(NumberText(row=row - before, text=text))
                 before = row
-        return {"rows_per_frame": self.n_each, "patterns": patterns, "texts": texts}
+        return SectionNotesFields(rows_per_frame=self.n_each, patterns=patterns, texts=texts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,9 +78,9 @@ class TableNotes:
     def cut(self, start: int, stop: int) -> bytes:
         """TABLE_NOTES of the frames start <= f < stop; b"" where all of them are usual."""
         fields = [section.cut(start, stop) for section in self.sections]
-        while fields and not (fields[-1]["patterns"] or fields[-1]["texts"]):
+        while fields and not (fields[-1].patterns or fields[-1].texts):
             fields.pop()
-        return build(TABLE_NOTES, {"sections": fields}, "source notes") if fields else b""
+        return build(TableNotesFields(sections=fields), "source notes") if fields else b""
 
     def part(self, start: int, stop: int) -> TableNotes:
         """The notes of the frames start <= f < stop alone, numbered from 0."""
@@ -108,14 +119,14 @@ def _sparse(n_each: int, notes: RowNotes | None) -> SectionNotes:
 def join_table_notes(parts: Sequence[tuple[int, int, bytes]]) -> TableNotes:
     """The notes of (start, stop, TABLE_NOTES) parts, the inverse of ``cut``; the rest is usual.
 
-    Raises FormatError where a part is not TABLE_NOTES of ``stop - start`` frames.
+    Raises FormatError where a part is not a TableNotesFields of ``stop - start`` frames.
     """
     found: list[SectionNotes] = []
     for start, stop, data in sorted(parts):
         if not data:
             continue
         where = f"source notes of frames {start} to {stop}"
-        for number, fields in enumerate(parse(TABLE_NOTES, data, where).sections):
+        for number, fields in enumerate(parse(TableNotesFields, data, where).sections):
             if number == len(found):
                 found.append(SectionNotes(fields.rows_per_frame))
             mine = found[number]

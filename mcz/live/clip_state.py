@@ -44,11 +44,11 @@ class LiveClip:
     codec: str
 
 
-def needs(fields: Any) -> Iterator[tuple[bytes, bytes]]:
+def needs(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
     """Kind and id of the chunks that a clip with these ``fields`` cannot be read without."""
     yield b"SKEL", bytes(fields.skeleton)
-    for source in fields.source:
-        yield b"SRCE", bytes(source.template)
+    if fields.source is not None:
+        yield b"SRCE", fields.source.template
     for signal in fields.signals:
         with suppress(FormatError):  # it is said when the signal is read
             uses = by_id(signal.codec, signal.codec_version).uses
@@ -56,7 +56,7 @@ def needs(fields: Any) -> Iterator[tuple[bytes, bytes]]:
                 yield b"MODL", id_
 
 
-def row_of(fields: Any, chunk: Chunk) -> ClipRow:
+def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
     """A clip of which nothing but its CLIP is known; raises FormatError."""
     if not fields.name or not fields.signals:
         raise FormatError(f"chunk {chunk.label}: a clip without a name or a signal")

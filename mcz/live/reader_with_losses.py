@@ -177,7 +177,7 @@ class FramesWithLosses:
         yield from self._leave("another clip began")
         try:
             chunk = Chunk(b"CLIP", 0, 0, len(piece.payload or b""))
-            fields = parse(payloads.CLIP, piece.payload or b"", "CLIP")
+            fields = parse(payloads.Clip, piece.payload or b"", "CLIP")
             followed = begin(self._head, self._shared, row_of(fields, chunk), fields)
         except (UnsupportedError, LimitError):
             raise
@@ -197,7 +197,7 @@ class FramesWithLosses:
         if course is None:
             return
         try:
-            fields = parse(payloads.CEND, piece.payload or b"", "CEND")
+            fields = parse(payloads.Cend, piece.payload or b"", "CEND")
         except FormatError as error:
             self._course = course
             self._fault(str(error))

@@ -75,7 +75,7 @@ class StrictFrames:
             elif kind == b"CLIP":
                 row = self._walker.clip
                 assert row is not None
-                fields = parse(payloads.CLIP, arrival.payload, row.clip.label)
+                fields = parse(payloads.Clip, arrival.payload, row.clip.label)
                 before = opening(head, shared, fields)
                 clip = begin(head, shared, row, fields) or _Held(before + arrival.data, row.name)
             elif isinstance(clip, ClipState):
@@ -87,7 +87,7 @@ class StrictFrames:
     def _frame(self, clip: ClipState, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
         row = arrival.segment
         if kind == b"CEND":
-            clip.check_hash(parse(payloads.CEND, arrival.payload, "CEND"))  # PACK-19
+            clip.check_hash(parse(payloads.Cend, arrival.payload, "CEND"))  # PACK-19
             self.is_checked = True
         if row is None or row.header.signal:
             return

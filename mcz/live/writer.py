@@ -300,8 +300,8 @@ class LiveWriter:
             fixed = {k: v for k, v in self.options.items() if k not in self._changed}
             settings = {f"param.{name}": value for name, value in fixed.items()}
             found = {"codec": self.codec.name, **settings, **self._figures.entries()}
-            rows = [{"key": key, "value": value} for key, value in texts_of(found).items()]
-            payload = build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
+            record = payloads.Qual(entries=payloads.metadata_records(texts_of(found)))
+            payload = build(record, "quality record")
             self._writer.ancillary(CHUNK, payload)
         self._writer.finish()
         self._outlet.send()

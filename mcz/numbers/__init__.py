@@ -11,15 +11,15 @@ ordinal -1 and nothing is an exception only because of its sign.
 """
 
 from mcz.numbers.choose import bits_of, choose_grid, fit
-from mcz.numbers.grid import GRID, GRID_FIELDS, Grid, printed_base
+from mcz.numbers.grid import GRID, Grid, GridFields, printed_base
 from mcz.numbers.rules import GridFlag, GridKind
 from mcz.numbers.tokens import Texts, Tokens, scan, values_of_texts
 from mcz.numbers.values import ordinals_of, values_of
 
 __all__ = [
     "GRID",
-    "GRID_FIELDS",
     "Grid",
+    "GridFields",
     "GridFlag",
     "GridKind",
     "Texts",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from construct import If, Int8ul, this
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError, OptionError
@@ -23,7 +24,8 @@ from mcz.numbers.magnitudes import (
 )
 from mcz.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
 from mcz.numbers.tokens import NAN, TENS, Bools, Floats, Ints, Texts, Tokens, nearest
-from mcz.schema import FINITE, Adapter, Fields, If, Int8ul, Struct
+from mcz.schema import FINITE, Adapted, Record
+from mcz.schema import field as record_field
 
 MAX = np.finfo(np.float64).max
 _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
@@ -246,30 +248,36 @@ def printed_base(grid: Grid) -> Grid:
     return Grid(GridKind.FIXED, digits)
 
 
-def _grid_of(fields: Fields) -> Grid:
+class GridFields(Record):
+    """A number grid as bytes."""
+
+    kind: int = record_field(Int8ul, "kind of grid")
+    digits: int = record_field(Int8ul, "digits, by kind")
+    flags: int = record_field(Int8ul, "print style, by kind")
+    scale: float | None = record_field(
+        If(this.kind == int(GridKind.SCALED), FINITE), "SCALED only: the unit"
+    )
+    style: int | None = record_field(
+        If(this.kind == int(GridKind.PRINTED), Int8ul), "PRINTED only: print rule"
+    )
+
+
+def _grid_of(fields: GridFields) -> Grid:
     try:
         # GRID-01
         scale = 1.0 if fields.scale is None else fields.scale
-        return Grid(fields.kind, fields.digits, fields.flags, scale, fields.style or 0)
-    except OptionError as error:
+        return Grid(GridKind(fields.kind), fields.digits, fields.flags, scale, fields.style or 0)
+    except (OptionError, ValueError) as error:
         raise FormatError(f"{error}") from None
 
 
-def _fields_of(grid: Grid) -> dict[str, Any]:
-    names = ("kind", "digits", "flags", "scale", "style")
-    return {name: getattr(grid, name) for name in names}
+def _fields_of(grid: Grid) -> GridFields:
+    return GridFields(
+        kind=grid.kind, digits=grid.digits, flags=grid.flags, scale=grid.scale, style=grid.style
+    )
 
 
-GRID_FIELDS = Struct(
-    "kind" / Int8ul * "kind of grid",
-    "digits" / Int8ul * "digits, by kind",
-    "flags" / Int8ul * "print style, by kind",
-    "scale" / If(lambda fields: fields.kind == GridKind.SCALED, FINITE) * "SCALED only: the unit",
-    "style"
-    / If(lambda fields: fields.kind == GridKind.PRINTED, Int8ul)
-    * "PRINTED only: print rule",
-)
-GRID = Adapter(GRID_FIELDS, _grid_of, _fields_of)
+GRID = Adapted(GridFields, _grid_of, _fields_of)
 
 
 def _beyond(chosen: Bools, values: Floats) -> Bools:

@@ -214,7 +214,7 @@ class Clip(StoredClip, Posed):
             return None
         skip = self.signals[0].skip
         frames = range(start + skip, stop + skip, step)
-        fields = self._fields.source[0]
+        fields = self._fields.source
         try:
             if self._row.skeleton != self._fields.skeleton:  # what salvage has in its place
                 raise FormatError("the names of its skeleton are lost")

@@ -145,13 +145,13 @@ def _row(clip: Clip) -> ClipRow:
 
 def _source(clip: Clip) -> Value:
     source = clip._fields.source
-    return source[0].path or None if source else None
+    return source.path or None if source else None
 
 
 def _format(clip: Clip) -> Value:
     """The usual suffix of the source's format, without the dot."""
     source = clip._fields.source
-    return format_by_id(source[0].format).suffixes[0][1:] if source else None
+    return format_by_id(source.format).suffixes[0][1:] if source else None
 
 
 FIELDS: dict[str, Getter] = {

@@ -184,7 +184,7 @@ class File:
     @cached_property
     def header(self) -> dict[str, Any]:
         """Format version, version needed and profile, from HEAD."""
-        head = parse(payloads.HEAD, self.container.directory.head, "HEAD")
+        head = parse(payloads.Head, self.container.directory.head, "HEAD")
         return {
             "format_version": f"{head.major}.{head.minor}",
             "needs_version": f"{head.needs_major}.{head.needs_minor}",

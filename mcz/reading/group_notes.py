@@ -75,7 +75,7 @@ def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str
     if not data:
         return [], []
     where = f"clip {name!r}, group notes"
-    fields = parse(payloads.GROUP_NOTES, data, where)
+    fields = parse(payloads.GroupNotes, data, where)
     n_channels = len(grids)
     changes = [(c.channel, c.grid) for c in fields.grid_changes]
     channels = [channel for channel, _ in changes]

@@ -6,7 +6,7 @@ The id of a skeleton is a hash of its bytes: what has the id is what was lost.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -121,24 +121,25 @@ def _lost(container: Container) -> set[bytes]:
     for kind, id_ in directory.shared:
         if kind == b"SKEL":
             with suppress(MczError):
-                named |= set(map(bytes, container.skeleton_fields(id_).base))
+                base = container.skeleton_fields(id_).base
+                named |= {base} if base else set()
     return {id_ for id_ in named if (b"SKEL", id_) not in directory.shared}
 
 
 def _of_asf(container: Container, template: bytes, lost: set[bytes]) -> Iterator[bytes]:
     """The payloads of SKEL that writers make of an ASF: under each name and length unit."""
     text = container.template(template, ASF.id)
-    source = {
-        "template": template,
-        "format": ASF.id,
-        "size": len(text),
-        "sha256": hashlib.sha256(text).digest(),
-    }
+    source = payloads.SkeletonSource(
+        template=template,
+        format=ASF.id,
+        size=len(text),
+        sha256=hashlib.sha256(text).digest(),
+    )
     for name in _names(container, lost):
         yield from _payloads(ASF.read(text, name), source)
 
 
-def _payloads(skeleton: Skeleton, source: Mapping[str, Any] | None) -> Iterator[bytes]:
+def _payloads(skeleton: Skeleton, source: payloads.SkeletonSource | None) -> Iterator[bytes]:
     """The payloads of SKEL of a skeleton, under each length unit that it may have been given."""
     for unit_cm in dict.fromkeys((skeleton.unit_cm, None, *UNIT_CM.values())):
         payload = build_skeleton(replace(skeleton, unit_cm=unit_cm), source)
@@ -151,7 +152,7 @@ def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
     What position channels do to the offset the frames decide, which may be lost: all ways.
     """
     fields = container.clip(row)
-    for source in fields.source:
+    for source in [fields.source] if fields.source else []:
         form = format_by_id(source.format)
         template = container.template(bytes(source.template), source.format)
         text = form.write(_of_zeros(fields, row, Source(form.name, template, bytes(source.detail))))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
+from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.errors import FormatError, OptionError
 from mcz.formats import recording_of
@@ -47,13 +47,13 @@ def _on_clock(source: Source, rate: Fraction | None) -> Recording | None:
 
 
 def read_recording(
-    container: Container, fields: Any, rate: Fraction | None = None
+    container: Container, fields: payloads.Clip, rate: Fraction | None = None
 ) -> Recording | None:
     """The recording that the source of a clip, whose CLIP is ``fields``, tells of."""
     form = known_format(fields)
-    if form is None or form.recording is None:
+    source = fields.source
+    if form is None or form.recording is None or source is None:
         return None
-    source = fields.source[0]
     template = container.template(source.template, source.format)
     return _on_clock(Source(form.name, template, bytes(source.detail)), rate)
 

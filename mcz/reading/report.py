@@ -103,7 +103,7 @@ def joint_facts(skeleton: Skeleton) -> dict[str, Any]:
 
 
 def _model_info(container: Container, id_: bytes) -> dict[str, Any]:
-    fields = container.shared(b"MODL", id_, payloads.MODL)
+    fields = container.model(id_)
     size = container.directory.shared[b"MODL", id_].size
     return {"id": id_.hex(), "kind": fields.kind, "chunk_bytes": size}
 
@@ -248,7 +248,7 @@ def exceptions_info(container: Container, clip: Clip) -> dict[str, Any]:
 
 
 def _count(notes: bytes) -> int:
-    return len(parse(payloads.GROUP_NOTES, notes, "group notes").exceptions)
+    return len(parse(payloads.GroupNotes, notes, "group notes").exceptions)
 
 
 def validate(file: File, clips: Sequence[Clip] | None = None) -> list[Problem]:

@@ -140,7 +140,7 @@ def _model(container: Container, before: int, id_: bytes) -> Model | None:
     chunk = container.directory.shared.get((b"MODL", id_))
     if chunk is None or chunk.offset > before:  # GRAM-10
         return None
-    fields = container.shared(b"MODL", id_, payloads.MODL)
+    fields = container.model(id_)
     return Model(fields.kind, bytes(fields.data))
 
 

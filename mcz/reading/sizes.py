@@ -10,7 +10,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.container import payloads
 from mcz.container.chunks import FOOT, FRAMING, HEADER
 from mcz.container.directory import SegmentRow
 from mcz.container.packets import CHECK_SIZE, head_size
@@ -55,10 +54,10 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
     source = _source_fields_size(fields)
     template = 0
     if fields.source:
-        chunk = container.directory.shared.get((b"SRCE", bytes(fields.source[0].template)))
+        chunk = container.directory.shared.get((b"SRCE", bytes(fields.source.template)))
         template = chunk.size if chunk else 0
     cend = row.cend.length or 0 if row.cend else 0
-    n_hashes = len(clip.signals) + len(fields.source) if row.cend else 0
+    n_hashes = len(clip.signals) + bool(fields.source) if row.cend else 0
     hashes = 16 + 32 * n_hashes
     clip_length = row.clip.length or 0
     own = clip_length - source - 16 - len(fields.extension) + cend - (hashes - 16)
@@ -142,6 +141,4 @@ def _end_size(n_packets: int) -> int:
 
 
 def _source_fields_size(fields: Any) -> int:
-    if not fields.source:
-        return 0
-    return len(build(payloads.CLIP_SOURCE, fields.source[0], "source"))
+    return len(build(fields.source, "source")) if fields.source else 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
-from typing import Any
 
 from mcz.container import payloads
 from mcz.container.reader import Container
@@ -33,28 +32,32 @@ class SourceInfo:
         return (*FORMATS[self.format].suffixes, *([own] if own else []))
 
 
-def source_info(fields: Any, cend: Any) -> SourceInfo | None:
+def source_info(fields: payloads.Clip, cend: payloads.Cend | None) -> SourceInfo | None:
     """The facts in CLIP and CEND of a clip (None: it has no CEND); None where it has no source."""
     if not fields.source:
         return None
-    source = fields.source[0]
-    hashes = cend.source_sha256 if cend is not None else []
+    source = fields.source
+    digest = cend.source_sha256 if cend is not None else None
     name = format_by_id(source.format).name
-    return SourceInfo(name, source.path, source.size, bytes(hashes[0]) if hashes else b"")
+    return SourceInfo(name, source.path, source.size, digest or b"")
 
 
-def known_format(fields: Any) -> Format | None:
+def known_format(fields: payloads.Clip) -> Format | None:
     """The source format of a clip whose CLIP is ``fields``; None: none that is known."""
     if not fields.source:
         return None
     try:
-        return format_by_id(fields.source[0].format)
+        return format_by_id(fields.source.format)
     except UnsupportedError:
         return None
 
 
 def read_source(
-    container: Container, fields: Any, info: SourceInfo, signal: SignalInfo, frames: range
+    container: Container,
+    fields: payloads.ClipSource,
+    info: SourceInfo,
+    signal: SignalInfo,
+    frames: range,
 ) -> Source:
     """The source of the stored ``frames`` of a clip; ``fields`` are those of CLIP_SOURCE.
 
@@ -87,12 +90,13 @@ def clock_of(source_format: Format, template: bytes, signal: SignalInfo) -> Sour
     return found
 
 
-def read_clock(container: Container, fields: Any, signal: SignalInfo) -> SourceClock | None:
+def read_clock(
+    container: Container, fields: payloads.Clip, signal: SignalInfo
+) -> SourceClock | None:
     """The clock of the source of a clip whose CLIP is ``fields``, None where it has none."""
-    source_format = known_format(fields)
-    if source_format is None or source_format.clock is None:
+    source_format, source = known_format(fields), fields.source
+    if source_format is None or source_format.clock is None or source is None:
         return None
-    source = fields.source[0]
     return clock_of(source_format, container.template(source.template, source.format), signal)
 
 
@@ -127,7 +131,7 @@ def _skeleton_source(container: Container, id_: bytes) -> Source | None:
     fields = container.skeleton_fields(id_)
     if not fields.source:
         return None
-    source = fields.source[0]
+    source = fields.source
     own = (payloads.OF_SKELETON, id_)
     return Source(
         format=format_by_id(source.format, of_skeleton=True).name,

@@ -43,7 +43,8 @@ class StoredClip:
     @cached_property
     def _cend(self) -> Any:
         fields = self.container.cend(self._row)
-        if fields is not None and len(fields.source_sha256) != len(self._fields.source):  # CEND-01
+        has_hash = fields is not None and fields.source_sha256 is not None
+        if fields is not None and has_hash != (self._fields.source is not None):  # CEND-01
             raise FormatError("a source without a hash, or a hash without it", clip=self.name)
         return fields
 
@@ -156,7 +157,7 @@ class StoredClip:
         """The quality record, None where the clip has none."""
         for chunk in self._row.ancillary:
             if chunk.type == b"QUAL":
-                fields = parse(payloads.QUAL, self.container.payload(chunk), chunk.label)
+                fields = parse(payloads.Qual, self.container.payload(chunk), chunk.label)
                 return {entry.key: entry.value for entry in fields.entries}
         return None
 

@@ -112,7 +112,7 @@ def _source(source: Any) -> dict[str, Any]:
 def _attachment(file: File, held: Attachment) -> dict[str, Any]:
     part = file.container.directory.attachments[held.name].parts[0]
     try:
-        sha256 = parse(payloads.ATTA, file.container.payload(part), part.label).sha256.hex()
+        sha256 = parse(payloads.Atta, file.container.payload(part), part.label).sha256.hex()
     except MczError:
         sha256 = None
     return {"name": held.name, "bytes": held.size, "sha256": sha256}

@@ -15,14 +15,15 @@ def inflate(data: bytes, size: int, where: str, *, words: bytes = b"") -> bytes:
     ``words``: bytes that distances may reach back to, as if they came before.
     """
     if size > MAX_RATIO * (len(data) + 1):  # LIMIT-14
-        raise LimitError(f"{where}: {size} bytes cannot come of {len(data)}")
+        raise LimitError(f"{size} bytes cannot come of {len(data)}", where=where)
     inflater = zlib.decompressobj(-15, words)  # CONV-19
     try:
         out = inflater.decompress(data, size + 1)
     except zlib.error as error:
-        raise FormatError(f"{where}: {error}") from None
+        raise FormatError(str(error), where=where) from None
     if len(out) != size or not inflater.eof or inflater.unused_data:  # CONV-08, CONV-09
-        raise FormatError(f"{where}: deflate of {len(data)} bytes does not give {size} bytes")
+        message = f"deflate of {len(data)} bytes does not give {size} bytes"
+        raise FormatError(message, where=where)
     return out
 
 

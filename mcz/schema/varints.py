@@ -30,13 +30,13 @@ def take_varint(source: Iterable[int], where: str) -> int:
     for byte in source:
         value |= (byte & 0x7F) << shift
         if value > MAX_COUNT or shift > 49:  # 8 bytes hold 56 bits (CONV-03)
-            raise FormatError(f"{where}: varint beyond 2^53 - 1")
+            raise FormatError("varint beyond 2^53 - 1", where=where)
         if byte < 0x80:
             if byte == 0 and shift:  # CONV-02
-                raise FormatError(f"{where}: varint {value} is not in its shortest form")
+                raise FormatError(f"varint {value} is not in its shortest form", where=where)
             return value
         shift += 7  # CONV-04
-    raise TruncatedError(f"{where}: a varint runs past the end")
+    raise TruncatedError("a varint runs past the end", where=where)
 
 
 def read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from mcz.container.frame_numbers import KEY, frame_number_metadata
 from mcz.container.limits import ARCHIVE, check
 from mcz.container.packed import pack_skeleton
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.container.skeletons import build_skeleton, channel_fields
+from mcz.container.skeletons import build_skeleton, channel_records
 from mcz.container.strict import is_plain_path
 from mcz.container.value_hash import value_hash
 from mcz.container.writer import Writer
@@ -50,12 +50,12 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     source = None
     if skeleton.source is not None:
         format_id = FORMATS[skeleton.source.format].id
-        source = {
-            "template": writer.template(format_id, skeleton.source.template),
-            "format": format_id,
-            "size": skeleton.source.size,
-            "sha256": skeleton.source.sha256,
-        }
+        source = payloads.SkeletonSource(
+            template=writer.template(format_id, skeleton.source.template),
+            format=format_id,
+            size=skeleton.source.size,
+            sha256=skeleton.source.sha256,
+        )
     payload = build_skeleton(skeleton, source)
     id_ = writer.shared(b"SKEL", pack_skeleton(payload) if writer.short else payload)
     writer.last_skeleton = given, id_
@@ -104,8 +104,8 @@ def write_clip(
     ]
     for part in coded:
         _write_models(writer, part.encoded)
-    fields = _clip_fields(writer, motion, coded)
-    writer.begin_clip(fields, [signal.n_channels for signal in motion.signals])
+    record = _clip_record(writer, motion, coded)
+    writer.begin_clip(record, [signal.n_channels for signal in motion.signals])
     decoded = [
         _write_signal(writer, motion, index, part, progress) for index, part in enumerate(coded)
     ]
@@ -117,10 +117,10 @@ def write_clip(
     writer.end_clip(motion.n_frames, sha256, hashes)
     if quality and not codec.lossless:
         settings = codec.settings(options)
-        record = quality_record(motion, decoded, codec.name, settings, remarks)
-        record = amend(record, decoded) if amend else record
-        writer.ancillary(CHUNK, quality_payload(record))
-        return record
+        quality_entries = quality_record(motion, decoded, codec.name, settings, remarks)
+        quality_entries = amend(quality_entries, decoded) if amend else quality_entries
+        writer.ancillary(CHUNK, quality_payload(quality_entries))
+        return quality_entries
     return None
 
 
@@ -134,20 +134,20 @@ def open_clip(
     check("channels", motion.signals[0].n_channels, writer.profile.channels)
     _write_models(writer, encoded)
     source = MemorySource(motion, 0, codec, writer.profile.segment_bytes)
-    fields = _clip_fields(writer, motion, [_Coded(source, codec, encoded)])
-    fields["flags"] |= payloads.OPEN_CLIP
+    record = _clip_record(writer, motion, [_Coded(source, codec, encoded)])
+    record.flags |= payloads.OPEN_CLIP
     numbers = frame_number_metadata(np.array([first_number], np.int64))
-    more = [{"key": key, "value": value} for key, value in numbers.items()]
-    fields["metadata"] = sorted(fields["metadata"] + more, key=lambda pair: pair["key"])
-    writer.begin_clip(fields, [motion.signals[0].n_channels])
+    more = payloads.metadata_records(numbers)
+    record.metadata = sorted(record.metadata + more, key=lambda pair: pair.key)
+    writer.begin_clip(record, [motion.signals[0].n_channels])
 
 
 def _write_models(writer: Writer, encoded: Encoded) -> None:
     """Write the models that a signal needs; well-known ones where all shall be in the file."""
     known = encoded.known if writer.profile is ARCHIVE else ()
     for model in (*encoded.models, *known):
-        fields = {"kind": model.kind, "data": model.data}
-        writer.shared(b"MODL", build(payloads.MODL, fields, "MODL"))
+        record = payloads.Modl(kind=model.kind, data=model.data)
+        writer.shared(b"MODL", build(record, "MODL"))
 
 
 def asked(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -186,48 +186,41 @@ def _write_signal(
     return coded.source.signal.values if coded.codec.lossless else _decoded(coded, kept)
 
 
-def _clip_fields(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> dict[str, Any]:
+def _clip_record(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> payloads.Clip:
     rate = motion.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
         raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
     if KEY in motion.metadata:
         raise MotionError(f"metadata {KEY!r} is written from the motion's frame_numbers")
     metadata = dict(motion.metadata) | frame_number_metadata(motion.frame_numbers)
-    return {
-        "name": motion.name,
-        "flags": 0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
-        "skeleton": write_skeleton(writer, motion.skeleton),
-        "n_frames": motion.n_frames,
-        "rate_numerator": rate.numerator if rate else 0,
-        "rate_denominator": rate.denominator if rate else 1,
-        "metadata": [{"key": k, "value": metadata[k]} for k in sorted(metadata)],
-        "source": [_source_fields(writer, motion.source)] if motion.source else [],
-        "signals": [_signal_fields(part.source, part.codec, part.encoded) for part in coded],
-        "extension": b"",
-    }
+    return payloads.Clip(
+        name=motion.name,
+        flags=0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
+        skeleton=write_skeleton(writer, motion.skeleton),
+        n_frames=motion.n_frames,
+        rate_numerator=rate.numerator if rate else 0,
+        rate_denominator=rate.denominator if rate else 1,
+        metadata=payloads.metadata_records(dict(sorted(metadata.items()))),
+        source=_source_record(writer, motion.source) if motion.source else None,
+        signals=[_signal_record(part.source, part.codec, part.encoded) for part in coded],
+    )
 
 
-def _source_fields(writer: Writer, source: Source) -> dict[str, Any]:
+def _source_record(writer: Writer, source: Source) -> payloads.ClipSource:
     format_id = FORMATS[source.format].id
     if source.path and not is_plain_path(source.path):
         raise MotionError(f"source path {source.path!r} is not relative and plain")
-    return {
-        "template": writer.template(format_id, source.template),
-        "format": format_id,
-        "detail": source.detail,
-        "path": source.path,
-        "size": source.size,
-    }
+    return payloads.ClipSource(
+        template=writer.template(format_id, source.template),
+        format=format_id,
+        detail=source.detail,
+        path=source.path,
+        size=source.size,
+    )
 
 
-def _signal_fields(source: MemorySource, codec: Codec, part: Encoded) -> dict[str, Any]:
+def _signal_record(source: MemorySource, codec: Codec, part: Encoded) -> payloads.Signal:
     signal = source.signal
-    runs: list[dict[str, Any]] = []
-    for grid in signal.grids:
-        if runs and runs[-1]["grid"] == grid:
-            runs[-1]["n_channels"] += 1
-        else:
-            runs.append({"n_channels": 1, "grid": grid})
     kinds = {"all": payloads.GROUP_ALL, "joint": payloads.GROUP_JOINT}
     own = signal.channels is not None
     kind = kinds.get(codec.grouping, payloads.GROUP_CHANNEL)
@@ -235,21 +228,18 @@ def _signal_fields(source: MemorySource, codec: Codec, part: Encoded) -> dict[st
         kind = payloads.GROUP_CHANNEL
     kind = payloads.GROUP_LISTED if source.is_listed else kind
     sizes = [len(group) for group in source.layout.groups] if source.is_listed else None
-    return {
-        "name": signal.name,
-        "flags": payloads.OWN_CHANNELS if own else 0,
-        "channels": channel_fields(signal.channels) if signal.channels is not None else None,
-        "samples_per_frame": signal.samples_per_frame,
-        "skip": 0,
-        "spare": 0,
-        "grids": runs,
-        "codec": codec.id,
-        "codec_version": codec.version if part.version is None else part.version,
-        "header": part.header,
-        "groups": {"kind": kind, "sizes": sizes},
-        "n_resolutions": part.n_resolutions,
-        "extension": b"",
-    }
+    return payloads.Signal(
+        name=signal.name,
+        flags=payloads.OWN_CHANNELS if own else 0,
+        channels=channel_records(signal.channels) if signal.channels is not None else None,
+        samples_per_frame=signal.samples_per_frame,
+        grids=payloads.grid_runs(signal.grids),
+        codec=codec.id,
+        codec_version=codec.version if part.version is None else part.version,
+        header=part.header,
+        groups=payloads.Groups(kind=kind, sizes=sizes),
+        n_resolutions=part.n_resolutions,
+    )
 
 
 def _write_segment(

@@ -63,8 +63,7 @@ def _greatest_error(original: Motion, decoded: Signal) -> dict[str, Any]:
 def quality_payload(entries: Mapping[str, str]) -> bytes:
     """The payload of QUAL that says this."""
     stored = {key: value for key, value in entries.items() if key not in NOT_STORED}
-    rows = [{"key": key, "value": value} for key, value in stored.items()]
-    return build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
+    return build(payloads.Qual(entries=payloads.metadata_records(stored)), "quality record")
 
 
 def quality_entries(

@@ -99,25 +99,21 @@ class MemorySource:
         changed = [c for c, grid in enumerate(signal.grids) if grid != self.layout.grids[c]]
         if not changed and not len(signal.exceptions):
             return []
-        notes: list[dict[str, list[Any]]] = [
-            {"grid_changes": [], "exceptions": []} for _ in self.layout.groups
-        ]
+        notes = [payloads.GroupNotes() for _ in self.layout.groups]
         groups = enumerate(self.layout.groups)
         where = {c: (g, column) for g, group in groups for column, c in enumerate(group)}
         for channel in changed:
             group, column = where[channel]
-            row = {"channel": column, "grid": signal.grids[channel]}
-            notes[group]["grid_changes"].append(row)
+            change = payloads.GridChange(channel=column, grid=signal.grids[channel])
+            notes[group].grid_changes.append(change)
         before = [0] * len(notes)
         found = signal.exceptions
         for number, channel, text in zip(found.rows, found.channels, found.texts, strict=True):
             group, column = where[int(channel)]
-            row = {"row": int(number) - before[group], "channel": column, "text": text}
-            notes[group]["exceptions"].append(row)
+            row = int(number) - before[group]
+            notes[group].exceptions.append(payloads.OddToken(row=row, channel=column, text=text))
             before[group] = int(number)
-        return [
-            build(payloads.GROUP_NOTES, n, "group notes") if any(n.values()) else b"" for n in notes
-        ]
+        return [build(n, "group notes") if n.grid_changes or n.exceptions else b"" for n in notes]
 
     def masks(self, start: int, stop: int) -> list[bytes]:
         """The mask of each group, b"" where all is valid."""

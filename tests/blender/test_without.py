@@ -278,7 +278,7 @@ def test_compiled_kernels_of_several_platforms_are_in_one_wheel(tmp_path: Path) 
     wheel_with(tmp_path / "mcz-0.9.0-cp311-cp311-win_amd64.whl", windows, checked)
     (tmp_path / "numpy-1.24.4-cp311-cp311-win_amd64.whl").write_bytes(b"")
     members = zip_members(build.build_zip(build.wheels_in(tmp_path))[1])
-    (wheel,) = (data for name, data in members.items() if name.endswith(".whl"))
+    (wheel,) = (data for name, data in members.items() if name.startswith("wheels/mcz-"))
     package = zip_members(wheel)
     assert package[linux] == linux.encode() and package[windows] == windows.encode()
     assert checked not in package

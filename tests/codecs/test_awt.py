@@ -14,7 +14,7 @@ from mcz.angles import unwrap
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.wavelet import awt_choices as choice
 from mcz.codecs.wavelet.awt import CODEC
-from mcz.codecs.wavelet.shared import WAVELET_HEADER, transform_of
+from mcz.codecs.wavelet.shared import WaveletHeader, transform_of
 from mcz.motion import Motion
 from mcz.schema import parse
 from mcz.transforms import wavelets
@@ -139,10 +139,10 @@ def test_positions_are_better_for_it() -> None:
 
 def test_presets() -> None:
     published = Direct("awt", smooth(100), preset="khan2014", a_w=20)
-    fields = parse(WAVELET_HEADER, published.header, "header")
+    fields = parse(WaveletHeader, published.header, "header")
     assert (fields.wavelet, fields.levels, fields.decimals) == (wavelets.IDS["db2"], 4, 2)
     assert len(published.segments) == 1
-    default = parse(WAVELET_HEADER, Direct("awt", smooth(400)).header, "header")
+    default = parse(WaveletHeader, Direct("awt", smooth(400)).header, "header")
     assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs import basis_models
 from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
-from mcz.codecs.spatial.windows import WINDOWS_HEADER
+from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.kinematics import point_names
 from mcz.motion import Signal
 from mcz.reading.sizes import clip_sizes
@@ -36,7 +36,7 @@ BOUND = 0.8  # of a step: the threshold, and what rounding the bases may add
 
 
 def header_of(coded: Direct) -> object:
-    return parse(WINDOWS_HEADER, coded.header, "header")
+    return parse(WindowsHeader, coded.header, "header")
 
 
 def root_mean_square(values: np.ndarray) -> float:

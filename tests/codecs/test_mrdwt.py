@@ -20,7 +20,7 @@ from mcz.codecs import by_name
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.steps import code_of, ratio_of
 from mcz.codecs.wavelet import streams
-from mcz.codecs.wavelet.shared import WAVELET_HEADER
+from mcz.codecs.wavelet.shared import WaveletHeader
 from mcz.codecs.weights import weights_of
 from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS, Motion
@@ -53,7 +53,7 @@ class Direct(lossy.Direct):
 
     def __init__(self, motion: Motion, **params: Any) -> None:
         super().__init__("mrdwt", motion, **params)
-        self.fields = parse(WAVELET_HEADER, self.header, "header")
+        self.fields = parse(WaveletHeader, self.header, "header")
 
     def coefficients(self, channel: int) -> list[Array]:
         """All bands of a channel, the coarsest first, put together from the streams."""
@@ -395,7 +395,7 @@ def test_the_greatest_that_a_header_allows_is_finite() -> None:
         "unit": 2.0**100,
         "least": 2**39,
     }
-    header = build(WAVELET_HEADER, fields, "header")
+    header = build(WaveletHeader(**fields), "header")
     layout = Layout(1000, ((0,),), n_resolutions=1)
     stream = bytes([streams.CONSTANT, 255]) + b"\x80\x80\x80\x80\x80\x40"  # 2^40, zigzag
     request = Request(0, 1000, (0,))
@@ -409,7 +409,7 @@ def test_the_greatest_that_a_header_allows_is_finite() -> None:
 def test_frames_that_no_segment_holds_are_not_allocated() -> None:
     coded = small()
     far = {
-        "header": build(WAVELET_HEADER, {**coded.fields, "coded_frames": 2**50}, "header"),
+        "header": build(replace(coded.fields, coded_frames=2**50), "header"),
         "layout": replace(coded.layout, n_frames=2**50),
         "spans": [Span(0, 12), Span(12, 2**50 - 32, 6), Span(2**50 - 20, 20, 6)],
         "fetch": lambda *_: b"",
@@ -441,11 +441,11 @@ def test_dwt_is_mrdwt_with_a_flat_threshold() -> None:
 
 def test_presets_of_dwt() -> None:
     published = lossy.Direct("dwt", smooth(100), preset="khan2014")
-    fields = parse(WAVELET_HEADER, published.header, "header")
+    fields = parse(WaveletHeader, published.header, "header")
     assert (fields.wavelet, fields.levels, fields.decimals) == (wavelets.IDS["db2"], 4, 2)
     assert fields.least == 300 and len(published.segments) == 1
     few = lossy.Direct("dwt", smooth(3), preset="khan2014")
-    assert parse(WAVELET_HEADER, few.header, "header").levels == 4
-    default = parse(WAVELET_HEADER, lossy.Direct("dwt", smooth(400)).header, "header")
+    assert parse(WaveletHeader, few.header, "header").levels == 4
+    default = parse(WaveletHeader, lossy.Direct("dwt", smooth(400)).header, "header")
     assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
     assert default.unit == 0.2 / 0.8

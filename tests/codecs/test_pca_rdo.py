@@ -14,7 +14,7 @@ import mcz
 from mcz.codecs import basis_models
 from mcz.codecs.space import COURSES
 from mcz.codecs.spatial.window_kernels import synthesize_courses
-from mcz.codecs.spatial.windows import WINDOWS_HEADER
+from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.motion import Signal
 from mcz.reading.sizes import clip_sizes
 from mcz.schema import parse
@@ -85,7 +85,7 @@ def test_a_short_window_has_cosines() -> None:
 def test_long_windows_have_all_courses_or_none(window) -> None:
     motion = markers(window + 3, 1)
     coded = Direct(NAME, motion, step=0.01, window=window)
-    flags = parse(WINDOWS_HEADER, coded.header, "header").space.flags
+    flags = parse(WindowsHeader, coded.header, "header").space.flags
     assert bool(flags & COURSES) == (window <= 1024)
     assert np.sqrt(np.mean((coded.read() - motion.values) ** 2)) < 0.01
 

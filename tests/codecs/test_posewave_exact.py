@@ -15,7 +15,7 @@ from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.codecs import by_name
 from mcz.codecs.contract import Encoded, Request, Span
-from mcz.codecs.posewave.header import POSEWAVE_HEADER
+from mcz.codecs.posewave.header import PosewaveHeader
 from mcz.coding.ordinals.streams import build_stream
 from mcz.editing.extraction import extract
 from mcz.motion import Exceptions, Motion, Signal
@@ -67,9 +67,7 @@ class Coded:
         return self.codec.decode(given, self.layout, self.spans, request, self.stream)
 
     def with_header(self, **fields: Any) -> bytes:
-        return build(
-            POSEWAVE_HEADER, {**parse(POSEWAVE_HEADER, self.header, "header"), **fields}, "header"
-        )
+        return build(replace(parse(PosewaveHeader, self.header, "header"), **fields), "header")
 
 
 @pytest.fixture(scope="module")

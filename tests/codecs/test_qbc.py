@@ -78,7 +78,7 @@ SETTINGS = st.fixed_dictionaries(
 
 def curves_of(clip: Direct, group: int) -> list[tuple[int, int]]:
     """First and last frame of each curve of a joint, from the streams."""
-    fields = parse(qbc.QBC_HEADER, clip.header, "header")
+    fields = parse(qbc.QbcHeader, clip.header, "header")
     n_channels = len(clip.layout.groups[group])
     found = []
     for index, span in enumerate(clip.spans):
@@ -97,13 +97,13 @@ def curves_of(clip: Direct, group: int) -> list[tuple[int, int]]:
 
 
 def step_of(clip: Direct) -> float:
-    fields = parse(qbc.QBC_HEADER, clip.header, "header")
+    fields = parse(qbc.QbcHeader, clip.header, "header")
     return float(fields.step if fields.decimals == SCALED else 10.0**-fields.decimals)
 
 
 def check_bound(motion: Motion, limit: float, clip: Direct, *, closed: bool) -> None:
     """No frame is farther from its curve than SPEC.md allows, all channels of a joint together."""
-    fields = parse(qbc.QBC_HEADER, clip.header, "header")
+    fields = parse(qbc.QbcHeader, clip.header, "header")
     errors = clip.read() - unwrap(motion.values, motion.skeleton)
     if fields.decimals == SCALED:
         lengths = [c.kind in ("tx", "ty", "tz", "length") for c in motion.skeleton.channels]
@@ -293,12 +293,12 @@ def test_fewest_breaks_need_marks_near_each_other() -> None:
 
 def test_presets() -> None:
     clip = coded(smooth(400), preset="khan2014")
-    fields = parse(qbc.QBC_HEADER, clip.header, "header")
+    fields = parse(qbc.QbcHeader, clip.header, "header")
     assert (fields.delta, fields.decimals, fields.coded_frames) == (80, 2, 400)
     assert len(clip.segments) == 1
     same = {"d2_lmt": 4, "delta": 80, "Q": 2, "middle": "published"}
     assert coded(smooth(400), preset="khan2014", **same).segments == clip.segments
-    default = parse(qbc.QBC_HEADER, coded(smooth(400)).header, "header")
+    default = parse(qbc.QbcHeader, coded(smooth(400)).header, "header")
     assert (default.delta, default.decimals, default.step) == (40, SCALED, 0.75)
     lever = reach(smooth(1).skeleton) * math.pi / 180
     assert default.position_step == 0.75 * lever

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from mcz.errors import FormatError, LimitError, MczError, MotionError
 from mcz.formats import bvh
 from mcz.formats.layout import (
-    DETAIL,
     FRAME_NUMBER,
-    TEMPLATE,
+    Detail,
     Layout,
     Pattern,
     Run,
+    Template,
     parse_layout,
     runs_of,
 )
@@ -25,7 +25,7 @@ from mcz.formats.notes import RowNotes, join_notes
 from mcz.formats.restore import restore
 from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build
+from tools.records import built
 
 GAPS = st.sampled_from([b"", b" ", b"\n", b"\r\n", b"\nname ", b"\0\xff"])
 
@@ -119,7 +119,7 @@ def test_hostile_notes_are_refused_or_used(data: bytes) -> None:
     ],
 )
 def test_a_bad_pattern_is_refused(pattern: dict[str, object]) -> None:
-    template = build(TEMPLATE, {"header": [b""], "gaps": [b" "], "patterns": [pattern]}, "test")
+    template = built(Template, {"header": [b""], "gaps": [b" "], "patterns": [pattern]}, "test")
     _, detail = Layout((b"",)).build()
     with pytest.raises(FormatError):
         parse_layout(template, detail, 2)
@@ -130,9 +130,9 @@ def test_sizes_are_known_before_anything_is_allocated() -> None:
     fields = {"header": [b""], "gaps": [b" " * 2**19], "patterns": [{"runs": [huge], "tail": 0}]}
     _, detail = Layout((b"",)).build()
     with pytest.raises(LimitError, match="bytes of gaps a row"):
-        parse_layout(build(TEMPLATE, fields, "test"), detail, 2)
+        parse_layout(built(Template, fields, "test"), detail, 2)
     fields["gaps"] = [b" " * 2**18]
-    template = build(TEMPLATE, fields, "test")
+    template = built(Template, fields, "test")
     skeleton = Skeleton((Joint("a", channels=(Channel("rx"), Channel("ry"))),))
     motion = Motion(skeleton, (Signal(np.zeros((1000, 2))),))
     with pytest.raises(LimitError, match="a text of 78"):
@@ -194,7 +194,7 @@ def test_a_new_layout_in_every_row_stays_linear() -> None:
 def test_a_detail_of_many_patterns_is_refused() -> None:
     _, _detail = Layout((b"",)).build()
     pattern = {"runs": [], "tail": 0}
-    template = build(TEMPLATE, {"header": [b""], "gaps": [b" "], "patterns": [pattern]}, "test")
+    template = built(Template, {"header": [b""], "gaps": [b" "], "patterns": [pattern]}, "test")
     fields = {
         "count": b"",
         "rows": 0,
@@ -204,4 +204,4 @@ def test_a_detail_of_many_patterns_is_refused() -> None:
         "ending": b"",
     }
     with pytest.raises(LimitError):
-        parse_layout(template, build(DETAIL, fields, "test"), 0)
+        parse_layout(template, built(Detail, fields, "test"), 0)

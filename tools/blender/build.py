@@ -2,7 +2,8 @@
 
     python tools/blender/build.py [--wheels DIR] [--out dist]
 
-It holds the add-on's modules, and ``mcz`` as a wheel, which needs nothing but Blender's NumPy.
+It holds the add-on's modules, and as wheels ``mcz`` and construct, which is pure Python, as it is
+installed here: Blender has NumPy, and nothing else is needed.
 ``--wheels`` names a folder of wheels of this tree, each for a Python and a platform; their compiled
 kernels are added to the one wheel. Of several wheels of one name and version Blender takes the last
 by file name, 4.2 whatever their Python; so there is one wheel, in which Python finds the modules of
@@ -18,6 +19,7 @@ import io
 import re
 import zipfile
 from collections.abc import Iterable, Mapping
+from importlib.metadata import distribution
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -63,10 +65,11 @@ def build_zip(wheels: Iterable[Path] = ()) -> tuple[str, bytes]:
     name, wheel = mcz_wheel(compiled_kernels(wheels))
     files = {path.relative_to(ADDON).as_posix(): path.read_bytes() for path in ADDON.rglob("*.py")}
     manifest = (ADDON / "blender_manifest.toml").read_text("utf-8")
-    listed = f'\nwheels = ["./wheels/{name}"]\n\n['
+    construct, construct_wheel = installed_wheel("construct")
+    listed = f'\nwheels = ["./wheels/{construct}", "./wheels/{name}"]\n\n['
     files["blender_manifest.toml"] = manifest.replace("\n[", listed, 1).encode()
     files["LICENSE"] = (ROOT / "LICENSE").read_bytes()
-    files[f"wheels/{name}"] = wheel
+    files |= {f"wheels/{name}": wheel, f"wheels/{construct}": construct_wheel}
     return f"mcz-blender-{version()}.zip", zipped(files)
 
 
@@ -120,11 +123,33 @@ def mcz_wheel(kernels: Mapping[str, bytes]) -> tuple[str, bytes]:
     files = {name: data for name, data in files.items() if not name.endswith((".pyc", ".html"))}
     files |= kernels
     about = f"Metadata-Version: 2.1\nName: mcz\nVersion: {version()}\nLicense: Apache-2.0\n"
-    folder = f"mcz-{version()}.dist-info"
-    files |= {f"{folder}/METADATA": about.encode(), f"{folder}/WHEEL": WHEEL}
-    rows = [f"{name},sha256={_digest(data)},{len(data)}" for name, data in sorted(files.items())]
-    files[f"{folder}/RECORD"] = "\n".join([*rows, f"{folder}/RECORD,,", ""]).encode()
-    return f"mcz-{version()}-py3-none-any.whl", zipped(files)
+    return wheel_of("mcz", version(), {**files, "METADATA": about.encode()})
+
+
+def installed_wheel(name: str) -> tuple[str, bytes]:
+    """The wheel of a pure Python package from its installed files."""
+    package = distribution(name)
+    kept = {
+        path.as_posix(): Path(str(package.locate_file(path))).read_bytes()
+        for path in package.files or ()
+        if path.suffix == ".py" and ".." not in path.parts
+    }
+    files = kept | {
+        about: text.encode()
+        for about in ("METADATA", "LICENSE")
+        if (text := package.read_text(about)) is not None
+    }
+    return wheel_of(name, package.version, files)
+
+
+def wheel_of(name: str, version: str, files: Mapping[str, bytes]) -> tuple[str, bytes]:
+    """A wheel of these files; those without a folder are about the package."""
+    folder = f"{name}-{version}.dist-info"
+    placed = {path if "/" in path else f"{folder}/{path}": data for path, data in files.items()}
+    placed[f"{folder}/WHEEL"] = WHEEL
+    rows = [f"{path},sha256={_digest(data)},{len(data)}" for path, data in sorted(placed.items())]
+    placed[f"{folder}/RECORD"] = "\n".join([*rows, f"{folder}/RECORD,,", ""]).encode()
+    return f"{name}-{version}-py3-none-any.whl", zipped(placed)
 
 
 def _digest(data: bytes) -> str:

@@ -26,7 +26,7 @@ from mcz.kinematics import point_set
 from mcz.kinematics.points import listed_points
 
 SAMPLED = 60  # frames at most
-OTHERS = {"click", "construct", "fsspec", "pywt"}  # not all Blenders have them
+OTHERS = {"click", "fsspec", "pywt"}  # not all Blenders have them
 
 
 def main() -> None:

@@ -147,16 +147,16 @@ class Mutation:
         if end is None or not data or any(pieces[n].packets is not None for n in data):
             return None
         try:
-            fields = parse(payloads.CEND, pieces[end].payload, "CEND")
+            fields = parse(payloads.Cend, pieces[end].payload, "CEND")
             last = parse_header(pieces[data[-1]].payload)[0]
             more = self._near(last.n_frames) - last.n_frames
             changed = list(pieces)
             changed[data[-1]] = _edited(pieces[data[-1]], n_frames=last.n_frames + more)
             fields.n_frames += more
-            changed[end] = replace(pieces[end], payload=build(payloads.CEND, fields, "CEND"))
-            begin = parse(payloads.CLIP, pieces[clip].payload, "CLIP")
+            changed[end] = replace(pieces[end], payload=build(fields, "CEND"))
+            begin = parse(payloads.Clip, pieces[clip].payload, "CLIP")
             begin.n_frames += more if begin.n_frames else 0
-            changed[clip] = replace(pieces[clip], payload=build(payloads.CLIP, begin, "CLIP"))
+            changed[clip] = replace(pieces[clip], payload=build(begin, "CLIP"))
         except (MczError, TypeError):
             return None
         return changed
@@ -181,7 +181,8 @@ class Mutation:
             of, name = self.rng.choice(
                 [(fields, n) for n in CLIP_NUMBERS] + 2 * [(signal, n) for n in SIGNAL_NUMBERS]
             )
-            of[name] = self.rng.choice(list(CODECS)) if name == "codec" else self._near(of[name])
+            near = self._near(getattr(of, name))
+            setattr(of, name, self.rng.choice(list(CODECS)) if name == "codec" else near)
 
         return self._clip(pieces, edit)
 
@@ -198,8 +199,8 @@ class Mutation:
                 signal.groups.kind = self.rng.randrange(4)
                 signal.groups.sizes = [self.rng.randrange(1, 4) for _ in range(3)]
             elif kind == 2 and fields.source:
-                detail = bytes(fields.source[0].detail)
-                fields.source[0].detail = self._bytes(detail, 16)
+                detail = bytes(fields.source.detail)
+                fields.source.detail = self._bytes(detail, 16)
             elif fields.metadata:
                 pair = self.rng.choice(fields.metadata)
                 pair.value = self.change(pair.value.encode(), 64).decode("latin-1")
@@ -211,9 +212,9 @@ class Mutation:
         if which is None:
             return None
         try:
-            fields = parse(payloads.CLIP, pieces[which].payload, "CLIP")
+            fields = parse(payloads.Clip, pieces[which].payload, "CLIP")
             edit(fields)
-            payload = build(payloads.CLIP, fields, "CLIP")
+            payload = build(fields, "CLIP")
         except (MczError, IndexError, TypeError):
             return None
         return with_payload(pieces, which, payload)
@@ -231,11 +232,11 @@ class Mutation:
         if pieces[which].type == b"MODL":
             return self._payload(pieces, which)
         try:
-            fields = parse(payloads.SRCE, pieces[which].payload, "SRCE")
+            fields = parse(payloads.Srce, pieces[which].payload, "SRCE")
             text = decoded(fields.data, fields.encoding, fields.size, "SRCE")
             fields.data = self._bytes(text, 32)
             fields.size, fields.encoding = len(fields.data), payloads.STORED
-            return with_payload(pieces, which, build(payloads.SRCE, fields, "SRCE"))
+            return with_payload(pieces, which, build(fields, "SRCE"))
         except MczError:
             return None
 

@@ -49,6 +49,7 @@ from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
 from mcz.schema import build, deflate, inflate, parse, read_varint, varint
+from tools.records import built
 
 SHARED = (b"SKEL", b"SRCE", b"MODL")  # chunks with an id
 MOST_TABLE = 4096  # bytes of a stream table that is looked for
@@ -169,10 +170,10 @@ def _payload(data: bytes, chunk: Chunk) -> bytes:
 def changed_index(index: bytes, change: Callable[[bytes], bytes]) -> bytes:
     """The INDX chunk with its inflated content passed through ``change``."""
     start = len(index) - CRC.size
-    outer = parse(payloads.INDX, index[16:start], "INDX")
+    outer = parse(payloads.Indx, index[16:start], "INDX")
     content = change(inflate(outer.data, outer.size, "INDX"))
     fields = {"size": len(content), "data": deflate(content)}
-    return build_chunk(b"INDX", build(payloads.INDX, fields, "INDX"))
+    return build_chunk(b"INDX", built(payloads.Indx, fields, "INDX"))
 
 
 def with_payload(pieces: Sequence[Piece], which: int, payload: bytes) -> Pieces:
@@ -260,17 +261,17 @@ def with_hashes(data: bytes, max_decoded: int | None = None) -> bytes:
     pending: tuple[list[bytes], bytes | None] | None = None
     for n, piece in enumerate(pieces):
         if piece.type == b"CLIP":
-            fields = parse(payloads.CLIP, piece.payload, "CLIP")
+            fields = parse(payloads.Clip, piece.payload, "CLIP")
             pending = found.get(fields.name)  # the index may list other clips, or in another order
             if pending is not None and pending[1] is not None and fields.source:
-                fields.source[0].size = len(pending[1])
-                pieces[n] = replace(piece, payload=build(payloads.CLIP, fields, "CLIP"))
+                fields.source.size = len(pending[1])
+                pieces[n] = replace(piece, payload=build(fields, "CLIP"))
         elif piece.type == b"CEND" and pending is not None:
-            fields = parse(payloads.CEND, piece.payload, "CEND")
+            fields = parse(payloads.Cend, piece.payload, "CEND")
             fields.value_sha256 = pending[0]
             if pending[1] is not None:
-                fields.source_sha256 = [hashlib.sha256(pending[1]).digest()]
-            pieces[n] = replace(piece, payload=build(payloads.CEND, fields, "CEND"))
+                fields.source_sha256 = hashlib.sha256(pending[1]).digest()
+            pieces[n] = replace(piece, payload=build(fields, "CEND"))
     return joined(pieces)
 
 

@@ -40,7 +40,7 @@ def codecs_of(vector: Vector) -> list[str]:
     found: set[str] = set()
     for payload in _payloads(vector.data, b"CLIP"):
         try:
-            fields = parse(payloads.CLIP, payload, "CLIP")
+            fields = parse(payloads.Clip, payload, "CLIP")
         except MczError:
             continue
         found |= {CODECS[s.codec].name for s in fields.signals if s.codec in CODECS}
@@ -54,14 +54,14 @@ def formats_of(vector: Vector) -> list[str]:
     """The names of the source formats of the clips and skeletons that have a source, sorted."""
     names = {source_format.id: source_format.name for source_format in FORMATS.values()}
     found: set[str] = set()
-    for kind, schema in ((b"CLIP", payloads.CLIP), (b"SKEL", payloads.SKEL)):
+    for kind, schema in ((b"CLIP", payloads.Clip), (b"SKEL", payloads.Skel)):
         for payload in _payloads(vector.data, kind):
             try:
                 plain = unpacked(payload, "source", BASE) if kind == b"SKEL" else payload
                 fields = parse(schema, plain, "source")
             except MczError:
                 continue
-            found |= {names[s.format] for s in fields.source if s.format in names}
+            found |= {names[s.format] for s in [fields.source] if s and s.format in names}
     return sorted(found)
 
 

@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from construct import Float64l, If, Int8ul, this
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
@@ -64,18 +65,7 @@ from mcz.codecs.parameters import (
 )
 from mcz.codecs.segments import SEGMENT_FRAMES, SEGMENT_FRAMES_PARAMETER, Lengths, halving
 from mcz.errors import FormatError, OptionError
-from mcz.schema import (
-    UVARINT,
-    ExprValidator,
-    Float64l,
-    IfThenElse,
-    Int8ul,
-    Pass,
-    Struct,
-    build,
-    parse,
-    this,
-)
+from mcz.schema import UVARINT, Checked, Record, bounded, build, field, parse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -83,22 +73,22 @@ Ints = NDArray[np.int64]
 MAX_DELTA = 2**20
 LEAST_FRAMES = 240  # of a segment: in fewer, hundreds of channels would cost more than they save
 
-STEP = IfThenElse(
-    this.decimals == SCALED,
-    ExprValidator(Float64l, lambda obj, ctx: LEAST_STEP <= obj <= 1 / LEAST_STEP),  # QBC-04
-    Pass,
-)
-QBC_HEADER = Struct(
-    "delta"
-    / ExprValidator(UVARINT, lambda obj, ctx: 1 <= obj <= MAX_DELTA)  # QBC-02
-    * "frames from mark to mark, 1 to 2^20",
-    "coded_frames" / UVARINT * "frames of the signal that was coded, from frame 0 on",
-    "decimals"
-    / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED)  # QBC-03
-    * "decimals of control points, 0 to 15; 255: they are multiples of steps",
-    "step" / STEP * "2^-100 to 2^100, only where decimals is 255",
-    "position_step" / STEP * "the same of the channels tx, ty, tz and length",
-)
+STEP = If(this.decimals == SCALED, bounded(Float64l, LEAST_STEP, 1 / LEAST_STEP))  # QBC-04
+
+
+class QbcHeader(Record):
+    """Header of qbc."""
+
+    delta: int = field(
+        bounded(UVARINT, 1, MAX_DELTA), "frames from mark to mark, 1 to 2^20"
+    )  # QBC-02
+    coded_frames: int = field(UVARINT, "frames of the signal that was coded, from frame 0 on")
+    decimals: int = field(
+        Checked(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED),
+        "decimals of control points, 0 to 15; 255: they are multiples of steps",
+    )  # QBC-03
+    step: float | None = field(STEP, "2^-100 to 2^100, only where decimals is 255")
+    position_step: float | None = field(STEP, "the same of the channels tx, ty, tz and length")
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
@@ -107,14 +97,14 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
     plan = plan_of_options(params, source.layout)
-    fields = {
-        "delta": plan.delta,
-        "coded_frames": source.layout.n_frames,
-        "decimals": SCALED if plan.decimals is None else plan.decimals,
-        "step": plan.step if plan.decimals is None else None,
-        "position_step": plan.step * plan.lever if plan.decimals is None else None,
-    }
-    return Encoded(build(QBC_HEADER, fields, "qbc header"), _segments(source, plan), 2)
+    header = QbcHeader(
+        delta=plan.delta,
+        coded_frames=source.layout.n_frames,
+        decimals=SCALED if plan.decimals is None else plan.decimals,
+        step=plan.step if plan.decimals is None else None,
+        position_step=plan.step * plan.lever if plan.decimals is None else None,
+    )
+    return Encoded(build(header, "qbc header"), _segments(source, plan), 2)
 
 
 def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
@@ -160,7 +150,7 @@ def _segment_length(layout: Layout, plan: Plan) -> int:
 
 def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
     """The streams of some joints with new values, with marks and steps of the header."""
-    fields = parse(QBC_HEADER, asked.header, "qbc header")
+    fields = parse(QbcHeader, asked.header, "qbc header")
     plan = plan_of_header(fields, asked.options)
     part = Part(asked.source, asked.groups, fields.coded_frames)
     code = _Coder(part, fields.coded_frames, plan)
@@ -170,7 +160,7 @@ def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
 
 def preview(header: bytes, layout: Layout, spans: Sequence[Span]) -> Ints:
     """The stored frames with a mark."""
-    fields = parse(QBC_HEADER, header, "qbc header")
+    fields = parse(QbcHeader, header, "qbc header")
     _check(fields, layout, spans)
     own = [
         marks[marks < span.stop]
@@ -218,7 +208,7 @@ def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> Floats:
     """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
-    fields = parse(QBC_HEADER, header, "qbc header")
+    fields = parse(QbcHeader, header, "qbc header")
     _check(fields, layout, spans)
     n_columns = sum(len(layout.groups[group]) for group in request.groups)
     out = np.zeros((request.stop - request.start, n_columns))
@@ -228,7 +218,7 @@ def decode(
     return out
 
 
-def _check(fields: Any, layout: Layout, spans: Sequence[Span]) -> None:
+def _check(fields: QbcHeader, layout: Layout, spans: Sequence[Span]) -> None:
     if layout.samples_per_frame != 1 or layout.n_resolutions > 2:  # QBC-01
         raise FormatError(
             f"qbc: {layout.samples_per_frame} samples a frame, {layout.n_resolutions} resolutions"
@@ -249,7 +239,7 @@ def _check(fields: Any, layout: Layout, spans: Sequence[Span]) -> None:
 
 def _read_segment(
     out: Floats,
-    fields: Any,
+    fields: QbcHeader,
     layout: Layout,
     spans: Sequence[Span],
     index: int,
@@ -287,10 +277,9 @@ def _read_segment(
             else straight(marks, frames)
         )
         steps = None
-        if fields.decimals == SCALED:
-            steps = np.where(  # QBC-27
-                is_position[list(layout.groups[group])], fields.position_step, fields.step
-            )
+        if fields.step is not None and fields.position_step is not None:  # QBC-27
+            are_positions = is_position[list(layout.groups[group])]
+            steps = np.array([fields.step, fields.position_step])[are_positions.astype(np.intp)]
         points = [_points(found, fields, steps) for found in (marks, curves.mids, curves.ends)]
         starts = np.concatenate([points[0][:1], points[2][:-1]])
         block = out[start - request.start : stop - request.start, column : column + n]
@@ -300,7 +289,7 @@ def _read_segment(
         column += n
 
 
-def _points(indices: Ints, fields: Any, steps: Floats | None) -> Floats:
+def _points(indices: Ints, fields: QbcHeader, steps: Floats | None) -> Floats:
     if steps is not None:
         return np.asarray(indices * steps)
     return np.asarray(indices / 10.0**fields.decimals)  # QBC-26
@@ -308,9 +297,9 @@ def _points(indices: Ints, fields: Any, steps: Floats | None) -> Floats:
 
 def cut(header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]) -> bytes:
     """The header for stored frames first <= f < stop alone."""
-    fields = parse(QBC_HEADER, header, "qbc header")
-    fields["coded_frames"] -= first
-    return build(QBC_HEADER, fields, "qbc header")
+    fields = parse(QbcHeader, header, "qbc header")
+    fields.coded_frames -= first
+    return build(fields, "qbc header")
 
 
 CODEC = Codec(

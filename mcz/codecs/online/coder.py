@@ -10,14 +10,15 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from construct import Int8ul
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
-from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, SPACE, Space, space_of
+from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, Space, SpaceFields, space_of
 from mcz.coding.start import start_states
 from mcz.errors import FormatError, LostFrameError, MotionError
-from mcz.schema import Int8ul, OneOf, Struct, parse
+from mcz.schema import Record, field, one_of, parse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,13 +28,18 @@ N_KINDS = 2  # start tables of a coder: for LTRs that are intra coded, and other
 AS_IS, REORDERED = 0, 1  # orders
 COEFFICIENT_BYTES = 40  # more than the bits of one take
 
-ONLINE_HEADER = Struct(
-    "space" / SPACE * "how a frame becomes coefficients",
-    "order"
-    / OneOf(Int8ul, (AS_IS, REORDERED))
-    * "points of a matrix: 0 as in Space; 1 x of all, then y, then z",
-    "coder" / OneOf(Int8ul, (MIXED, GOLOMB)) * "how coefficients become bits: 0 mixed, 1 Golomb",
-)
+
+class OnlineHeader(Record):
+    """Header of online."""
+
+    space: SpaceFields = field(SpaceFields, "how a frame becomes coefficients")
+    order: int = field(
+        one_of(Int8ul, (AS_IS, REORDERED)),
+        "points of a matrix: 0 as in Space; 1 x of all, then y, then z",
+    )
+    coder: int = field(
+        one_of(Int8ul, (MIXED, GOLOMB)), "how coefficients become bits: 0 mixed, 1 Golomb"
+    )
 
 
 @cache
@@ -50,9 +56,9 @@ def _coding() -> Any:
     return mixing
 
 
-def parse_header(header: bytes) -> Any:
-    """The fields of ONLINE_HEADER; raises FormatError."""
-    fields = parse(ONLINE_HEADER, header, f"{NAME} header")
+def parse_header(header: bytes) -> OnlineHeader:
+    """The fields of OnlineHeader; raises FormatError."""
+    fields = parse(OnlineHeader, header, f"{NAME} header")
     if fields.space.flags & (MEAN | COURSES):  # ONLINE-04
         raise FormatError(f"{NAME}: flags {fields.space.flags:#x}, it has no mean or courses")
     if fields.order == REORDERED and fields.space.flags & APART:  # ONLINE-05
@@ -60,7 +66,7 @@ def parse_header(header: bytes) -> Any:
     return fields
 
 
-def _space(fields: Any, layout: Layout) -> Space:
+def _space(fields: OnlineHeader, layout: Layout) -> Space:
     space = space_of(NAME, fields.space, layout)
     if fields.order == AS_IS:  # ONLINE-07
         return space
@@ -182,4 +188,4 @@ class Coder:
         return self._state, data, self.coder, kind, frames, past, self.space.transform()
 
 
-__all__ = ["GOLOMB", "INTRA", "LTR", "MIXED", "NAME", "ONLINE_HEADER", "STR", "Coder"]
+__all__ = ["GOLOMB", "INTRA", "LTR", "MIXED", "NAME", "STR", "Coder", "OnlineHeader"]

@@ -37,16 +37,16 @@ from mcz.codecs.online.coder import (
     LTR,
     MIXED,
     NAME,
-    ONLINE_HEADER,
     STR,
     Coder,
+    OnlineHeader,
     parse_header,
 )
 from mcz.codecs.online.options import CHANGEABLE, PARAMETERS, choose, choose_live, settled
 from mcz.codecs.online.units import Unit, build_units, parse_units
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import TARGET_BYTES
-from mcz.codecs.space import check, uses_of
+from mcz.codecs.space import SpaceFields, check, uses_of
 from mcz.codecs.space_choices import sample_of
 from mcz.errors import FormatError, OptionError
 from mcz.schema import build
@@ -65,14 +65,14 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     chosen = settled(params)
     choice, order = choose(sample_of(NAME, source), chosen)
     layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
-    header = build(ONLINE_HEADER, _fields(choice.fields, order, chosen), f"{NAME} header")
+    header = build(_header(choice.fields, order, chosen), f"{NAME} header")
     writer = _Writer(header, layout, chosen)
     return Encoded(header, _segments(source, writer), models=choice.models, known=choice.known)
 
 
-def _fields(space: Any, order: int, chosen: Mapping[str, Any]) -> dict[str, Any]:
+def _header(space: SpaceFields, order: int, chosen: Mapping[str, Any]) -> OnlineHeader:
     coder = MIXED if chosen["coder"] == "mixed" else GOLOMB
-    return {"space": space, "order": order, "coder": coder}
+    return OnlineHeader(space=space, order=order, coder=coder)
 
 
 class _Writer:
@@ -206,7 +206,7 @@ class _LiveEncoder(LiveEncoder):
     def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
         chosen = settled(options)
         choice, order = choose_live(layout, chosen)
-        self.header = build(ONLINE_HEADER, _fields(choice.fields, order, chosen), f"{NAME} header")
+        self.header = build(_header(choice.fields, order, chosen), f"{NAME} header")
         self.models = choice.models
         found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
         self._writer = _Writer(self.header, found, chosen)

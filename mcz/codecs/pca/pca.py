@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from construct import Int8ul
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
@@ -40,17 +41,21 @@ from mcz.codecs.segments import (
 )
 from mcz.codecs.steps import ratio_of
 from mcz.errors import FormatError
-from mcz.schema import ExprValidator, Int8ul, Struct, build, parse
+from mcz.schema import Checked, Record, build, field, parse
 
 Floats = NDArray[np.float64]
 
 LEAST_FRAMES = 256  # of a segment: in fewer the basis would cost more than it saves
 
-PCA_HEADER = Struct(
-    "decimals"
-    / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED)  # PCA-05
-    * "decimals of means and coefficients, 0 to 15; 255: they are multiples of a step",
-)
+
+class PcaHeader(Record):
+    """Header of pca."""
+
+    decimals: int = field(
+        Checked(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED),
+        "decimals of means and coefficients, 0 to 15; 255: they are multiples of a step",
+    )  # PCA-05
+
 
 PRESETS: dict[str, dict[str, Any]] = {
     "khan2014": {"q": 13, "Q": 2},
@@ -67,7 +72,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     chosen = chosen_of(PRESETS, params)
     frames = segment_frames_of(source.layout, params["segment_frames"], as_published=published)
     decimals = SCALED if chosen["Q"] is None else chosen["Q"]
-    header = build(PCA_HEADER, {"decimals": decimals}, "pca header")
+    header = build(PcaHeader(decimals=decimals), "pca header")
     return Encoded(header, _segments(source, chosen["q"], chosen["Q"], frames, published))
 
 
@@ -93,7 +98,7 @@ def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> Floats:
     """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
-    fields = parse(PCA_HEADER, header, "pca header")
+    fields = parse(PcaHeader, header, "pca header")
     _check(layout, spans)
     n_columns = sum(len(layout.groups[group]) for group in request.groups)
     out = np.zeros((request.stop - request.start, n_columns))

@@ -17,6 +17,7 @@ from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
 from mcz.codecs.posewave.contact_keeper import Keeper
+from mcz.codecs.posewave.contact_plan import ContactsFields
 from mcz.codecs.posewave.exact import partition
 from mcz.codecs.posewave.header import (
     MAX_FINE,
@@ -103,7 +104,7 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
 
 def _contacts(
     source: SignalSource, params: Mapping[str, Any], in_cm: float
-) -> tuple[list[dict[str, Any]], Keeper | None]:
+) -> tuple[list[ContactsFields], Keeper | None]:
     """The header's field, and what is to be kept; ``in_cm``: length units a centimeter."""
     if not params.get("contacts") or not source.layout.n_frames:
         return [], None

@@ -16,7 +16,13 @@ from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import in_range
 from mcz.codecs.posewave.contact_keeper import Piece
-from mcz.codecs.posewave.contact_plan import MAX_POINTS, MAX_RAMP, path_of
+from mcz.codecs.posewave.contact_plan import (
+    MAX_POINTS,
+    MAX_RAMP,
+    ContactsFields,
+    PointFields,
+    path_of,
+)
 from mcz.codecs.posewave.header import NAME
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import skeleton_of
@@ -43,7 +49,7 @@ RAMP_SECONDS = 1 / 15
 class Wanted:
     """Fields of CONTACTS, and the pieces to hold, in the order of their points and frames."""
 
-    fields: dict[str, Any]
+    fields: ContactsFields
     pieces: tuple[Piece, ...]
 
 
@@ -150,7 +156,7 @@ def choose_contacts(
         above = [j for j in path_of(skeleton.parents, joint)[:-1] if j in by_joint]
         follows = joints.index(above[-1]) + 1 if above else 0
         tail = points_of(skeleton)[joint][0] + 1
-        points.append({"joint": joint, "tail": tail, "step": step, "follows": follows})
+        points.append(PointFields(joint=joint, tail=tail, step=step, follows=follows))
     for group in _groups(skeleton, joints):
         stances = merged_ranges([span for joint in group for span in by_joint[joint]])
         for joint in group:
@@ -159,7 +165,7 @@ def choose_contacts(
                 pieces.append(Piece(joints.index(joint), first, stop - first, first, stance))
         n_stances += len(stances)
     ramp = min(round(RAMP_SECONDS * (frame_rate or USUAL_RATE)), MAX_RAMP)
-    return Wanted({"rounds": ROUNDS, "ramp": ramp, "points": points}, tuple(pieces))
+    return Wanted(ContactsFields(rounds=ROUNDS, ramp=ramp, points=points), tuple(pieces))
 
 
 def _groups(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from construct import Float32l, Int8ul
 
 from mcz.codecs.posewave.skeleton_plan import PLAIN, Plan, limited, orientation
 from mcz.codecs.posewave.turns import RULES
 from mcz.errors import FormatError
 from mcz.kernels.types import Floats, Floats2, Ints
 from mcz.motion import Skeleton
-from mcz.schema import UVARINT, ExprValidator, Float32l, Int8ul, Struct, counted
+from mcz.schema import UVARINT, Record, bounded, counted, field
 
 MAX_POINTS = 8
 MAX_ROUNDS = 6
@@ -24,30 +25,37 @@ MAX_RAMP = 64
 START_UNITS = 16  # of a step, in which the place is told that a contact begins with
 MOST_STEPS = 4.0  # greatest steps by which a channel may be corrected
 
-POINT = Struct(
-    "joint" / UVARINT * "whose point it is",
-    "tail" / UVARINT * "0: the origin of the joint; else the number of a tail, from 1",
-    "step"
-    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # HOLD-04
-    * "grid of its displacements, in length units, 2^-60 to 2^60",
-    "follows" / UVARINT * "0, or the number of an earlier point that moves alike, from 1",
-)
-CONTACTS = Struct(
-    "rounds"
-    / ExprValidator(Int8ul, lambda n, ctx: 1 <= n <= MAX_ROUNDS)  # HOLD-02
-    * "in which a pose is corrected, 1 to 6",
-    "ramp"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_RAMP)  # HOLD-02
-    * "frames before and after a contact in which its correction comes and goes, 0 to 64",
-    "points"
-    / counted(POINT, MAX_POINTS)  # HOLD-03
-    * "that are held, 1 to 8",
-)
+
+class PointFields(Record):
+    """A point that is held in its place, in CONTACTS."""
+
+    joint: int = field(UVARINT, "whose point it is")
+    tail: int = field(UVARINT, "0: the origin of the joint; else the number of a tail, from 1")
+    step: float = field(
+        bounded(Float32l, 2.0**-60, 2.0**60),
+        "grid of its displacements, in length units, 2^-60 to 2^60",
+    )  # HOLD-04
+    follows: int = field(UVARINT, "0, or the number of an earlier point that moves alike, from 1")
+
+
+class ContactsFields(Record):
+    """Contacts of posewave."""
+
+    rounds: int = field(
+        bounded(Int8ul, 1, MAX_ROUNDS), "in which a pose is corrected, 1 to 6"
+    )  # HOLD-02
+    ramp: int = field(
+        bounded(Int8ul, 0, MAX_RAMP),
+        "frames before and after a contact in which its correction comes and goes, 0 to 64",
+    )  # HOLD-02
+    points: list[PointFields] = field(
+        counted(PointFields, MAX_POINTS), "that are held, 1 to 8"
+    )  # HOLD-03
 
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
-    """The fields of CONTACTS, checked against a skeleton.
+    """The fields of ContactsFields, checked against a skeleton.
 
     ``joints`` and ``steps`` of the points, and their places ``tails`` (n_points, 3) along the
     joint's B. ``follows``: the number of another point, from 1, or 0.
@@ -79,7 +87,9 @@ class Held(NamedTuple):
     columns: Ints
 
 
-def parse_contacts(fields: Sequence[Any], skeleton: Skeleton, where: str) -> Contacts | None:
+def parse_contacts(
+    fields: Sequence[ContactsFields], skeleton: Skeleton, where: str
+) -> Contacts | None:
     """Raises FormatError where the fields do not fit the skeleton."""
     for found in fields:
         if not found.points:  # HOLD-03

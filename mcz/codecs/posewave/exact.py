@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout, Request, SignalSource, Span
-from mcz.codecs.posewave.header import NAME, POSEWAVE_HEADER, build_header
+from mcz.codecs.posewave.header import NAME, PosewaveHeader, build_header
 from mcz.codecs.segments import gather
 from mcz.coding.ordinals.heads import COPY, read_heads
 from mcz.coding.ordinals.streams import build_stream, parse_stream
@@ -75,7 +75,7 @@ def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int,
 
     Raises OptionError for other groups.
     """
-    fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
+    fields = parse(PosewaveHeader, header, f"{NAME} header")
     if len(groups) == len(layout.groups):
         return header
     if not set(groups) <= set(fields.exact):
@@ -83,8 +83,8 @@ def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int,
             f"{NAME}: joints that are not coded exactly cannot be cut out or left out; all of them "
             f"are coded in one"
         )
-    left = {"plain": [], "orders": [], "exact": range(len(groups))}
-    return build_header(**{**fields, **left})
+    left = {"plain": [], "orders": [], "exact": list(range(len(groups)))}
+    return build_header(**vars(fields) | left)
 
 
 def build_exact(source: SignalSource, groups: Sequence[int], first: int, stop: int) -> list[bytes]:

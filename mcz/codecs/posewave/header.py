@@ -11,10 +11,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from construct import Float32l, Int8ul
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
-from mcz.codecs.posewave.contact_plan import CONTACTS, Contacts, parse_contacts
+from mcz.codecs.posewave.contact_plan import Contacts, ContactsFields, parse_contacts
 from mcz.codecs.posewave.model import Start, start_tables
 from mcz.codecs.posewave.orders import N_ORDERS, check_orders
 from mcz.codecs.steps import code_of, ratio_of
@@ -27,7 +28,7 @@ from mcz.motion import (
     VECTOR_KINDS,
     Skeleton,
 )
-from mcz.schema import UVARINT, ExprValidator, Float32l, Int8ul, Struct, build, counted, parse
+from mcz.schema import UVARINT, Checked, Record, bounded, build, counted, field, parse
 from mcz.skeleton import first_columns
 
 Floats = NDArray[np.float64]
@@ -38,49 +39,62 @@ MAX_FINE = 24
 WHOLE_SHARE = 16
 REFINING, WHOLE_TURNS = 1, 2  # of ``flags``
 
-POSEWAVE_HEADER = Struct(
-    "levels"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_LEVELS)  # PWAVE-05
-    * "levels, 0 to 8",
-    "borrowing"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= ctx.levels)  # PWAVE-06
-    * "finest levels of details that take the metric of the next coarser one",
-    "start" / Int8ul * "start table of the model, 0 or 1",
-    "flags"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= 3)  # PWAVE-08
-    * "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric",
-    "step"
-    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # PWAVE-09
-    * "quantizer step of a row in the metric, in length units, 2^-60 to 2^60",
-    "radius"
-    / ExprValidator(Float32l, lambda x, ctx: 0 <= x <= 2.0**60)  # PWAVE-10
-    * "of the shell, in length units, 0 to 2^60",
-    "shell"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= WHOLE_SHARE)  # PWAVE-11
-    * "share of the shell in the metric, in sixteenths",
-    "rotation" / Int8ul * "step code of the greatest step of a rotation channel",
-    "position" / Int8ul * "step code of the greatest step of a position channel",
-    "first"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)  # PWAVE-12
-    * "halvings from the greatest step to that of a segment's first values, 0 to 24",
-    "constant"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)  # PWAVE-12
-    * "halvings from there to the step of constant channels, 0 to 24",
-    "plain"
-    / counted(Int8ul, 2**14)
-    * "of each channel of another kind the step code of its step; none: they are 128",
-    "weights" / counted(Int8ul, 2**14) * "of each joint the step code of its weight; none: all 1",
-    "orders"
-    / counted(ExprValidator(Int8ul, lambda n, ctx: n < N_ORDERS), 2**14)
-    * "of each joint the code of its axis order, 0 to 6; none: all 0",
-    "exact" / counted(UVARINT, 2**14) * "numbers of the groups whose channels are exact, ascending",
-    "contacts" / counted(CONTACTS, 1) * "none, or what the contacts of segments rest on",
-)
+
+class PosewaveHeader(Record):
+    """Header of posewave."""
+
+    levels: int = field(bounded(Int8ul, 0, MAX_LEVELS), "levels, 0 to 8")  # PWAVE-05
+    borrowing: int = field(
+        Checked(Int8ul, lambda n, ctx: n <= ctx.levels),
+        "finest levels of details that take the metric of the next coarser one",
+    )  # PWAVE-06
+    start: int = field(Int8ul, "start table of the model, 0 or 1")
+    flags: int = field(
+        bounded(Int8ul, 0, 3),
+        "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric",
+    )  # PWAVE-08
+    step: float = field(
+        bounded(Float32l, 2.0**-60, 2.0**60),
+        "quantizer step of a row in the metric, in length units, 2^-60 to 2^60",
+    )  # PWAVE-09
+    radius: float = field(
+        bounded(Float32l, 0, 2.0**60), "of the shell, in length units, 0 to 2^60"
+    )  # PWAVE-10
+    shell: int = field(
+        bounded(Int8ul, 0, WHOLE_SHARE), "share of the shell in the metric, in sixteenths"
+    )  # PWAVE-11
+    rotation: int = field(Int8ul, "step code of the greatest step of a rotation channel")
+    position: int = field(Int8ul, "step code of the greatest step of a position channel")
+    first: int = field(
+        bounded(Int8ul, 0, MAX_FINE),
+        "halvings from the greatest step to that of a segment's first values, 0 to 24",
+    )  # PWAVE-12
+    constant: int = field(
+        bounded(Int8ul, 0, MAX_FINE),
+        "halvings from there to the step of constant channels, 0 to 24",
+    )  # PWAVE-12
+    plain: list[int] = field(
+        counted(Int8ul, 2**14),
+        "of each channel of another kind the step code of its step; none: they are 128",
+    )
+    weights: list[int] = field(
+        counted(Int8ul, 2**14), "of each joint the step code of its weight; none: all 1"
+    )
+    orders: list[int] = field(
+        counted(Checked(Int8ul, lambda n, ctx: n < N_ORDERS), 2**14),
+        "of each joint the code of its axis order, 0 to 6; none: all 0",
+    )
+    exact: list[int] = field(
+        counted(UVARINT, 2**14), "numbers of the groups whose channels are exact, ascending"
+    )
+    contacts: list[ContactsFields] = field(
+        counted(ContactsFields, 1), "none, or what the contacts of segments rest on"
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The fields of POSEWAVE_HEADER, checked against a layout.
+    """The fields of PosewaveHeader, checked against a layout.
 
     Arrays are by channel, but for ``weights`` (n_joints,): ``greatest`` steps and the step of the
     ``first`` value of a segment and of a ``constant``, in source units. ``whole``: quaternions and
@@ -128,12 +142,12 @@ def has_whole_turns(skeleton: Skeleton) -> bool:
 
 
 def build_header(**fields: Any) -> bytes:
-    return build(POSEWAVE_HEADER, {"contacts": [], **fields}, f"{NAME} header")
+    return build(PosewaveHeader(**{"contacts": [], **fields}), f"{NAME} header")
 
 
 def parse_header(header: bytes, layout: Layout) -> Header:
     """Raises FormatError where ``header`` does not fit the skeleton of ``layout``."""
-    fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
+    fields = parse(PosewaveHeader, header, f"{NAME} header")
     skeleton = layout.skeleton
     if skeleton is None:  # PWAVE-04
         raise FormatError(f"{NAME}: a signal with channels of its own, not those of its skeleton")
@@ -151,13 +165,13 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     turning = ANGLE_KINDS if whole else ROTATION_KINDS
     kinds = [channel.kind for channel in skeleton.channels]
     n_plain = sum(kind not in (*turning, *POSITION_KINDS) for kind in kinds)
-    for name, due in (
-        ("plain", n_plain),
-        ("weights", skeleton.n_joints),
-        ("orders", skeleton.n_joints),
+    for name, codes, due in (
+        ("plain", fields.plain, n_plain),
+        ("weights", fields.weights, skeleton.n_joints),
+        ("orders", fields.orders, skeleton.n_joints),
     ):
-        if len(fields[name]) not in (0, due):  # PWAVE-13, PWAVE-14, PWAVE-15
-            raise FormatError(f"{NAME}: {len(fields[name])} of {name}, {due} are due")
+        if len(codes) not in (0, due):  # PWAVE-13, PWAVE-14, PWAVE-15
+            raise FormatError(f"{NAME}: {len(codes)} of {name}, {due} are due")
     check_orders(fields.orders, skeleton, NAME)
     exact = _exact(fields.exact, layout)
     if fields.exact and fields.contacts:  # PWAVE-39

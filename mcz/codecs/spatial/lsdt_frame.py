@@ -33,7 +33,7 @@ from mcz.codecs.contract import (
 from mcz.codecs.gaps import FrameReader, LiveRows, SegmentReader
 from mcz.codecs.parameters import Dial, chosen_of, preset_parameter
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, Lengths, halving, segment_frames_of
-from mcz.codecs.space import COURSES, MEAN, SPACE, check, space_of, uses_of
+from mcz.codecs.space import COURSES, MEAN, SpaceFields, check, space_of, uses_of
 from mcz.codecs.space_choices import (
     BASIS,
     CODER,
@@ -49,8 +49,8 @@ from mcz.codecs.space_choices import (
     sample_of,
 )
 from mcz.codecs.spatial.prefix_streams import (
-    CODE,
     NO_CODES,
+    CodeFields,
     build_vectors,
     codes_from,
     fields_of,
@@ -59,7 +59,7 @@ from mcz.codecs.spatial.prefix_streams import (
 from mcz.coding.start import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
-from mcz.schema import Struct, build, parse
+from mcz.schema import Record, build, field, parse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,10 +68,13 @@ NAME = "lsdt-frame"
 BLOCK_FRAMES = 512  # coded at a time
 SEGMENT_FRAMES = 1200
 
-FRAME_HEADER = Struct(
-    "space" / SPACE * "how a frame becomes coefficients",
-    "code" / CODE * "how coefficients become bits",
-)
+
+class FrameHeader(Record):
+    """Header of lsdt-frame."""
+
+    space: SpaceFields = field(SpaceFields, "how a frame becomes coefficients")
+    code: CodeFields = field(CodeFields, "how coefficients become bits")
+
 
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {"threshold": THRESHOLD, "coder": "mixed"},
@@ -89,14 +92,14 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     step = params["step"] or default_step(sample)
     choice = choose_space(NAME, sample, step, params["basis"], changes)
     layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
-    fields = {"space": choice.fields, "code": NO_CODES}
+    fields = FrameHeader(space=choice.fields, code=NO_CODES)
     published = params["preset"] == "hou2016"
     length = segment_frames_of(layout, params["segment_frames"], as_published=published)
-    coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
+    coder = _Coder(build(fields, f"{NAME} header"), layout, chosen["threshold"])
     if chosen["coder"] == "prefix" and layout.n_channels:
         length = min(length or SEGMENT_FRAMES, layout.most_frames)  # each begins with large ones
-        fields["code"] = fields_of(_vectors(coder, source, length))
-        coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
+        fields.code = fields_of(_vectors(coder, source, length))
+        coder = _Coder(build(fields, f"{NAME} header"), layout, chosen["threshold"])
     segments = _segments(source, coder, length)
     return Encoded(coder.header, segments, models=choice.models, known=choice.known)
 
@@ -159,8 +162,8 @@ def decode(
 
 
 def _header(header: bytes) -> Any:
-    """The fields of FRAME_HEADER; raises FormatError."""
-    fields = parse(FRAME_HEADER, header, f"{NAME} header")
+    """The fields of FrameHeader; raises FormatError."""
+    fields = parse(FrameHeader, header, f"{NAME} header")
     if fields.space.flags & (MEAN | COURSES):  # FRAME-05
         raise FormatError(f"{NAME}: flags {fields.space.flags:#x}, it has no mean or courses")
     return fields
@@ -275,8 +278,8 @@ class _LiveEncoder(LiveEncoder):
         choice = live_choice(NAME, layout, options["step"], options["basis"])
         if chosen["coder"] == "prefix":
             raise OptionError(f"{NAME}: prefix codes need all frames, coder mixed does not")
-        fields = {"space": choice.fields, "code": NO_CODES}
-        self.header = build(FRAME_HEADER, fields, f"{NAME} header")
+        fields = FrameHeader(space=choice.fields, code=NO_CODES)
+        self.header = build(fields, f"{NAME} header")
         self.models = choice.models
         found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
         self._coder = _Coder(self.header, found, chosen["threshold"])

@@ -11,27 +11,33 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from construct import If, Int8ul, this
 from numpy.typing import NDArray
 
 from mcz.coding.huffman import DIRECT, MAX_LENGTH, N_CLASSES, code_lengths, codes_of
 from mcz.errors import FormatError
-from mcz.schema import ExprValidator, If, Int8ul, OneOf, Struct, counted
+from mcz.schema import Checked, Record, counted, field, one_of
 
 Ints = NDArray[np.int64]
 
 ADAPTIVE, PREFIX = 0, 1  # coder
-_LENGTHS = counted(ExprValidator(Int8ul, lambda n, ctx: n <= MAX_LENGTH), N_CLASSES)
+_LENGTHS = counted(Checked(Int8ul, lambda n, ctx: n <= MAX_LENGTH), N_CLASSES)
 
-CODE = Struct(
-    "coder" / OneOf(Int8ul, (ADAPTIVE, PREFIX)) * "0 mixed, 1 prefix codes",
-    "gap_lengths"
-    / If(lambda ctx: ctx.coder == PREFIX, _LENGTHS)
-    * "lengths of the codes of a gap's classes, 0 to 15; only where coder is 1",
-    "value_lengths"
-    / If(lambda ctx: ctx.coder == PREFIX, _LENGTHS)
-    * "the same of the classes of a value",
-)
-NO_CODES: dict[str, Any] = {"coder": ADAPTIVE, "gap_lengths": None, "value_lengths": None}
+
+class CodeFields(Record):
+    """Prefix codes of sparse lists, in headers."""
+
+    coder: int = field(one_of(Int8ul, (ADAPTIVE, PREFIX)), "0 mixed, 1 prefix codes")
+    gap_lengths: list[int] | None = field(
+        If(this.coder == PREFIX, _LENGTHS),
+        "lengths of the codes of a gap's classes, 0 to 15; only where coder is 1",
+    )
+    value_lengths: list[int] | None = field(
+        If(this.coder == PREFIX, _LENGTHS), "the same of the classes of a value"
+    )
+
+
+NO_CODES = CodeFields(coder=ADAPTIVE, gap_lengths=None, value_lengths=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +55,7 @@ def _kernels() -> Any:
     return prefix_kernels
 
 
-def fields_of(blocks: Iterable[Ints]) -> dict[str, Any]:
+def fields_of(blocks: Iterable[Ints]) -> CodeFields:
     """The fields of CODE with the best codes for these vectors, (n_vectors, n) each."""
     gaps, values = np.zeros(N_CLASSES, np.int64), np.zeros(N_CLASSES, np.int64)
     for rows in blocks:
@@ -60,7 +66,7 @@ def fields_of(blocks: Iterable[Ints]) -> dict[str, Any]:
         gaps += np.bincount(_classes(found), minlength=N_CLASSES)
         values += np.bincount(_classes(np.abs(rows[vectors, columns]) - 1), minlength=N_CLASSES)
     lengths = [list(np.trim_zeros(code_lengths(c.tolist()), "b")) for c in (gaps, values)]
-    return {"coder": PREFIX, "gap_lengths": lengths[0], "value_lengths": lengths[1]}
+    return CodeFields(coder=PREFIX, gap_lengths=lengths[0], value_lengths=lengths[1])
 
 
 def _classes(numbers: Ints) -> Ints:
@@ -71,11 +77,11 @@ def _classes(numbers: Ints) -> Ints:
     return found
 
 
-def codes_from(fields: Any, where: str) -> Codes | None:
-    """The codes that the fields of CODE say, None where there are none; raises FormatError."""
+def codes_from(fields: CodeFields, where: str) -> Codes | None:
+    """The codes in the fields of CODE, None where there are none; raises FormatError."""
     if fields.coder == ADAPTIVE:
         return None
-    return Codes(_table(fields.gap_lengths, where), _table(fields.value_lengths, where))
+    return Codes(_table(fields.gap_lengths or (), where), _table(fields.value_lengths or (), where))
 
 
 def _table(lengths: Sequence[int], where: str) -> Ints:

@@ -28,7 +28,16 @@ from mcz.codecs.contract import Model, SignalSource, id_of
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import Parameter, Presets, integer, number, preset_parameter
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
-from mcz.codecs.space import APART, COSINES, COURSES, LEARNED, MEAN, WEIGHTED, columns_of
+from mcz.codecs.space import (
+    APART,
+    COSINES,
+    COURSES,
+    LEARNED,
+    MEAN,
+    WEIGHTED,
+    SpaceFields,
+    columns_of,
+)
 from mcz.codecs.space_choices import CODER, DOMAIN, STEP, VIRTUAL_MARKERS, Sample
 from mcz.codecs.spatial.windows import MAX_WINDOW, Plan
 from mcz.codecs.steps import ratio_of
@@ -136,13 +145,13 @@ def plan_of(
     """
     windows = Windows(name, source, sample, asked)
     courses = courses and windows.window <= LONGEST
-    fields: dict[str, Any] = {
-        "flags": WEIGHTED if sample.codes else 0,
-        "basis": COSINES,
-        "model": None,
-        "step": asked.step,
-        "weights": list(sample.codes) if sample.codes else None,
-    }
+    fields = SpaceFields(
+        flags=WEIGHTED if sample.codes else 0,
+        basis=COSINES,
+        model=None,
+        step=asked.step,
+        weights=list(sample.codes) if sample.codes else None,
+    )
     models: tuple[Model, ...] = ()
     n_frequencies = windows.window
     if windows.n_frames and len(windows.weights):
@@ -151,9 +160,9 @@ def plan_of(
         found = fit(windows, apart=apart, mean=mean, courses=courses)
         bases, n_frequencies = _bases(windows, found, asked)
         models = (model_of(bases),)
-        fields |= {"basis": LEARNED, "model": id_of(models[0])}
+        fields.basis, fields.model = LEARNED, id_of(models[0])
         there = ((APART, apart), (MEAN, mean), (COURSES, courses))
-        fields["flags"] |= sum(flag for flag, is_there in there if is_there)
+        fields.flags |= sum(flag for flag, is_there in there if is_there)
     return Plan(
         windows.window,
         n_frequencies,

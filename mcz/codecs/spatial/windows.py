@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +24,11 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.segments import SEGMENT_FRAMES, TARGET_BYTES
-from mcz.codecs.space import APART, SPACE, WEIGHTED, Space, check, space_of, uses_of
-from mcz.codecs.spatial.prefix_streams import CODE, NO_CODES, Codes, codes_from, fields_of
+from mcz.codecs.space import APART, WEIGHTED, Space, SpaceFields, check, space_of, uses_of
+from mcz.codecs.spatial.prefix_streams import NO_CODES, CodeFields, Codes, codes_from, fields_of
 from mcz.codecs.spatial.window_streams import MAX_INDEX, build_window, parse_window, windows_of
 from mcz.errors import FormatError, MotionError
-from mcz.schema import UVARINT, ExprValidator, Struct, build, parse
+from mcz.schema import UVARINT, Checked, Record, bounded, build, field, parse
 from mcz.transforms.dct import dct_matrix
 
 Floats = NDArray[np.float64]
@@ -38,19 +37,21 @@ Ints = NDArray[np.int64]
 MAX_WINDOW = 2048  # WIND-05
 MAX_PRODUCTS = 2**30  # of a model's courses with cosines
 
-WINDOWS_HEADER = Struct(
-    "window" / ExprValidator(UVARINT, lambda n, ctx: 1 <= n <= MAX_WINDOW) * "frames, 1 to 2048",
-    "n_frequencies"
-    / ExprValidator(UVARINT, lambda n, ctx: 1 <= n <= ctx.window)  # WIND-06
-    * "coefficients of a row, 1 to window",
-    "space" / SPACE * "how a frame becomes coefficients",
-    "code" / CODE * "how coefficients become bits",
-)
+
+class WindowsHeader(Record):
+    """Header of lsdt-clip, mdtt and pca-rdo."""
+
+    window: int = field(bounded(UVARINT, 1, MAX_WINDOW), "frames, 1 to 2048")
+    n_frequencies: int = field(
+        Checked(UVARINT, lambda n, ctx: 1 <= n <= ctx.window), "coefficients of a row, 1 to window"
+    )  # WIND-06
+    space: SpaceFields = field(SpaceFields, "how a frame becomes coefficients")
+    code: CodeFields = field(CodeFields, "how coefficients become bits")
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What an encoder has chosen; ``space`` are fields of SPACE.
+    """What an encoder has chosen; ``space``: the header's field.
 
     A coefficient smaller than ``threshold`` steps becomes 0. ``segment_frames`` may be 0: as many
     windows as make a DATA of the usual size. ``prefix``: coded by prefix codes.
@@ -58,7 +59,7 @@ class Plan:
 
     window: int
     n_frequencies: int
-    space: dict[str, Any]
+    space: SpaceFields
     models: tuple[Model, ...]
     known: tuple[Model, ...]
     threshold: float
@@ -66,7 +67,7 @@ class Plan:
     prefix: bool = False
 
 
-def temporal_of(space: Space, fields: Any, n_frames: int) -> Floats:
+def temporal_of(space: Space, fields: WindowsHeader, n_frames: int) -> Floats:
     """What turns a row of coefficients into a course over a window, (n_frequencies, n_frames).
 
     A window that is shorter than the others, the last one, has cosines of its own length.
@@ -78,17 +79,14 @@ def temporal_of(space: Space, fields: Any, n_frames: int) -> Floats:
 
 def encode(name: str, source: SignalSource, plan: Plan) -> Encoded:
     """Code the values of ``source``; raises MotionError for what cannot be coded."""
-    fields: dict[str, Any] = {
-        "window": plan.window,
-        "n_frequencies": plan.n_frequencies,
-        "space": plan.space,
-        "code": NO_CODES,
-    }
-    quantizer = _Quantizer(name, source, plan, build(WINDOWS_HEADER, fields, f"{name} header"))
+    fields = WindowsHeader(
+        window=plan.window, n_frequencies=plan.n_frequencies, space=plan.space, code=NO_CODES
+    )
+    quantizer = _Quantizer(name, source, plan, build(fields, f"{name} header"))
     if plan.prefix and source.layout.n_channels:  # the codes are those of all windows
-        fields["code"] = fields_of(quantizer.windows())
-    header = build(WINDOWS_HEADER, fields, f"{name} header")
-    codes = codes_from(parse(WINDOWS_HEADER, header, name).code, name)
+        fields.code = fields_of(quantizer.windows())
+    header = build(fields, f"{name} header")
+    codes = codes_from(parse(WindowsHeader, header, name).code, name)
     segments = _segments(source.layout, quantizer.windows(), plan, quantizer.space.starts, codes)
     return Encoded(header, segments, models=plan.models, known=plan.known)
 
@@ -100,7 +98,7 @@ class _Quantizer:
         layout = source.layout
         layout = replace(layout, find_model=model_finder((*plan.models, *plan.known)))
         self.name, self.source, self.threshold = name, source, plan.threshold
-        self.fields = parse(WINDOWS_HEADER, header, f"{name} header")
+        self.fields = parse(WindowsHeader, header, f"{name} header")
         self.space = space_of_windows(name, self.fields, layout)
         self.analysis = self.space.analysis()
         self.from_courses: Floats | None = None
@@ -176,7 +174,7 @@ def decode(
 
     ``flags`` are those that the codec may have.
     """
-    fields = parse(WINDOWS_HEADER, header, f"{name} header")
+    fields = parse(WindowsHeader, header, f"{name} header")
     if fields.space.flags & ~flags:  # LCLIP-02, MDTT-02
         raise FormatError(f"{name}: flags {fields.space.flags:#x}, it has no mean or courses")
     check(name, layout, spans, fresh=True)
@@ -194,10 +192,10 @@ def decode(
 
 def uses(name: str, header: bytes) -> tuple[bytes, ...]:
     """The models that a header names."""
-    return uses_of(parse(WINDOWS_HEADER, header, f"{name} header").space)
+    return uses_of(parse(WindowsHeader, header, f"{name} header").space)
 
 
-def space_of_windows(name: str, fields: Any, layout: Layout) -> Space:
+def space_of_windows(name: str, fields: WindowsHeader, layout: Layout) -> Space:
     """The Space of a header, its courses those of a whole window."""
     from mcz.codecs.spatial.window_kernels import synthesize_courses
 
@@ -220,7 +218,7 @@ def space_of_windows(name: str, fields: Any, layout: Layout) -> Space:
 def _segment(
     name: str,
     space: Space,
-    fields: Any,
+    fields: WindowsHeader,
     codes: Codes | None,
     span: Span,
     stream: bytes,

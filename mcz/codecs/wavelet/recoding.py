@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Recode, Recoding, SignalSource
 from mcz.codecs.groups import Part
-from mcz.codecs.parameters import SCALED
 from mcz.codecs.steps import code_of
 from mcz.codecs.wavelet.quantizer import DEAD_ZONE, Quantizer
-from mcz.codecs.wavelet.shared import WAVELET_HEADER, Plan, Transform, segment_streams
+from mcz.codecs.wavelet.shared import Plan, Transform, WaveletHeader, segment_streams
 from mcz.codecs.wavelet.windows import Frames
 from mcz.schema import parse
 from mcz.transforms.wavelets import INLINE, Wavelet, by_id
@@ -50,7 +49,7 @@ def recoder(name: str, weigh: Weigh) -> Recode:
 
     def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
         """The streams of some channels with new values, with the steps of the header."""
-        fields = parse(WAVELET_HEADER, asked.header, f"{name} header")
+        fields = parse(WaveletHeader, asked.header, f"{name} header")
         quantizer = _quantizer(fields, asked, *weigh(asked.source, asked.options))
         plan = Plan(name, _transform(fields), quantizer, 0)
         part = Part(asked.source, asked.groups, fields.coded_frames)
@@ -63,24 +62,27 @@ def recoder(name: str, weigh: Weigh) -> Recode:
     return recode
 
 
-def _transform(fields: Any) -> Transform:
+def _transform(fields: WaveletHeader) -> Transform:
     wavelet = (
         by_id(fields.wavelet)
         if fields.wavelet != INLINE
-        else Wavelet(tuple(fields.lo), tuple(fields.hi))
+        else Wavelet(tuple(fields.lo or ()), tuple(fields.hi or ()))
     )
     return Transform(fields.wavelet, wavelet, fields.levels)
 
 
-def _quantizer(fields: Any, asked: Recoding, weights: Floats, threshold: float | None) -> Quantizer:
+def _quantizer(
+    fields: WaveletHeader, asked: Recoding, weights: Floats, threshold: float | None
+) -> Quantizer:
     columns = [column for group in asked.groups for column in asked.source.layout.groups[group]]
     own = weights[columns]
-    if fields.decimals == SCALED:
+    if fields.unit is not None:  # decimals are SCALED
+        unit = fields.unit
         codes = tuple(
             _step_code(group, asked, code_of(float(weight)))
             for group, weight in zip(asked.groups, own, strict=True)
         )
-        return _Held(DEAD_ZONE * fields.unit * own, None, fields.unit, codes, fields.least)
+        return _Held(DEAD_ZONE * unit * own, None, unit, codes, fields.least)
     if threshold is None:
         lowest = float(weights.min()) if weights.any() else 1.0
         threshold = fields.least / 10.0**fields.decimals / lowest

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from construct import Float64l, If, Int8ul, this
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
@@ -22,19 +23,7 @@ from mcz.codecs.wavelet.quantizer import Quantizer
 from mcz.codecs.wavelet.streams import Coding, build_streams, parse_streams
 from mcz.codecs.wavelet.windows import Frames
 from mcz.errors import FormatError
-from mcz.schema import (
-    UVARINT,
-    ExprValidator,
-    Float64l,
-    IfThenElse,
-    Int8ul,
-    Pass,
-    Struct,
-    build,
-    counted,
-    parse,
-    this,
-)
+from mcz.schema import UVARINT, Checked, Record, bounded, build, counted, field, parse
 from mcz.transforms import dwt
 from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
 
@@ -44,27 +33,29 @@ LEAST_FRAMES = 256  # of a segment: in fewer, hundreds of channels would cost mo
 INWARD = 1 / 16  # of a step: how far a scaled detail is set back towards zero (MRDWT-34)
 
 TAPS = counted(Float64l, MAX_TAPS)  # MRDWT-06
-WAVELET_HEADER = Struct(
-    "wavelet" / Int8ul * "id of the registered wavelet; 0: its filters follow",
-    "lo" / IfThenElse(this.wavelet == INLINE, TAPS, Pass) * "synthesis filter of approximations",
-    "hi" / IfThenElse(this.wavelet == INLINE, TAPS, Pass) * "synthesis filter of details",
-    # MRDWT-08
-    "levels" / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_LEVELS) * "levels, 0 to 16",
-    "coded_frames" / UVARINT * "frames of the signal that was transformed, from frame 0 on",
-    "decimals"
-    / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED)  # MRDWT-09
-    * "decimals of a coefficient, 0 to 15; 255: it is scaled",
-    "unit"
-    / IfThenElse(
-        this.decimals == SCALED,
-        ExprValidator(Float64l, lambda obj, ctx: 2.0**-100 <= obj <= 2.0**100),  # MRDWT-10
-        Pass,
+
+
+class WaveletHeader(Record):
+    """Header of mrdwt, dwt and awt."""
+
+    wavelet: int = field(Int8ul, "id of the registered wavelet; 0: its filters follow")
+    lo: list[float] | None = field(
+        If(this.wavelet == INLINE, TAPS), "synthesis filter of approximations"
     )
-    * "what step codes multiply, 2^-100 to 2^100, only where decimals is 255",
-    "least"
-    / ExprValidator(UVARINT, lambda obj, ctx: 1 <= obj <= 2**39)  # MRDWT-11
-    * "least magnitude of a detail that is not zero, 1 to 2^39",
-)
+    hi: list[float] | None = field(If(this.wavelet == INLINE, TAPS), "synthesis filter of details")
+    levels: int = field(bounded(Int8ul, 0, MAX_LEVELS), "levels, 0 to 16")  # MRDWT-08
+    coded_frames: int = field(UVARINT, "frames of the signal that was transformed, from frame 0 on")
+    decimals: int = field(
+        Checked(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED),
+        "decimals of a coefficient, 0 to 15; 255: it is scaled",
+    )  # MRDWT-09
+    unit: float | None = field(
+        If(this.decimals == SCALED, bounded(Float64l, 2.0**-100, 2.0**100)),
+        "what step codes multiply, 2^-100 to 2^100, only where decimals is 255",
+    )  # MRDWT-10
+    least: int = field(
+        bounded(UVARINT, 1, 2**39), "least magnitude of a detail that is not zero, 1 to 2^39"
+    )  # MRDWT-11
 
 
 Q = decimals_parameter("decimals of coefficients; default: steps follow the thresholds")
@@ -130,17 +121,18 @@ def encode(source: SignalSource, plan: Plan) -> Encoded:
     """
     scaled = plan.quantizer.decimals is None
     inline = plan.transform.wavelet_id == INLINE
-    fields = {
-        "wavelet": plan.transform.wavelet_id,
-        "lo": plan.wavelet.lo if inline else None,
-        "hi": plan.wavelet.hi if inline else None,
-        "levels": plan.levels,
-        "coded_frames": source.layout.n_frames,
-        "decimals": SCALED if scaled else plan.quantizer.decimals,
-        "unit": plan.quantizer.unit if scaled else None,
-        "least": plan.quantizer.least,
-    }
-    header = build(WAVELET_HEADER, fields, f"{plan.name} header")
+    decimals = plan.quantizer.decimals
+    fields = WaveletHeader(
+        wavelet=plan.transform.wavelet_id,
+        lo=list(plan.wavelet.lo) if inline else None,
+        hi=list(plan.wavelet.hi) if inline else None,
+        levels=plan.levels,
+        coded_frames=source.layout.n_frames,
+        decimals=SCALED if decimals is None else decimals,
+        unit=plan.quantizer.unit if scaled else None,
+        least=plan.quantizer.least,
+    )
+    header = build(fields, f"{plan.name} header")
     return Encoded(header, _segments(source, plan), plan.levels + 1)
 
 
@@ -197,7 +189,7 @@ class _Decoder:
     """Header and segments of a signal, checked."""
 
     def __init__(self, name: str, header: bytes, layout: Layout, spans: Sequence[Span]) -> None:
-        fields = parse(WAVELET_HEADER, header, f"{name} header")  # CODEC-05
+        fields = parse(WaveletHeader, header, f"{name} header")  # CODEC-05
         self.name, self.fields, self.layout, self.spans = name, fields, layout, spans
         if layout.samples_per_frame != 1:  # MRDWT-02
             raise FormatError(f"{name}: {layout.samples_per_frame} samples a frame, it has 1")
@@ -210,7 +202,7 @@ class _Decoder:
         self.wavelet = (
             by_id(fields.wavelet)
             if fields.wavelet != INLINE
-            else Wavelet(tuple(fields.lo), tuple(fields.hi))
+            else Wavelet(tuple(fields.lo or ()), tuple(fields.hi or ()))
         )
         scaled = fields.decimals == SCALED
         self.coding = Coding(name, scaled, fields.least, (self.wavelet.n_taps - 2) // 2)
@@ -301,7 +293,7 @@ class _Decoder:
             return np.asarray(found / 10.0**self.fields.decimals)  # MRDWT-32
         if detail:
             found = np.where(indices == 0, 0.0, found - np.copysign(INWARD, found))
-        return np.asarray(found * (self.fields.unit * ratio_of(code)))  # MRDWT-33
+        return np.asarray(found * ((self.fields.unit or 1.0) * ratio_of(code)))  # MRDWT-33
 
 
 def _stream(fetch: Fetch, segment: int, group: int, band: int) -> bytes:
@@ -312,6 +304,6 @@ def cut(
     name: str, header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]
 ) -> bytes:
     """The header for stored frames first <= f < stop alone."""
-    fields = parse(WAVELET_HEADER, header, f"{name} header")
-    fields["coded_frames"] -= first
-    return build(WAVELET_HEADER, fields, f"{name} header")
+    fields = parse(WaveletHeader, header, f"{name} header")
+    fields.coded_frames -= first
+    return build(fields, f"{name} header")

@@ -11,22 +11,11 @@ from enum import IntEnum
 from itertools import accumulate
 
 import numpy as np
+from construct import If, IfThenElse, Int8ul, this
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
-from mcz.schema import (
-    SIZED,
-    UVARINT,
-    ExprValidator,
-    If,
-    Int8ul,
-    OneOf,
-    Struct,
-    build,
-    counted,
-    parse,
-)
-from mcz.schema.fields import Field, IfThenElse
+from mcz.schema import POSITIVE, SIZED, UVARINT, Record, build, counted, field, one_of, parse
 
 # Types of NumPy by their number in a template: |b1 to <f8, without byte order.
 TYPES = ("b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
@@ -50,42 +39,63 @@ _OF_ROWS = (Kind.COUNT, Kind.DATA)
 _OF_PIECES = (Kind.CRC, Kind.SIZE4, Kind.SIZE8)
 
 
-def _if(kinds: Sequence[Kind], item: Field) -> IfThenElse:
-    return If(lambda fields: fields.kind in kinds, item)
+def _if(kinds: Sequence[Kind], item: object) -> IfThenElse:
+    condition = this.kind == int(kinds[0])
+    for kind in kinds[1:]:
+        condition |= this.kind == int(kind)
+    return If(condition, item)
 
 
-ARRAY_RUN = Struct(
-    "channel" / UVARINT * "first channel",
-    # ARRAY-03
-    "n_channels" / ExprValidator(UVARINT, lambda n, ctx: n >= 1) * "channels, at least 1",
-)
-ARRAY_PIECE = Struct(
-    "kind" / OneOf(Int8ul, tuple(Kind)) * "what the piece is",  # ARRAY-01
-    "text" / _if((Kind.TEXT,), SIZED) * "TEXT only: the bytes",
-    "signal" / _if(_OF_ROWS, UVARINT) * "COUNT and DATA only: index of the signal",
-    "after" / _if((Kind.COUNT,), SIZED) * "COUNT only: what follows the number",
-    "size" / _if((Kind.COUNT,), UVARINT) * "COUNT only: bytes, those of blanks included",
-    "type"
-    / _if((Kind.DATA,), OneOf(Int8ul, tuple(range(len(TYPES)))))  # ARRAY-02
-    * "DATA only: type of a number",
-    "flags"
-    / _if((Kind.DATA,), OneOf(Int8ul, (0, 1, 2, 3)))  # ARRAY-04
-    * "DATA only: bit 0: big-endian; 1: column after column",
-    "runs"
-    / _if((Kind.DATA,), counted(ARRAY_RUN, kind="runs"))
-    * "DATA only: its columns, in order",
-    "start" / _if(_OF_PIECES, UVARINT) * "CRC and SIZE only: first piece",
-    "stop" / _if(_OF_PIECES, UVARINT) * "CRC and SIZE only: the piece behind the last",
-)
-ARRAY_TEMPLATE = Struct(
-    "pieces" / counted(ARRAY_PIECE, MAX_PIECES) * "the file, piece by piece"  # ARRAY-17
-)
-ARRAY_DETAIL = Struct("parts" / counted(SIZED, MAX_PIECES) * "bytes of the OWN pieces, in order")
+class ArrayRun(Record):
+    """Channels in a row of an array, in ArrayPiece."""
+
+    channel: int = field(UVARINT, "first channel")
+    n_channels: int = field(POSITIVE, "channels, at least 1")  # ARRAY-03
+
+
+class ArrayPiece(Record):
+    """A piece of an array file."""
+
+    kind: int = field(one_of(Int8ul, tuple(Kind)), "what the piece is")  # ARRAY-01
+    text: bytes | None = field(_if((Kind.TEXT,), SIZED), "TEXT only: the bytes")
+    signal: int | None = field(_if(_OF_ROWS, UVARINT), "COUNT and DATA only: index of the signal")
+    after: bytes | None = field(_if((Kind.COUNT,), SIZED), "COUNT only: what follows the number")
+    size: int | None = field(
+        _if((Kind.COUNT,), UVARINT), "COUNT only: bytes, those of blanks included"
+    )
+    type: int | None = field(
+        _if((Kind.DATA,), one_of(Int8ul, tuple(range(len(TYPES))))), "DATA only: type of a number"
+    )  # ARRAY-02
+    flags: int | None = field(
+        _if((Kind.DATA,), one_of(Int8ul, (0, 1, 2, 3))),
+        "DATA only: bit 0: big-endian; 1: column after column",
+    )  # ARRAY-04
+    runs: list[ArrayRun] | None = field(
+        _if((Kind.DATA,), counted(ArrayRun, kind="runs")), "DATA only: its columns, in order"
+    )
+    start: int | None = field(_if(_OF_PIECES, UVARINT), "CRC and SIZE only: first piece")
+    stop: int | None = field(
+        _if(_OF_PIECES, UVARINT), "CRC and SIZE only: the piece behind the last"
+    )
+
+
+class ArrayTemplate(Record):
+    """Template of arrays."""
+
+    pieces: list[ArrayPiece] = field(
+        counted(ArrayPiece, MAX_PIECES), "the file, piece by piece"
+    )  # ARRAY-17
+
+
+class ArrayDetail(Record):
+    """Detail of arrays."""
+
+    parts: list[bytes] = field(counted(SIZED, MAX_PIECES), "bytes of the OWN pieces, in order")
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A piece of a file; what does not go with its kind is empty. See ARRAY_PIECE."""
+    """A piece of a file; what does not go with its kind is empty. See ArrayPiece."""
 
     kind: Kind
     text: bytes = b""  # of OWN pieces, too
@@ -117,25 +127,32 @@ class Piece:
 def build_arrays(pieces: Sequence[Piece]) -> tuple[bytes, bytes]:
     """The template and the detail of pieces."""
     fields = [
-        {
-            **{name: getattr(piece, name) for name in Piece.__slots__},
-            "kind": int(piece.kind),
-            "runs": [{"channel": c, "n_channels": n} for c, n in piece.runs],
-        }
+        ArrayPiece(
+            kind=int(piece.kind),
+            text=piece.text,
+            signal=piece.signal,
+            after=piece.after,
+            size=piece.size,
+            type=piece.type,
+            flags=piece.flags,
+            runs=[ArrayRun(channel=c, n_channels=n) for c, n in piece.runs],
+            start=piece.start,
+            stop=piece.stop,
+        )
         for piece in pieces
     ]
     parts = [piece.text for piece in pieces if piece.kind == Kind.OWN]
     return (
-        build(ARRAY_TEMPLATE, {"pieces": fields}, "source template"),
-        build(ARRAY_DETAIL, {"parts": parts}, "source detail"),
+        build(ArrayTemplate(pieces=fields), "source template"),
+        build(ArrayDetail(parts=parts), "source detail"),
     )
 
 
 def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
     """The inverse of ``build_arrays``; raises FormatError on bad bytes."""
     limits = {"runs": MAX_RUNS}  # ARRAY-17
-    fields = parse(ARRAY_TEMPLATE, template, "source template", limits).pieces
-    parts = list(parse(ARRAY_DETAIL, detail, "source detail").parts)
+    fields = parse(ArrayTemplate, template, "source template", limits).pieces
+    parts = list(parse(ArrayDetail, detail, "source detail").parts)
     wanted = sum(row.kind == Kind.OWN for row in fields)
     if wanted != len(parts):  # ARRAY-05
         raise FormatError(f"source detail: {len(parts)} parts, but {wanted} pieces are its own")

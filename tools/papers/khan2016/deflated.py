@@ -29,7 +29,7 @@ def deflated_bytes(case: Case, variant: Variant, T_g: float) -> int:
     source = MemorySource(load(case).motion, 0, codec, SEGMENT_BYTES)
     encoded = codec.encode(source, codec.options(variant.options({"T_g": T_g})))
     (segment,) = encoded.segments
-    fields = parse(wavelet_codec.WAVELET_HEADER, encoded.header, "header")
+    fields = parse(wavelet_codec.WaveletHeader, encoded.header, "header")
     wavelet, levels = by_id(fields.wavelet), fields.levels
     lengths = wavelet.lengths(fields.coded_frames, levels)
     owns = [own_range(0, segment.n_frames, n, lengths) for n in (levels, *range(levels, 0, -1))]

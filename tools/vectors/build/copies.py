@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from mcz.container import payloads
 from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
 from mcz.container.copies import Copy
-from mcz.schema import build, deflate, varint
+from mcz.schema import deflate, varint
+from tools.records import built
 from tools.vectors.build.files import Crafter
 
 Edit = Callable[[list[Copy]], list[Copy]]
@@ -38,4 +39,4 @@ def payload_of(content: bytes, *, size: int | None = None, stored: bool = False)
     data = content if stored else deflate(content)
     stated = len(content) if size is None else size
     fields = {"encoding": int(not stored), "size": stated, "data": data}
-    return build(payloads.COPY, fields, "COPY")
+    return built(payloads.Copy, fields, "COPY")

@@ -45,12 +45,12 @@ def window(
     skip = start if skip is None else skip
     spare = motion.n_frames - stop if spare is None else spare
     clip: Edit = both(
-        put(payloads.CLIP, "n_frames", varint(stop - start)),
-        put(payloads.CLIP, "signals.0.skip", varint(skip)),
-        put(payloads.CLIP, "signals.0.spare", varint(spare)),
+        put(payloads.Clip, "n_frames", varint(stop - start)),
+        put(payloads.Clip, "signals.0.skip", varint(skip)),
+        put(payloads.Clip, "signals.0.spare", varint(spare)),
     )
     values = motion.signals[0].cut(start, stop).values
-    cend: Edit = both(put(payloads.CEND, "n_frames", varint(stop - start)), rehash(values))
+    cend: Edit = both(put(payloads.Cend, "n_frames", varint(stop - start)), rehash(values))
 
     def row(found: Any) -> Any:
         signals = (replace(found.signals[0], skip=skip, spare=spare), *found.signals[1:])

@@ -12,9 +12,8 @@ from typing import Any
 from mcz.container import payloads
 from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
 from mcz.numbers import Grid, GridKind
-from mcz.schema import Field, Fields, Struct, build, varint
-from mcz.schema.fields import Counted
-from mcz.schema.source import Source
+from mcz.schema import varint
+from tools.records import built, span
 
 BAD_STEPS = {  # that no codec takes, by what their vectors are called
     "0": 0.0,
@@ -49,41 +48,9 @@ def put(schema: Any, path: str, new: bytes) -> Edit:
     return edit
 
 
-def span(schema: Field, payload: bytes, path: str) -> tuple[int, int]:
-    """Where the field at ``path`` begins and ends in ``payload``."""
-    start, stop = 0, len(payload)
-    for name in path.split("."):
-        while not isinstance(schema, Struct | Counted):
-            schema = schema.item
-        source = Source(payload, {})
-        source.at = start
-        find = _field if isinstance(schema, Struct) else _item
-        schema, start, stop = find(schema, source, name)
-    return start, stop
-
-
-def _field(schema: Struct, source: Source, name: str) -> tuple[Field, int, int]:
-    found = Fields()
-    for field in schema.fields:
-        start = source.at
-        found[field.name] = field.item.read(source, found)
-        if field.name == name:
-            return field.item, start, source.at
-    raise KeyError(name)
-
-
-def _item(schema: Counted, source: Source, index: str) -> tuple[Field, int, int]:
-    source.varint()
-    start = source.at
-    for _ in range(int(index) + 1):
-        start = source.at
-        schema.item.read(source, Fields())
-    return schema.item, start, source.at
-
-
 def says(data: bytes) -> Edit:
     """Put another header of the codec into CLIP."""
-    return put(payloads.CLIP, "signals.0.header", varint(len(data)) + data)
+    return put(payloads.Clip, "signals.0.header", varint(len(data)) + data)
 
 
 def binary64(value: float) -> bytes:
@@ -215,7 +182,7 @@ class Nth:
 
 def all_integers(n_channels: int) -> Edit:
     run = {"n_channels": n_channels, "grid": Grid(GridKind.INTEGER)}
-    return put(payloads.CLIP, "signals.0.grids", b"\1" + build(payloads.GRID_RUN, run, "grids"))
+    return put(payloads.Clip, "signals.0.grids", b"\1" + built(payloads.GridRun, run, "grids"))
 
 
 def two_rows(found: Any) -> Any:

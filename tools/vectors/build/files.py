@@ -16,7 +16,7 @@ import numpy as np
 
 from mcz.codecs import raw
 from mcz.codecs.contract import Codec
-from mcz.container import payloads
+from mcz.container import index_records, payloads
 from mcz.container.chunks import (
     ANCILLARY,
     HEADER,
@@ -44,8 +44,9 @@ from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.value_hash import canonical
 from mcz.container.writer import Writer, payload_id
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import build, deflate, inflate, parse, varint
+from mcz.schema import deflate, inflate, parse, varint
 from mcz.writing.clip_writer import write_clip, write_skeleton
+from tools.records import built, update
 from tools.vectors.build.edits import Edit, Made, put
 from tools.vectors.build.motions import dance, puppet
 
@@ -155,7 +156,7 @@ class Crafter(Writer):
             shorter = len(packed) < len(piece)
             fields = {"part": part, "part_size": len(piece), "encoding": int(shorter)}
             fields["data"] = packed if shorter else piece
-            row.parts.append(self.chunk(b"ATTA", build(payloads.ATTA, common | fields, name)))
+            row.parts.append(self.chunk(b"ATTA", built(payloads.Atta, common | fields, name)))
         self.directory.attachments[name] = row
 
     def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
@@ -244,12 +245,12 @@ class Crafter(Writer):
 
     def _index_chunk(self) -> bytes:
         whole = build_index(self.directory)
-        outer = parse(payloads.INDX, whole[16:-4], "INDX")
-        fields = parse(payloads.INDEX, inflate(outer.data, outer.size, "INDX"), "INDX")
+        outer = parse(payloads.Indx, whole[16:-4], "INDX")
+        fields = parse(index_records.Index, inflate(outer.data, outer.size, "INDX"), "INDX")
         self.edited("table", fields)
-        content = build(payloads.INDEX, fields, "INDX")
+        content = built(index_records.Index, fields, "INDX")
         packed = {"size": len(content), "data": deflate(content)}
-        return build_chunk(b"INDX", self.edited("INDX", build(payloads.INDX, packed, "INDX")))
+        return build_chunk(b"INDX", self.edited("INDX", built(payloads.Indx, packed, "INDX")))
 
 
 def file_of(
@@ -284,7 +285,7 @@ def finished(crafter: Crafter, *motions: Motion, index: bool = True) -> bytes:
 def rehash(*signals: np.ndarray) -> Edit:
     """Put the hashes of these canonical arrays into CEND."""
     hashes = [hashlib.sha256(canonical(values)).digest() for values in signals]
-    return put(payloads.CEND, "value_sha256", varint(len(hashes)) + b"".join(hashes))
+    return put(payloads.Cend, "value_sha256", varint(len(hashes)) + b"".join(hashes))
 
 
 def arrays(*motions: Motion) -> tuple[tuple[dict[str, Any], bytes], ...]:
@@ -372,9 +373,9 @@ def attached(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
     content = b"" if whole is None else whole
 
     def edit(payload: bytes) -> bytes:
-        fields = parse(payloads.ATTA, payload, "ATTA")
-        fields.update({"encoding": 1, "size": size, "part_size": size, "data": stream})
-        return build(payloads.ATTA, fields, "ATTA")
+        fields = parse(payloads.Atta, payload, "ATTA")
+        update(fields, {"encoding": 1, "size": size, "part_size": size, "data": stream})
+        return built(payloads.Atta, fields, "ATTA")
 
     def row(fields: Any) -> Any:
         fields.attachments[0].size = size

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from mcz.container import payloads
 from mcz.container.metadata import Record, record_bytes
 from mcz.container.packed import words
-from mcz.schema import build, deflate
+from mcz.schema import deflate
+from tools.records import built
 
 
 def content_of(records: Sequence[Record]) -> bytes:
@@ -31,4 +32,4 @@ def payload_of(
         "size": len(content) if size is None else size,
         "data": data,
     }
-    return build(payloads.META, fields, "META")
+    return built(payloads.Meta, fields, "META")

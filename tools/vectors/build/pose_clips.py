@@ -21,10 +21,11 @@ from mcz.codecs.posewave import posewave
 from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.contact_keeper import Keeper, Piece
 from mcz.codecs.posewave.exact import build_exact, groups_of
-from mcz.codecs.posewave.header import Header, build_header, parse_header
+from mcz.codecs.posewave.header import Header, PosewaveHeader, parse_header
 from mcz.codecs.posewave.segment import Weights, encode_segment
 from mcz.motion import Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid
+from tools.records import built
 from tools.vectors.build.files import Whole, file_of, partial
 from tools.vectors.build.motions import channels, wave
 
@@ -104,7 +105,7 @@ class Plan:
 def header_of(plan: Plan, **changes: Any) -> bytes:
     fields = PLAIN_FIELDS | {"exact": plan.groups[1]} | plan.fields | changes
     fields["borrowing"] = min(fields["borrowing"], fields["levels"])
-    return build_header(**fields)
+    return built(PosewaveHeader, {"contacts": []} | fields, "posewave header")
 
 
 def layout_of(plan: Plan) -> Layout:

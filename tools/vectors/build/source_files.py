@@ -13,8 +13,9 @@ from mcz.container import payloads
 from mcz.formats import FORMATS, bvh
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.numbers import Grid
-from mcz.schema import build, deflate, inflate, parse
+from mcz.schema import deflate, inflate, parse
 from mcz.writing.clip_writer import write_skeleton
+from tools.records import built, update
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.edits import Edit
 from tools.vectors.build.files import Crafter
@@ -199,14 +200,14 @@ def with_template(edit: Edit, *, deflated: bool = False) -> Edit:
     """Edit the template inside a SRCE, which becomes a stored one, or a deflated one."""
 
     def edit_payload(payload: bytes) -> bytes:
-        fields = parse(payloads.SRCE, payload, "SRCE")
+        fields = parse(payloads.Srce, payload, "SRCE")
         text = fields.data
         if fields.encoding:
             text = inflate(fields.data, fields.size, "SRCE")
         text = edit(text)
         packed = deflate(text) if deflated else text
-        fields.update({"encoding": int(deflated), "size": len(text), "data": packed})
-        return build(payloads.SRCE, fields, "SRCE")
+        update(fields, {"encoding": int(deflated), "size": len(text), "data": packed})
+        return built(payloads.Srce, fields, "SRCE")
 
     return edit_payload
 

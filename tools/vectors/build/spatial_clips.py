@@ -31,7 +31,7 @@ from mcz.codecs.contract import (
 from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
 from mcz.codecs.spatial import lsdt_frame, window_streams
 from mcz.codecs.spatial.prefix_streams import codes_from, fields_of
-from mcz.codecs.spatial.windows import WINDOWS_HEADER
+from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import parse, varint
 from tools.vectors.build.files import Whole, file_of, partial
@@ -210,7 +210,7 @@ def lengths_of(plan: Plan) -> Lengths:
     if plan.codec == FRAME:
         found = [part for t in found for part in np.split(t, plan.starts[1:-1], axis=1)]
     fields = fields_of(found)
-    return fields["gap_lengths"], fields["value_lengths"]
+    return fields.gap_lengths, fields.value_lengths
 
 
 # Streams
@@ -237,7 +237,7 @@ def _frame_streams(plan: Plan, fresh: Sequence[bool]) -> Iterator[bytes]:
 
 
 def _window_streams_of(plan: Plan) -> Iterator[bytes]:
-    codes = codes_from(parse(WINDOWS_HEADER, header(plan), plan.codec).code, plan.codec)
+    codes = codes_from(parse(WindowsHeader, header(plan), plan.codec).code, plan.codec)
     for segment in tables(plan):
         yield b"".join(window_streams.build_window(t, plan.starts, codes) for t in segment)
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Model, id_of
 from mcz.codecs.spatial import lsdt_frame, prefix_streams, window_streams
-from mcz.codecs.spatial.lsdt_frame import FRAME_HEADER
+from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.prefix_streams import codes_from
-from mcz.codecs.spatial.windows import WINDOWS_HEADER, space_of_windows, temporal_of
+from mcz.codecs.spatial.windows import WindowsHeader, space_of_windows, temporal_of
 from mcz.codecs.table_kernels import code_table
 from mcz.coding import mixing
 from mcz.coding.huffman import class_of, codes_of
@@ -22,7 +22,8 @@ from mcz.coding.start import start_states
 from mcz.coding.streams import code
 from mcz.container import payloads
 from mcz.motion import Motion
-from mcz.schema import build, parse, varint
+from mcz.schema import parse, varint
+from tools.records import built
 from tools.vectors.build.edits import Edit, stream, swap
 from tools.vectors.build.spatial_clips import (
     CLIP,
@@ -164,7 +165,7 @@ def overlooked(plan: Plan, edit: Edit) -> Plan:
     (segment,) = segments_of(plan)
     stream = segment.streams[0]
     data = np.frombuffer(edit(stream if plan.codec == FRAME else stream[1:]), np.uint8).copy()
-    kind = FRAME_HEADER if plan.codec == FRAME else WINDOWS_HEADER
+    kind = FrameHeader if plan.codec == FRAME else WindowsHeader
     codes = codes_from(parse(kind, header(plan), plan.codec).code, plan.codec)
     assert codes is not None
     found = np.zeros_like(table)
@@ -185,7 +186,7 @@ def values_from(plan: Plan) -> NDArray[np.float64]:
             out = values[first : first + len(table)]
             lsdt_frame._kernels().add_frames(out, coder._values, table, coder.space.transform())
         return values
-    fields = parse(WINDOWS_HEADER, header(plan), plan.codec)
+    fields = parse(WindowsHeader, header(plan), plan.codec)
     space = space_of_windows(plan.codec, fields, plan.layout)
     sizes, at = [n for _, own in plan.windows() for n in own], 0
     for n, table in zip(sizes, found, strict=True):
@@ -220,7 +221,7 @@ def with_model(plan: Plan, kind: int, data: bytes, **edits: Any) -> bytes:
     """The file of ``plan`` with another model, which the clip names."""
     old = plan.model
     assert old is not None
-    payload = build(payloads.MODL, {"kind": kind, "data": data}, "MODL")
+    payload = built(payloads.Modl, {"kind": kind, "data": data}, "MODL")
     named = swap(id_of(old), id_of(Model(kind, data)))
     return file_with(plan, MODL=lambda _: payload, CLIP=named, **edits)
 

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from mcz.container import payloads
 from mcz.container.packed import PACKED, words
-from mcz.schema import build, deflate, inflate, parse, varint
+from mcz.schema import deflate, inflate, parse, varint
+from tools.records import built
 
 BEYOND = 32768  # a distance that the words are too few for
 
 
 def after_words(payload: bytes) -> bytes:
     """A SRCE whose template, deflated until now, is deflated after words."""
-    fields = parse(payloads.SRCE, payload, "SRCE")
+    fields = parse(payloads.Srce, payload, "SRCE")
     text = inflate(fields.data, fields.size, "SRCE")
     packed = {"encoding": payloads.AFTER_WORDS, "data": deflate(text, words=words())}
-    return build(payloads.SRCE, dict(fields) | packed, "SRCE")
+    return built(payloads.Srce, vars(fields) | packed, "SRCE")
 
 
 def beyond(payload: bytes) -> bytes:

@@ -261,7 +261,7 @@ def _class_far(state: Any, data: Any) -> None:
 
 
 def _signal(shelf: Broken) -> None:
-    header = put(payloads.CLIP, "signals.0.header", b"\1h")
+    header = put(payloads.Clip, "signals.0.header", b"\1h")
     data = file_of(dance(), codec=codec_of(), CLIP=header)
     shelf.add("header", HEADING, "A header for best, which has none.", data)
 
@@ -269,7 +269,7 @@ def _signal(shelf: Broken) -> None:
         ((header, streams),) = made
         return [(header, [*streams, *streams])]
 
-    twice = put(payloads.CLIP, "signals.0.n_resolutions", b"\2")
+    twice = put(payloads.Clip, "signals.0.n_resolutions", b"\2")
     data = file_of(dance(), codec=codec_of(), CLIP=twice, segments=doubled)
     purpose = "Two resolutions of best, which has one."
     shelf.add("resolutions", f"{HEADING}; Codecs", purpose, data)

@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from mcz.container import payloads
 from mcz.container.chunks import ANCILLARY, build_chunk
 from mcz.container.packets import END, Packet, build_packet
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build.edits import flip, framed, plus
 from tools.vectors.build.files import Broken, Crafter, Vector, file_of, finished
 from tools.vectors.build.motions import dance
@@ -120,7 +121,7 @@ def _flags_of_unknown(shelf: Broken) -> None:
 
 
 def _records(shelf: Broken) -> None:
-    record = build(payloads.QUAL, RECORD, "QUAL")
+    record = built(payloads.Qual, RECORD, "QUAL")
     cases = {
         "cut": ("ends within its last value", record[:-1]),
         "empty": ("has no bytes", b""),

@@ -13,7 +13,8 @@ from mcz.container import payloads
 from mcz.container.limits import ARCHIVE
 from mcz.container.value_hash import value_hash
 from mcz.motion import Channel, Motion, Signal
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build.edits import Made, both, indexed, put
 from tools.vectors.build.files import Broken, Crafter, Vector, file_of, finished, rehash
 from tools.vectors.build.motions import dance
@@ -37,7 +38,7 @@ def vectors() -> Iterable[Vector]:
 
 def _clip(shelf: Broken) -> None:
     source = {"template": b"t" * 16, "format": 3, "detail": b"", "path": "a.bvh", "size": 1}
-    lost = b"\1" + build(payloads.CLIP_SOURCE, source, "source")
+    lost = b"\1" + built(payloads.ClipSource, source, "source")
     cases: tuple[tuple[str, str, str, bytes, dict[str, Any]], ...] = (
         ("name-empty", "A clip without a name.", "name", b"\0", {"name": ""}),
         ("flag", "A reserved flag of CLIP is set.", "flags", b"\4", {}),
@@ -54,12 +55,12 @@ def _clip(shelf: Broken) -> None:
         ("template-missing", "A template that is not in the file.", "source", lost, {}),
     )
     for name, purpose, path, new, row in cases:
-        edit = put(payloads.CLIP, path, new)
+        edit = put(payloads.Clip, path, new)
         shelf.edited(
             name, "CLIP", purpose, CLIP=edit, row=indexed(**row), index=name != "rate-over-0"
         )
     unknown = both(
-        put(payloads.CLIP, "rate_numerator", b"\0"), put(payloads.CLIP, "rate_denominator", b"\0")
+        put(payloads.Clip, "rate_numerator", b"\0"), put(payloads.Clip, "rate_denominator", b"\0")
     )
     purpose = "An unknown frame rate over 0."
     shelf.edited("rate-unknown-over-0", "CLIP", purpose, CLIP=unknown, index=False)
@@ -79,12 +80,12 @@ def _metadata(shelf: Broken) -> None:
         "empty": "",
     }
     for name, text in numbers.items():
-        pair = build(payloads.METADATA, {"key": "frame-numbers", "value": text}, name)
-        edit = put(payloads.CLIP, "metadata", b"\1" + pair)
+        pair = built(payloads.Metadata, {"key": "frame-numbers", "value": text}, name)
+        edit = put(payloads.Clip, "metadata", b"\1" + pair)
         purpose = f"Frame numbers {text!r} of a clip of 4 frames."
         shelf.edited(f"frame-numbers-{name}", "Registry", purpose, CLIP=edit)
-    pair = build(payloads.METADATA, {"key": "x-a", "value": ""}, "metadata")
-    edit = put(payloads.CLIP, "metadata", b"\2" + pair * 2)
+    pair = built(payloads.Metadata, {"key": "x-a", "value": ""}, "metadata")
+    edit = put(payloads.Clip, "metadata", b"\2" + pair * 2)
     shelf.edited("metadata-twice", "CLIP", "A key of the metadata twice.", CLIP=edit)
 
 
@@ -103,20 +104,20 @@ def _signal(shelf: Broken) -> None:
         ("groups-empty", "A group of no channels.", "groups", b"\3\3\4\0\2", {}),
     )
     for name, purpose, path, new, changes in cases:
-        edit = put(payloads.CLIP, f"signals.0.{path}", new)
+        edit = put(payloads.Clip, f"signals.0.{path}", new)
 
         def row(row: Any, changes: dict[str, int] = changes) -> Any:
             return replace(row, signals=(replace(row.signals[0], **changes),))
 
         shelf.edited(name, "CLIP", purpose, CLIP=edit, row=row)
-    header = put(payloads.CLIP, "signals.0.header", b"\1h")
+    header = put(payloads.Clip, "signals.0.header", b"\1h")
     purpose = "A header for raw, which has none."
     shelf.edited("codec-header", "Codec 0: raw", purpose, CLIP=header)
 
 
 def _crafted_signals(shelf: Broken) -> None:
     own = dance(signals=(replace(dance().signals[0], channels=dance().skeleton.channels),))
-    data = file_of(own, CLIP=put(payloads.CLIP, "signals.0.groups", b"\1"))
+    data = file_of(own, CLIP=put(payloads.Clip, "signals.0.groups", b"\1"))
     purpose = "Groups per joint of channels without joints."
     shelf.add("groups-without-joints", "CLIP", purpose, data)
 
@@ -128,7 +129,7 @@ def _crafted_signals(shelf: Broken) -> None:
         "resolutions-of-raw",
         "Codec 0: raw; Codecs",
         "Two resolutions of raw, which has one.",
-        CLIP=put(payloads.CLIP, "signals.0.n_resolutions", b"\2"),
+        CLIP=put(payloads.Clip, "signals.0.n_resolutions", b"\2"),
         segments=doubled,
     )
     hips = replace(dance().skeleton.joints[0], channels=dance().skeleton.channels[:1] * 16385)
@@ -148,17 +149,17 @@ def _cend(shelf: Broken) -> None:
         ("source-hash-of-nothing", "A source's hash.", "source_sha256", b"\1" + b"s" * 32),
     )
     for name, purpose, path, new in cases:
-        edit = put(payloads.CEND, path, new)
+        edit = put(payloads.Cend, path, new)
         shelf.edited(name, "CEND", f"Hashes of a clip without a source: {purpose}", CEND=edit)
-    opened = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+    opened = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
     for name, purpose, n_frames, clip in (
         ("CEND-frames", "CEND has a frame more than the segments.", 5, None),
         ("CEND-frames-of-open", "A frame less than the segments of an open clip.", 3, opened),
     ):
         edits = {"CLIP": clip} if clip else {}
-        cend = put(payloads.CEND, "n_frames", bytes((n_frames,)))
+        cend = put(payloads.Cend, "n_frames", bytes((n_frames,)))
         shelf.edited(name, "CEND", purpose, CEND=cend, row=indexed(n_frames=n_frames), **edits)
-    three = put(payloads.CLIP, "n_frames", b"\3")
+    three = put(payloads.Clip, "n_frames", b"\3")
     shelf.edited("CLIP-frames", "CLIP; CEND", "CLIP has a frame less than CEND.", CLIP=three)
 
 
@@ -168,8 +169,8 @@ def _hash_beside_unknown(clips: Broken) -> None:
     analog = replace(analog, channels=(Channel("", "force"),))
     both_signals = replace(dance(), signals=(*dance().signals, analog))
     hashes = varint(2) + value_hash(dance().signals[0].values, None) + b"v" * 32
-    wrong = put(payloads.CEND, "value_sha256", hashes)
-    unknown = put(payloads.CLIP, "signals.0.codec", varint(2**20))
+    wrong = put(payloads.Cend, "value_sha256", hashes)
+    unknown = put(payloads.Clip, "signals.0.codec", varint(2**20))
     made = file_of(both_signals, CEND=wrong, CLIP=unknown, index=False)
     purpose = "A wrong value hash of the second signal, where the codec of the first is unknown."
     clips.add("value-hash-beside-unknown-codec", "CEND; Strict reading", purpose, made)
@@ -177,20 +178,20 @@ def _hash_beside_unknown(clips: Broken) -> None:
 
 def _twice(shelf: Broken) -> None:
     source = {"template": b"t" * 16, "format": 3, "detail": b"", "path": "a.bvh", "size": 1}
-    two = b"\2" + build(payloads.CLIP_SOURCE, source, "source") * 2
+    two = b"\2" + built(payloads.ClipSource, source, "source") * 2
     purpose = "Two sources of one clip."
     shelf.edited(
-        "sources-two", "CLIP; Conventions", purpose, CLIP=put(payloads.CLIP, "source", two)
+        "sources-two", "CLIP; Conventions", purpose, CLIP=put(payloads.Clip, "source", two)
     )
-    two = put(payloads.CEND, "source_sha256", b"\2" + b"s" * 64)
+    two = put(payloads.Cend, "source_sha256", b"\2" + b"s" * 64)
     shelf.edited("source-hashes-two", "CEND; Conventions", "Two hashes of a source.", CEND=two)
 
 
 def _hashes(shelf: Broken) -> None:
-    edit = put(payloads.CLIP, "rate_numerator", BEYOND)
+    edit = put(payloads.Clip, "rate_numerator", BEYOND)
     purpose = "A frame rate of 2^53 over 1."
     shelf.edited("rate-2-53", "CLIP; Conventions", purpose, CLIP=edit, index=False)
-    wrong = {"CEND": put(payloads.CEND, "value_sha256", b"\1" + b"v" * 32)}
+    wrong = {"CEND": put(payloads.Cend, "value_sha256", b"\1" + b"v" * 32)}
     crafter = Crafter()
     crafter.clip(dance(), codec=replace(raw.CODEC, id=2**20))
     crafter.edits |= wrong
@@ -198,7 +199,7 @@ def _hashes(shelf: Broken) -> None:
     purpose = "A clip of an unknown codec, which is legal, before one with a wrong value hash."
     shelf.add("value-hash-behind-unknown-codec", "HEAD; CEND", purpose, data)
     good = value_hash(dance().signals[0].values, None)
-    more = put(payloads.CEND, "value_sha256", b"\2" + good + b"v" * 32)
+    more = put(payloads.Cend, "value_sha256", b"\2" + good + b"v" * 32)
     purpose = "A hash more than there are signals; the first is right."
     shelf.edited("value-hash-more", "CEND", purpose, CEND=more)
     _no_signals(shelf)
@@ -207,16 +208,16 @@ def _hashes(shelf: Broken) -> None:
 def _no_signals(shelf: Broken) -> None:
     """Clips that a reader could go on with."""
     none = {
-        "CLIP": put(payloads.CLIP, "signals", b"\0"),
-        "CEND": put(payloads.CEND, "value_sha256", b"\0"),
+        "CLIP": put(payloads.Clip, "signals", b"\0"),
+        "CEND": put(payloads.Cend, "value_sha256", b"\0"),
         "segments": lambda made: [],
     }
     purpose = "A clip of 4 frames without a signal, a segment and a hash."
     shelf.edited("no-signal-at-all", "CLIP", purpose, index=False, **none)
-    edit = put(payloads.CLIP, "signals.0.samples_per_frame", b"\0")
+    edit = put(payloads.Clip, "signals.0.samples_per_frame", b"\0")
     data = file_of(dance(0), CLIP=edit, index=False)
     shelf.add("samples-0-of-no-frames", "CLIP", "No rows a frame, of no frames.", data)
-    joints = put(payloads.CLIP, "signals.0.groups", b"\1")
+    joints = put(payloads.Clip, "signals.0.groups", b"\1")
     own = dance(signals=(replace(dance().signals[0], channels=dance().skeleton.channels),))
 
     def merged(made: Made) -> Made:
@@ -226,7 +227,7 @@ def _no_signals(shelf: Broken) -> None:
     data = file_of(own, grouping="channel", CLIP=joints, segments=merged)
     purpose = "Groups as if its own channels were those of the skeleton's joints."
     shelf.add("groups-of-no-joints", "CLIP", purpose, data)
-    five = put(payloads.CLIP, "signals.0.groups", b"\3\2\4\1")
+    five = put(payloads.Clip, "signals.0.groups", b"\3\2\4\1")
 
     def shorter(made: Made) -> Made:
         """The second group, of two channels, loses one, of 4 rows and width 1."""
@@ -246,7 +247,7 @@ def _lists(shelf: Broken) -> None:
         ("count-signals", "signals", "2^40 signals."),
         ("count-grids", "signals.0.grids", "2^40 runs of grids."),
     ):
-        edit = put(payloads.CLIP, path, many)
+        edit = put(payloads.Clip, path, many)
         shelf.edited(name, "CLIP; Conventions", purpose, CLIP=edit)
-    edit = put(payloads.CEND, "value_sha256", many)
+    edit = put(payloads.Cend, "value_sha256", many)
     shelf.edited("count-hashes", "CEND; Conventions", "2^40 hashes.", CEND=edit)

@@ -33,7 +33,7 @@ def vectors() -> Iterable[Vector]:
     for name, purpose, changes in windows:
         _add(shelf, name, "CLIP; DATA", purpose, **window(WHOLE, 2, 5, **changes))
     edits = window(WHOLE, 2, 5)
-    opened = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+    opened = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
     purpose = "A clip that does not know its frames skips some."
     _add(shelf, "open", "CLIP", purpose, **edits | {"CLIP": both(edits["CLIP"], opened)})
     for field in ("skip", "spare"):
@@ -41,7 +41,7 @@ def vectors() -> Iterable[Vector]:
         table = _indexed(field)
         _add(shelf, f"index-{field}", "INDX; Strict reading", purpose, **edits, table=table)
     purpose = "A skip that is not in its shortest form."
-    overlong = both(edits["CLIP"], put(payloads.CLIP, "signals.0.skip", b"\x82\0"))
+    overlong = both(edits["CLIP"], put(payloads.Clip, "signals.0.skip", b"\x82\0"))
     _add(shelf, "skip-varint", "Conventions; CLIP", purpose, **edits | {"CLIP": overlong})
     return shelf.vectors
 
@@ -53,7 +53,8 @@ def _add(shelf: Broken, name: str, spec: str, purpose: str, **edits: Any) -> Non
 
 def _indexed(field: str) -> Any:
     def edit(fields: Any) -> Any:
-        fields.clips[0].signals[0][field] += 1
+        row = fields.clips[0].signals[0]
+        setattr(row, field, getattr(row, field) + 1)
         return fields
 
     return edit

@@ -125,8 +125,8 @@ def _bomb(n_frames: int, n_segments: int) -> bytes:
     return file_of(
         column([0.0], Grid(GridKind.FIXED, 0)),
         segments=many,
-        CLIP=put(payloads.CLIP, "n_frames", varint(total)),
-        CEND=put(payloads.CEND, "n_frames", varint(total)),
+        CLIP=put(payloads.Clip, "n_frames", varint(total)),
+        CEND=put(payloads.Cend, "n_frames", varint(total)),
         row=indexed(n_frames=total),
     )
 
@@ -199,8 +199,8 @@ def _constant(n_rows: int, n_segments: int, padding: int) -> bytes:
 
     crafter = Crafter(
         segments=many,
-        CLIP=put(payloads.CLIP, "n_frames", varint(n_rows)),
-        CEND=both(put(payloads.CEND, "n_frames", varint(n_rows)), rehash(zeros)),
+        CLIP=put(payloads.Clip, "n_frames", varint(n_rows)),
+        CEND=both(put(payloads.Cend, "n_frames", varint(n_rows)), rehash(zeros)),
         row=indexed(n_frames=n_rows),
     )
     crafter.clip(column([0.0], Grid(GridKind.FIXED, 0)))

@@ -319,7 +319,7 @@ def _ordinals(shelf: Broken) -> None:
 
 
 def _signal(shelf: Broken) -> None:
-    header = put(payloads.CLIP, "signals.0.header", b"\1h")
+    header = put(payloads.Clip, "signals.0.header", b"\1h")
     data = file_of(dance(), codec=codec_of(), CLIP=header)
     shelf.add("header", HEADING, "A header for fast, which has none.", data)
 
@@ -327,7 +327,7 @@ def _signal(shelf: Broken) -> None:
         ((header, streams),) = made
         return [(header, [*streams, *streams])]
 
-    twice = put(payloads.CLIP, "signals.0.n_resolutions", b"\2")
+    twice = put(payloads.Clip, "signals.0.n_resolutions", b"\2")
     data = file_of(dance(), codec=codec_of(), CLIP=twice, segments=doubled)
     purpose = "Two resolutions of fast, which has one."
     shelf.add("resolutions", f"{HEADING}; Codecs", purpose, data)

@@ -9,7 +9,7 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import FOOT, build_chunk, build_foot
-from mcz.schema import build
+from tools.records import built
 from tools.vectors.build.edits import Nth, at, flip, plus
 from tools.vectors.build.files import Broken, Crafter, Vector, file_of, finished, skeleton_chunk
 from tools.vectors.build.motions import dance
@@ -46,7 +46,7 @@ def _order(shelf: Broken) -> None:
     def left_out(chunk: bytes) -> bytes:
         return b""
 
-    model = build_chunk(b"MODL", build(payloads.MODL, {"kind": 77, "data": b""}, "MODL"))
+    model = build_chunk(b"MODL", built(payloads.Modl, {"kind": 77, "data": b""}, "MODL"))
     data = build_chunk(b"DATA", b"\0\0\1\0\0\1\0" + b"\0" * 4)
     cases: tuple[tuple[str, str, str, Callable[[bytes], bytes]], ...] = (
         ("no-HEAD", "No HEAD.", "HEAD", left_out),

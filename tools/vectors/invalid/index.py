@@ -8,6 +8,7 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.schema import parse, varint
+from tools.records import update
 from tools.vectors.build.edits import Nth, at, both, plus, put
 from tools.vectors.build.files import Broken, Crafter, Vector, finished
 from tools.vectors.build.motions import dance, puppet
@@ -45,7 +46,7 @@ def _fields(shelf: Broken) -> None:
     )
     for name, purpose, change in cases:
         shelf.edited(name, "INDX; Strict reading", f"INDX: {purpose}", table=_silent(change))
-    opened = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+    opened = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
     purpose = "INDX: No frames of an open clip, as CLIP says, where CEND has 4."
     edits = {"CLIP": opened, "table": _silent(_clip(n_frames=0))}
     shelf.edited("n-frames-of-open", "INDX; CLIP; CEND", purpose, **edits)
@@ -63,11 +64,11 @@ def _silent(change: Callable[[Any], None]) -> Callable[[Any], Any]:
 
 
 def _clip(**changes: Any) -> Callable[[Any], None]:
-    return lambda fields: fields.clips[0].update(changes)
+    return lambda fields: update(fields.clips[0], changes)
 
 
 def _signal(**changes: Any) -> Callable[[Any], None]:
-    return lambda fields: fields.clips[0].signals[0].update(changes)
+    return lambda fields: update(fields.clips[0].signals[0], changes)
 
 
 def _segment(place: int, value: int) -> Callable[[Any], None]:
@@ -108,7 +109,7 @@ def _ghost_alias(fields: Any) -> None:
 
 
 def _resized(payload: bytes) -> bytes:
-    fields = parse(payloads.INDX, payload, "INDX")
+    fields = parse(payloads.Indx, payload, "INDX")
     return varint(fields.size + 1) + bytes(fields.data)
 
 
@@ -116,18 +117,18 @@ def _every_field(shelf: Broken) -> None:
     """INDX of a file with all that it lists, one field after the other."""
 
     def clip(**changes: Any) -> Callable[[Any], Any]:
-        return lambda fields: fields.clips[0].update(changes)
+        return lambda fields: update(fields.clips[0], changes)
 
     def signal(**changes: Any) -> Callable[[Any], Any]:
-        return lambda fields: fields.clips[0].signals[0].update(changes)
+        return lambda fields: update(fields.clips[0].signals[0], changes)
 
     def add(rows: str, path: str, more: int = 1) -> Callable[[Any], Any]:
         def change(fields: Any) -> None:
             row = getattr(fields, rows)[0]
             *inner, last = path.split(".")
             for name in inner:
-                row = row[name][0]
-            row[last] += more
+                row = getattr(row, name)[0]
+            setattr(row, last, getattr(row, last) + more)
 
         return change
 
@@ -152,14 +153,14 @@ def _every_field(shelf: Broken) -> None:
         "shared-length": ("The skeleton is longer.", add("shared", "length")),
         "shared-type": (
             "The skeleton is a model.",
-            lambda f: f.shared[0].update({"type": b"MODL"}),
+            lambda f: update(f.shared[0], {"type": b"MODL"}),
         ),
         "shared-missing": ("The skeleton is left out.", lambda f: f.shared.pop(0) and None),
         "attachment-size": ("Another size of an attachment.", add("attachments", "size")),
         "attachment-offset": ("A part lies elsewhere.", add("attachments", "parts.offset")),
         "attachment-length": ("A part is longer.", add("attachments", "parts.length")),
-        "attachment-name": ("Another name.", lambda f: f.attachments[0].update({"name": "b.txt"})),
-        "attachment-no-part": ("No part.", lambda f: f.attachments[0].update({"parts": []})),
+        "attachment-name": ("Another name.", lambda f: update(f.attachments[0], {"name": "b.txt"})),
+        "attachment-no-part": ("No part.", lambda f: update(f.attachments[0], {"parts": []})),
         "attachment-missing": ("An attachment is left out.", lambda f: f.attachments.clear()),
         "alias-target": ("Another target of an alias.", _alias(target=b"b.txt")),
         "alias-of": ("An alias of a clip.", _alias(of=0)),
@@ -200,13 +201,13 @@ def _varint(place: int, more: int) -> Callable[[Any], Any]:
 def _ancillary(field: str, new: Any) -> Callable[[Any], Any]:
     def change(fields: Any) -> None:
         row = fields.clips[0].ancillary[0]
-        row[field] = new if isinstance(new, bytes) else row[field] + new
+        setattr(row, field, new if isinstance(new, bytes) else getattr(row, field) + new)
 
     return change
 
 
 def _alias(**changes: Any) -> Callable[[Any], Any]:
-    return lambda fields: fields.aliases[0].update(changes)
+    return lambda fields: update(fields.aliases[0], changes)
 
 
 def _index_bounds(shelf: Broken) -> None:

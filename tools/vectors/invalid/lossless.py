@@ -377,7 +377,7 @@ def _integers() -> Edit:
 
 
 def _signal(shelf: Broken) -> None:
-    header = put(payloads.CLIP, "signals.0.header", b"\1h")
+    header = put(payloads.Clip, "signals.0.header", b"\1h")
     data = file_of(dance(), codec=codec_of(), CLIP=header)
     shelf.add("header", HEADING, "A header for lossless, which has none.", data)
 
@@ -385,7 +385,7 @@ def _signal(shelf: Broken) -> None:
         ((header, streams),) = made
         return [(header, [*streams, *streams])]
 
-    twice = put(payloads.CLIP, "signals.0.n_resolutions", b"\2")
+    twice = put(payloads.Clip, "signals.0.n_resolutions", b"\2")
     data = file_of(dance(), codec=codec_of(), CLIP=twice, segments=doubled)
     purpose = "Two resolutions of lossless, which has one."
     shelf.add("resolutions", f"{HEADING}; Codecs", purpose, data)

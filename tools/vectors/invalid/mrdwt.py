@@ -16,9 +16,10 @@ from mcz.codecs.parameters import SCALED
 from mcz.codecs.wavelet.streams import CONSTANT, MAX_INDEX
 from mcz.container import payloads
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, varint
+from mcz.schema import varint
 from mcz.transforms import dwt
 from mcz.transforms.wavelets import MAX_TAP, by_id
+from tools.records import built
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.cuts import CUT_HEADING, window
 from tools.vectors.build.edits import (
@@ -148,16 +149,16 @@ def _signal(shelf: Broken) -> None:
     def fewer(made: Made) -> Made:
         return [(head, streams[::2]) for head, streams in made]
 
-    more = put(payloads.CLIP, "signals.0.n_resolutions", b"\4")
+    more = put(payloads.Clip, "signals.0.n_resolutions", b"\4")
     data = of_zeros(plan, 2, CLIP=more, segments=extended)
     shelf.add("resolutions", spec, "Four resolutions of two levels.", data)
-    none = put(payloads.CLIP, "signals.0.n_resolutions", b"\0")
+    none = put(payloads.Clip, "signals.0.n_resolutions", b"\0")
     data = of_zeros(plan, 2, CLIP=none, segments=lambda made: [(made[0][0], [])])
     shelf.add("resolutions-0", spec, "No resolution at all.", data)
-    together = put(payloads.CLIP, "signals.0.groups", b"\0")
+    together = put(payloads.Clip, "signals.0.groups", b"\0")
     data = of_zeros(plan, 2, CLIP=together, segments=fewer)
     shelf.add("groups", spec, "A group of two channels.", data)
-    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    twice = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
 
     def rows(found: Any) -> Any:
         signals = (replace(found.signals[0], samples_per_frame=2),)
@@ -165,8 +166,8 @@ def _signal(shelf: Broken) -> None:
 
     data = of_zeros(plan, CLIP=twice, CEND=rehash(np.zeros((16, 1))), row=rows)
     shelf.add("samples", spec, "Two rows a frame.", data)
-    run = build(payloads.GRID_RUN, {"n_channels": 2, "grid": WHOLE}, "grids")
-    integers = put(payloads.CLIP, "signals.0.grids", b"\1" + run)
+    run = built(payloads.GridRun, {"n_channels": 2, "grid": WHOLE}, "grids")
+    integers = put(payloads.Clip, "signals.0.grids", b"\1" + run)
     data = of_zeros(plan, 2, CLIP=integers, CEND=rehash(np.zeros((8, 2), np.int64)))
     purpose = "All grids are INTEGER, but the codec decodes no ordinals."
     shelf.add("integers", spec, purpose, data)

@@ -12,7 +12,8 @@ from mcz.container import payloads
 from mcz.container.segments import GROUP_NOTES
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build.edits import Edit, Made, at, both, plus, put, raw_stream, stream
 from tools.vectors.build.files import Broken, Vector, file_of, rehash
 from tools.vectors.build.motions import (
@@ -37,7 +38,7 @@ def vectors() -> Iterable[Vector]:
 
 
 def _exception(path: str, new: bytes) -> Edit:
-    return put(payloads.GROUP_NOTES, f"exceptions.{path}", new)
+    return put(payloads.GroupNotes, f"exceptions.{path}", new)
 
 
 def _exceptions(shelf: Broken) -> None:
@@ -88,14 +89,14 @@ def _spellings(shelf: Broken) -> None:
 
 
 def _grid_changes(shelf: Broken) -> None:
-    twice = put(payloads.GROUP_NOTES, "grid_changes", b"\2" + b"\1\4\0\0" * 2)
+    twice = put(payloads.GroupNotes, "grid_changes", b"\2" + b"\1\4\0\0" * 2)
     cases: tuple[tuple[str, str, Edit], ...] = (
-        ("channel", "beyond the group", put(payloads.GROUP_NOTES, "grid_changes.0.channel", b"\4")),
+        ("channel", "beyond the group", put(payloads.GroupNotes, "grid_changes.0.channel", b"\4")),
         ("twice", "twice the same", twice),
         (
             "kind",
             "to a grid that does not exist",
-            put(payloads.GROUP_NOTES, "grid_changes.0.grid", b"\x0b\0\0"),
+            put(payloads.GroupNotes, "grid_changes.0.grid", b"\x0b\0\0"),
         ),
     )
     for name, purpose, edit in cases:
@@ -110,7 +111,7 @@ def _grid_changes(shelf: Broken) -> None:
 
 def _without_text(shelf: Broken) -> None:
     def noted(**fields: Any) -> Callable[[Made], Made]:
-        data = build(payloads.GROUP_NOTES, {"grid_changes": [], "exceptions": []} | fields, "notes")
+        data = built(payloads.GroupNotes, {"grid_changes": [], "exceptions": []} | fields, "notes")
 
         def edit(made: Made) -> Made:
             ((header, streams),) = made
@@ -162,7 +163,7 @@ def _group_notes(shelf: Broken) -> None:
     """Group notes of a segment that is crafted whole."""
 
     def noted(**fields: Any) -> Callable[[Made], Made]:
-        data = build(payloads.GROUP_NOTES, {"grid_changes": [], "exceptions": []} | fields, "notes")
+        data = built(payloads.GroupNotes, {"grid_changes": [], "exceptions": []} | fields, "notes")
 
         def edit(made: Made) -> Made:
             ((header, streams),) = made

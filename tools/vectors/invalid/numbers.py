@@ -69,7 +69,7 @@ def _grids(shelf: Broken) -> None:
     }
     motion = column([0.0, 0.0], Grid(GridKind.FIXED, 2))
     for name, (purpose, grid) in cases.items():
-        edit = put(payloads.CLIP, "signals.0.grids", b"\1\1" + grid)
+        edit = put(payloads.Clip, "signals.0.grids", b"\1\1" + grid)
         shelf.add(name, "The grid structure", purpose, file_of(motion, CLIP=edit))
 
 
@@ -124,5 +124,5 @@ def _more_grids(shelf: Broken) -> None:
         "vax-digits": ("A VAX_F grid with digits.", b"\x0a\1\0"),
     }
     for name, (purpose, grid) in cases.items():
-        edit = put(payloads.CLIP, "signals.0.grids", b"\1\1" + grid)
+        edit = put(payloads.Clip, "signals.0.grids", b"\1\1" + grid)
         shelf.add(name, "The grid structure", purpose, file_of(motion, CLIP=edit))

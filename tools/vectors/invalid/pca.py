@@ -148,9 +148,9 @@ def _signal(shelf: Broken) -> None:
     plan = pca_clips.Plan((part_of(8, 4, 1),), empty=(0,))
     motion = pca_clips.motion_of(plan)
     spec = f"{pca_clips.HEADING}; CLIP"
-    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
-    grouped = put(payloads.CLIP, "signals.0.groups", b"\3\2\2\2")
-    resolved = put(payloads.CLIP, "signals.0.n_resolutions", b"\2")
+    twice = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
+    grouped = put(payloads.Clip, "signals.0.groups", b"\3\2\2\2")
+    resolved = put(payloads.Clip, "signals.0.n_resolutions", b"\2")
     cases: tuple[tuple[str, str, dict[str, Any]], ...] = (
         ("samples", "Two rows a frame.", {"CLIP": twice, "CEND": rehash(np.zeros((16, 4)))}),
         ("groups", "Two groups.", {"CLIP": grouped, "segments": _more}),

@@ -12,7 +12,8 @@ from mcz.codecs.contract import Model, id_of
 from mcz.container import payloads
 from mcz.container.chunks import build_chunk
 from mcz.motion import Channel, Joint, Skeleton
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build.edits import says
 from tools.vectors.build.files import Broken, Vector, rehash
 from tools.vectors.build.spatial_clips import (
@@ -113,7 +114,7 @@ def _mean(shelf: Broken) -> None:
     """A mean that fits the channels, which are more than a basis may have entries."""
     plan = Plan(PCA_RDO, WIDE, (1,), window=1, apart=True, prefix=True, fill=still)
     data = b"\1" + varint(WIDE) + b"\1\0" + coded_entries([(1, WIDE, 0)])
-    model = build_chunk(b"MODL", build(payloads.MODL, {"kind": 1, "data": data}, "MODL"))
+    model = build_chunk(b"MODL", built(payloads.Modl, {"kind": 1, "data": data}, "MODL"))
     said = says(header(plan, flags=b"\5", model=id_of(Model(1, data))))
     skeleton = Skeleton((Joint("", channels=(Channel(""),) * WIDE),))
     made = file_with(

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs.posewave.header import POSEWAVE_HEADER
+from mcz.codecs.posewave.header import PosewaveHeader
 from mcz.codecs.posewave.pyramid import Pyramid
 from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import classes_of, kinds_of
@@ -102,14 +102,14 @@ def _headers(shelf: Broken) -> None:
     }
     plan = _still()
     for name, (purpose, path, new) in cases.items():
-        header = put(POSEWAVE_HEADER, path, new)(header_of(plan))
+        header = put(PosewaveHeader, path, new)(header_of(plan))
         data = file_with(plan, CLIP=says(header))
         shelf.add(name, HEADING, f"{purpose}, over nothing but zeros.", data)
     whole = _still(flags=3)
-    header = put(POSEWAVE_HEADER, "flags", b"\4")(header_of(whole))
+    header = put(PosewaveHeader, "flags", b"\4")(header_of(whole))
     shelf.add("flags-4", HEADING, "Flags of 4.", file_with(whole, CLIP=says(header)))
     many = _still(levels=8)
-    header = put(POSEWAVE_HEADER, "levels", b"\x09")(header_of(many))
+    header = put(PosewaveHeader, "levels", b"\x09")(header_of(many))
     shelf.add("levels-9", HEADING, "9 levels.", file_with(many, CLIP=says(header)))
     good = header_of(plan)
     for name, header in (
@@ -127,7 +127,7 @@ def _counts(shelf: Broken) -> None:
     for path, due in (("plain", 3), ("weights", 3), ("orders", 3)):
         for n in (1, due - 1, due + 1, due + 300):
             code = b"\0" if path == "orders" else b"\x80"
-            header = put(POSEWAVE_HEADER, path, varint(n) + n * code)(header_of(plan))
+            header = put(PosewaveHeader, path, varint(n) + n * code)(header_of(plan))
             purpose = f"{n} of {path} in the place of {due}."
             shelf.add(f"{path}-{n}", HEADING, purpose, file_with(plan, CLIP=says(header)))
 
@@ -146,7 +146,7 @@ def _own_orders(shelf: Broken) -> None:
     )
     for name, purpose, skeleton, codes in cases:
         plan = _still(skeleton)
-        header = put(POSEWAVE_HEADER, "orders", varint(len(codes)) + bytes(codes))(header_of(plan))
+        header = put(PosewaveHeader, "orders", varint(len(codes)) + bytes(codes))(header_of(plan))
         edits = {"CLIP": says(header), "segments": stream(0, lambda data: b"\0" + data)}
         shelf.add(name, ORDERS, purpose, file_with(plan, **edits))
 
@@ -160,10 +160,10 @@ def _signal(shelf: Broken) -> None:
     plan = _still(levels=0)
     spec = f"{HEADING}; CLIP"
     n = plan.skeleton.n_channels
-    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
-    grouped = put(payloads.CLIP, "signals.0.groups", b"\3\2\6\6")
-    by_joint = put(payloads.CLIP, "signals.0.groups", b"\1")
-    resolved = put(payloads.CLIP, "signals.0.n_resolutions", b"\2")
+    twice = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
+    grouped = put(payloads.Clip, "signals.0.groups", b"\3\2\6\6")
+    by_joint = put(payloads.Clip, "signals.0.groups", b"\1")
+    resolved = put(payloads.Clip, "signals.0.n_resolutions", b"\2")
     hashed = rehash(np.zeros((16, n)))
     cases: tuple[tuple[str, str, dict[str, Any]], ...] = (
         ("samples", "Two rows a frame.", {"CLIP": twice, "CEND": hashed, "row": two_rows}),
@@ -184,21 +184,21 @@ def _signal(shelf: Broken) -> None:
 def _own_channels(count: int) -> Callable[[bytes], bytes]:
     """As many rotations in the place of the skeleton's channels."""
     flags = bytes([payloads.OWN_CHANNELS])
-    return put(payloads.CLIP, "signals.0.flags", flags + varint(count) + b"\4\0\0" * count)
+    return put(payloads.Clip, "signals.0.flags", flags + varint(count) + b"\4\0\0" * count)
 
 
 def _nothing(shelf: Broken) -> None:
     """Faults of clips of no frames, in which a decoder has nothing to stumble over."""
     plan = _still(n_frames=0, levels=0)
-    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    twice = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
     data = file_with(plan, CLIP=twice, row=two_rows)
     shelf.add("frames-0-samples", f"{HEADING}; CLIP", "Two rows a frame, no frames.", data)
     still = _still(_with("rx ry"), 0)
-    header = put(POSEWAVE_HEADER, "orders", b"\2\0\1")(header_of(still))
+    header = put(PosewaveHeader, "orders", b"\2\0\1")(header_of(still))
     purpose = "An order of a joint with two rotations, no frames."
     shelf.add("frames-0-order", ORDERS, purpose, file_with(still, CLIP=says(header)))
     exact = replace(_still(n_frames=0), exact=(1,))
-    header = put(POSEWAVE_HEADER, "exact", b"\2\1\3")(header_of(exact))
+    header = put(PosewaveHeader, "exact", b"\2\1\3")(header_of(exact))
     purpose = "Exact groups 1, which is, and 3 of 3 groups, no frames."
     shelf.add("frames-0-exact-beyond", EXACT, purpose, file_with(exact, CLIP=says(header)))
 
@@ -256,12 +256,12 @@ def _exact(shelf: Broken) -> None:
         ("twice", "Exact group 1 twice.", b"\2\1\1"),
         ("none", "Four groups, none of which is exact.", b"\0"),
     ):
-        header = put(POSEWAVE_HEADER, "exact", numbers)(header_of(plan))
+        header = put(PosewaveHeader, "exact", numbers)(header_of(plan))
         shelf.add(f"exact-{name}", EXACT, purpose, file_with(plan, motion, CLIP=says(header)))
     one = replace(plan, exact=(1,))
     for name, number in (("beyond", 3), ("far-beyond", 2**40)):
         numbers = b"\2\1" + varint(number)
-        header = put(POSEWAVE_HEADER, "exact", numbers)(header_of(one))
+        header = put(PosewaveHeader, "exact", numbers)(header_of(one))
         purpose = f"Exact groups 1, which is, and {number} of 3 groups."
         shelf.add(f"exact-{name}", EXACT, purpose, file_with(one, CLIP=says(header)))
     copies = b"\1" + b"\2\1\0" * 2  # a constant 0, and two copies of it

@@ -15,7 +15,7 @@ from mcz.codecs.posewave import displacement_kernels as coding
 from mcz.codecs.posewave.contact_plan import MOST_STEPS
 from mcz.codecs.posewave.contacts import Coder
 from mcz.codecs.posewave.head_kernels import code_number
-from mcz.codecs.posewave.header import POSEWAVE_HEADER
+from mcz.codecs.posewave.header import PosewaveHeader
 from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import classes_of, kinds_of
 from mcz.coding.mixing import adaptive
@@ -72,11 +72,11 @@ def _headers(shelf: Broken) -> None:
         cases[f"step-{name}"] = (f"A step that is {name}.", _contacts(_point(step=step)))
     plan = Plan(acclaim(), np.zeros((8, acclaim().n_channels)), {})
     for name, (purpose, new) in cases.items():
-        header = put(POSEWAVE_HEADER, "contacts", new)(header_of(plan))
+        header = put(PosewaveHeader, "contacts", new)(header_of(plan))
         data = file_with(plan, CLIP=says(header))
         shelf.add(f"contacts-{name}", CONTACTS, f"{purpose} Nothing is kept.", data)
     exact = replace(plan, exact=(1,))
-    header = put(POSEWAVE_HEADER, "contacts", _contacts(_point()))(header_of(exact))
+    header = put(PosewaveHeader, "contacts", _contacts(_point()))(header_of(exact))
     purpose = "Contacts beside an exact joint. Nothing is kept."
     data = file_with(exact, CLIP=says(header))
     shelf.add("exact-and-contacts", f"{HEADING}; Exact channels", purpose, data)

@@ -19,7 +19,8 @@ from mcz.coding.mixing import mixed
 from mcz.coding.residuals import bits, code_residual
 from mcz.container import payloads
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build import curve_clips
 from tools.vectors.build.curve_clips import (
     HEADING,
@@ -109,17 +110,17 @@ def _headers(shelf: Broken) -> None:
 def _signal(shelf: Broken) -> None:
     plan = Plan(8)
     spec = f"{HEADING}; Codecs; CLIP"
-    more = put(payloads.CLIP, "signals.0.n_resolutions", b"\3")
+    more = put(payloads.Clip, "signals.0.n_resolutions", b"\3")
 
     def extended(made: Made) -> Made:
         return [(head, [*streams, b"", b""]) for head, streams in made]
 
     data = _silent(plan, 2, CLIP=more, segments=extended)
     shelf.add("resolutions", spec, "Three resolutions.", data)
-    none = put(payloads.CLIP, "signals.0.n_resolutions", b"\0")
+    none = put(payloads.Clip, "signals.0.n_resolutions", b"\0")
     data = _silent(plan, 2, CLIP=none, segments=lambda made: [(made[0][0], [])])
     shelf.add("resolutions-0", spec, "No resolution at all.", data)
-    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    twice = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
 
     def rows(found: Any) -> Any:
         signals = (replace(found.signals[0], samples_per_frame=2),)
@@ -127,8 +128,8 @@ def _signal(shelf: Broken) -> None:
 
     data = _silent(plan, CLIP=twice, CEND=rehash(np.zeros((16, 1))), row=rows)
     shelf.add("samples", spec, "Two rows a frame.", data)
-    run = build(payloads.GRID_RUN, {"n_channels": 2, "grid": WHOLE}, "grids")
-    integers = put(payloads.CLIP, "signals.0.grids", b"\1" + run)
+    run = built(payloads.GridRun, {"n_channels": 2, "grid": WHOLE}, "grids")
+    integers = put(payloads.Clip, "signals.0.grids", b"\1" + run)
     data = _silent(plan, 2, CLIP=integers, CEND=rehash(np.zeros((8, 2), np.int64)))
     purpose = "All grids are INTEGER, but the codec decodes no ordinals."
     shelf.add("integers", spec, purpose, data)

@@ -18,7 +18,8 @@ from mcz.container.chunks import ANCILLARY, build_foot
 from mcz.container.packets import END, Packet, build_packet
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, inflate, parse
+from mcz.schema import inflate, parse
+from tools.records import built
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.edits import Made, at, both, headed, plus, put, swap
 from tools.vectors.build.files import (
@@ -138,7 +139,7 @@ def _most(shelf: Whole) -> None:
 def _records(shelf: Whole) -> None:
     entries = [("codec", "none"), ("mean_error_cm", "none of your business"), ("codec", "raw")]
     fields = {"entries": [{"key": k, "value": v} for k, v in entries], "extension": b""}
-    record = build(payloads.QUAL, fields, "QUAL")
+    record = built(payloads.Qual, fields, "QUAL")
     crafter = Crafter()
     crafter.ancillary(b"QUAL", record)
     crafter.clip(dance())
@@ -152,8 +153,8 @@ def _unknown_sources(shelf: Whole) -> None:
     """Formats of sources that nobody knows: the values are there, the file is not."""
     plain = take(PLAIN, "plain")
     edits = {
-        "SRCE": put(payloads.SRCE, "format", b"\x63"),
-        "CLIP": put(payloads.CLIP, "source.0.format", b"\x63"),
+        "SRCE": put(payloads.Srce, "format", b"\x63"),
+        "CLIP": put(payloads.Clip, "source.0.format", b"\x63"),
     }
     data = file_of(plain, **edits)
     purpose = "A source of a format beyond the registry, which nobody can restore."
@@ -222,7 +223,7 @@ def _unknown(shelf: Whole) -> None:
     data = finished(crafter, dance())
     purpose = "An unknown ancillary chunk inside a clip: the gap before its segment is longer."
     shelf.hold("unknown-ancillary-in-clip", "Grammar; INDX", purpose, data, dance())
-    data = file_of(dance(), SKEL=put(payloads.SKEL, "joints.0.channels.3.kind", b"\xc8"))
+    data = file_of(dance(), SKEL=put(payloads.Skel, "joints.0.channels.3.kind", b"\xc8"))
     purpose = "A channel kind beyond the registry is a plain scalar."
     shelf.hold("unknown-channel-kind", "SKEL; Registry", purpose, data, dance())
 
@@ -234,8 +235,8 @@ def _extensions(shelf: Whole) -> None:
 
     crafter = Crafter()
     crafter.clip(dance())
-    crafter.ancillary(b"QUAL", build(payloads.QUAL, {"entries": [], "extension": LATER}, "QUAL"))
-    signal = put(payloads.CLIP, "signals.0.extension", bytes((len(LATER),)) + LATER)
+    crafter.ancillary(b"QUAL", built(payloads.Qual, {"entries": [], "extension": LATER}, "QUAL"))
+    signal = put(payloads.Clip, "signals.0.extension", bytes((len(LATER),)) + LATER)
     cases = (
         ("HEAD", "HEAD", file_of(dance(), HEAD=plus(LATER))),
         ("SKEL", "SKEL", file_of(dance(), SKEL=plus(LATER))),
@@ -278,7 +279,7 @@ def _shared(shelf: Whole) -> None:
     purpose = "The same SKEL twice: the first counts."
     shelf.hold("repeated-skeleton", "Grammar; SKEL", purpose, data, *motions)
     crafter = Crafter()
-    crafter.shared(b"MODL", build(payloads.MODL, {"kind": 77, "data": b"learned"}, "MODL"))
+    crafter.shared(b"MODL", built(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
     data = finished(crafter, dance())
     shelf.hold("unused-model", "MODL", "A model that no clip refers to.", data, dance())
     plain = take(PLAIN, "plain")
@@ -294,14 +295,14 @@ def _shared(shelf: Whole) -> None:
 
 
 def _stored_blocks(payload: bytes) -> bytes:
-    fields = parse(payloads.SRCE, payload, "SRCE")
+    fields = parse(payloads.Srce, payload, "SRCE")
     text = inflate(fields.data, fields.size, "SRCE")
     half = len(text) // 2
     blocks = [(0, text[:half]), (0, b""), (1, text[half:])]
     fields.data = b"".join(
         struct.pack("<BHH", last, len(block), len(block) ^ 0xFFFF) + block for last, block in blocks
     )
-    return build(payloads.SRCE, fields, "SRCE")
+    return built(payloads.Srce, fields, "SRCE")
 
 
 def _open_data(shelf: Whole) -> None:
@@ -313,7 +314,7 @@ def _open_data(shelf: Whole) -> None:
         data = file_of(long, packets=True, segment_frames=3, index=index)
         shelf.hold(name, "Open DATA and packets", purpose, data, long)
     _frames(shelf)
-    opened = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+    opened = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
     purpose = "A clip that does not know its frames in advance: CEND tells."
     shelf.hold("open-clip", "CLIP; CEND", purpose, file_of(long, CLIP=opened), long)
 

@@ -15,7 +15,8 @@ from mcz.container.chunks import COPY, META, SIGNATURE
 from mcz.container.limits import ARCHIVE
 from mcz.container.metadata import Record
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.deflate import END, Bits, code_of, own_lengths
 from tools.vectors.build.edits import at, put
@@ -88,7 +89,7 @@ def _quality(shelf: Whole) -> None:
     crafter = Crafter()
     crafter.clip(dance())
     entries = [{"key": "position_error_cm", "value": "0.0"}, {"key": "encoder", "value": "none"}]
-    crafter.ancillary(b"QUAL", build(payloads.QUAL, {"entries": entries, "extension": b""}, "QUAL"))
+    crafter.ancillary(b"QUAL", built(payloads.Qual, {"entries": entries, "extension": b""}, "QUAL"))
     shelf.hold("quality", "QUAL", "A quality record behind CEND.", finished(crafter), dance())
 
 
@@ -315,7 +316,7 @@ def _frame_numbers(shelf: Whole) -> None:
 
 
 def _number_text(text: str) -> Any:
-    return put(payloads.CLIP, "metadata.0.value", varint(len(text)) + text.encode())
+    return put(payloads.Clip, "metadata.0.value", varint(len(text)) + text.encode())
 
 
 def _words(shelf: Whole) -> None:

@@ -46,7 +46,7 @@ def _live(shelf: Spaces) -> None:
     live = {"packets": True, "frames": 1}
     purpose = "A frame a packet, of kind 2 behind the first, every fourth fresh."
     shelf.plan("live", purpose, plan, requests, **about, **live)
-    opened = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+    opened = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
     purpose = "The same, of a clip that did not know its frames, without INDX."
     shelf.plan("live-open", purpose, plan, requests, **about, **live, CLIP=opened, index=False)
     motion = motion_of(plan, skeleton=markers(2), mask=_gap(11))

@@ -99,10 +99,10 @@ def _segments(shelf: Parts) -> None:
 
 def _grids_and_groups(shelf: pca_clips.Parts) -> None:
     plan = pca_clips.Plan((part_of(7, 3, 2), part_of(4, 3, 1, 2)))
-    listed = put(payloads.CLIP, "signals.0.groups", b"\3\1\3")
+    listed = put(payloads.Clip, "signals.0.groups", b"\3\1\3")
     purpose = "One group of all channels, that is listed."
     shelf.hold_plan("groups-listed", purpose, plan, [(2, 9)], CLIP=listed)
-    joined = put(payloads.CLIP, "signals.0.groups", b"\1")
+    joined = put(payloads.Clip, "signals.0.groups", b"\1")
     purpose = "One group of all channels, of the only joint."
     shelf.hold_plan("groups-joint", purpose, plan, [(2, 9)], CLIP=joined)
     motion = pca_clips.motion_of(plan)

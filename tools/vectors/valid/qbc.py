@@ -239,7 +239,7 @@ def _long(shelf: Curves) -> None:
 def _groups(shelf: Curves) -> None:
     plan = Plan(20, 6)
     about: dict[str, Any] = {"spec": f"{HEADING}; CLIP", "requests": [(1, (3, 9), (1, 0))]}
-    listed = {"CLIP": put(payloads.CLIP, "signals.0.groups", b"\3\2\4\2")}
+    listed = {"CLIP": put(payloads.Clip, "signals.0.groups", b"\3\2\4\2")}
     cases: dict[str, tuple[str, Sequence[int], dict[str, Any]]] = {
         "all": ("One group of all channels", (6,), {"grouping": "all"}),
         "channel": ("Groups of a channel each", (1,) * 6, {"grouping": "channel"}),

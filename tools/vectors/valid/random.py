@@ -22,8 +22,9 @@ from mcz.container.packets import END, SEGMENT, Packet, build_packet
 from mcz.container.segments import FRESH, SegmentHeader
 from mcz.container.value_hash import value_hash
 from mcz.motion import Motion
-from mcz.schema import build, deflate, varint
+from mcz.schema import deflate, varint
 from mcz.writing.clip_writer import write_skeleton
+from tools.records import built
 from tools.vectors.build.edits import both, plus, put
 from tools.vectors.build.files import Crafter, Vector, arrays, partial
 from tools.vectors.build.random_clips import clip
@@ -159,11 +160,11 @@ class _Maker:
             write_skeleton(crafter, skeleton(self.chance, [2, 1]))
         elif which == 1:
             fields = {"kind": self.chance.choice((2, 77, 2**53 - 1)), "data": self.bytes()}
-            crafter.shared(b"MODL", build(payloads.MODL, fields, "MODL"))
+            crafter.shared(b"MODL", built(payloads.Modl, fields, "MODL"))
         elif which == 2:
             data = self.bytes()
             fields = {"format": 3, "encoding": 1, "size": len(data), "data": deflate(data)}
-            crafter.shared(b"SRCE", build(payloads.SRCE, fields, "SRCE"))
+            crafter.shared(b"SRCE", built(payloads.Srce, fields, "SRCE"))
         else:
             for (kind, _), place in list(crafter.directory.shared.items())[:1]:
                 assert place.length is not None
@@ -215,7 +216,7 @@ class _Maker:
         if self.says("a quality record", 0.15):
             entries = [{"key": text(self.chance), "value": text(self.chance)} for _ in range(3)]
             fields = {"entries": entries, "extension": self.bytes()}
-            self.crafter.ancillary(b"QUAL", build(payloads.QUAL, fields, "QUAL"))
+            self.crafter.ancillary(b"QUAL", built(payloads.Qual, fields, "QUAL"))
 
     def described(self, motion: Motion) -> Motion:
         """What a clip says beside its values."""
@@ -248,30 +249,30 @@ class _Maker:
             shown = replace(motion, signals=signals)
         size = n - skip - spare
         clip_edits: list[Any] = [
-            put(payloads.CLIP, "n_frames", varint(0 if opened else size)),
-            *self.extended(payloads.CLIP, "CLIP"),
+            put(payloads.Clip, "n_frames", varint(0 if opened else size)),
+            *self.extended(payloads.Clip, "CLIP"),
         ]
         for number in range(len(motion.signals)):
             place = f"signals.{number}"
             clip_edits += [
-                put(payloads.CLIP, f"{place}.skip", varint(skip)),
-                put(payloads.CLIP, f"{place}.spare", varint(spare)),
+                put(payloads.Clip, f"{place}.skip", varint(skip)),
+                put(payloads.Clip, f"{place}.spare", varint(spare)),
             ]
             if self.says("an extension of a signal", 0.15):
                 more = self.bytes()
-                edit = put(payloads.CLIP, f"{place}.extension", varint(len(more)) + more)
+                edit = put(payloads.Clip, f"{place}.extension", varint(len(more)) + more)
                 clip_edits.append(edit)
         if opened:
             clip_edits.append(_opened)
         if self.says("listed groups", 0.25):
             sizes = _sizes(made)
             listed = b"\3" + varint(len(sizes)) + b"".join(map(varint, sizes))
-            clip_edits.append(put(payloads.CLIP, "signals.0.groups", listed))
+            clip_edits.append(put(payloads.Clip, "signals.0.groups", listed))
         hashes = [value_hash(s.values, s.mask) for s in shown.signals]
         cend_edits = [
-            put(payloads.CEND, "n_frames", varint(size)),
-            put(payloads.CEND, "value_sha256", varint(len(hashes)) + b"".join(hashes)),
-            *self.extended(payloads.CEND, "CEND"),
+            put(payloads.Cend, "n_frames", varint(size)),
+            put(payloads.Cend, "value_sha256", varint(len(hashes)) + b"".join(hashes)),
+            *self.extended(payloads.Cend, "CEND"),
         ]
 
         def row(found: Any) -> Any:
@@ -295,9 +296,9 @@ def _sizes(made: Clip) -> list[int]:
 
 def _opened(payload: bytes) -> bytes:
     """Flag bit 0, which is bit 0 of the byte behind the name."""
-    fields = put(payloads.CLIP, "flags", b"\1")(payload)
-    rounded = put(payloads.CLIP, "flags", b"\3")(payload)
-    return rounded if payload != put(payloads.CLIP, "flags", b"\0")(payload) else fields
+    fields = put(payloads.Clip, "flags", b"\1")(payload)
+    rounded = put(payloads.Clip, "flags", b"\3")(payload)
+    return rounded if payload != put(payloads.Clip, "flags", b"\0")(payload) else fields
 
 
 class _Odd(Crafter):

@@ -72,7 +72,7 @@ def _groups(shelf: Whole) -> None:
         return [(header, [b"".join(streams[a:b]) for a, b in ((0, 1), (1, 5), (5, 6))])]
 
     motion = dance()
-    listed = put(payloads.CLIP, "signals.0.groups", b"\3\3\1\4\1")
+    listed = put(payloads.Clip, "signals.0.groups", b"\3\3\1\4\1")
     cases: tuple[tuple[str, str, bytes], ...] = (
         ("all", "Groups of kind 0.", file_of(motion, grouping="all")),
         ("channel", "Groups of kind 2.", file_of(motion, grouping="channel")),

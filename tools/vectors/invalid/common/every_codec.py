@@ -24,11 +24,11 @@ def add(shelf: Broken, name: str) -> None:
     purpose = "A byte behind the header, of a clip of no frames."
     shelf.add("frames-0-header", spec, purpose, edited(_longer_header))
     purpose = "99 resolutions of a clip of no frames."
-    edit = put(payloads.CLIP, "signals.0.n_resolutions", b"\x63")
+    edit = put(payloads.Clip, "signals.0.n_resolutions", b"\x63")
     shelf.add("frames-0-resolutions", spec, purpose, edited(edit))
 
 
 def _longer_header(payload: bytes) -> bytes:
-    start, stop = span(payloads.CLIP, payload, "signals.0.header")
+    start, stop = span(payloads.Clip, payload, "signals.0.header")
     header = payload[start + 1 : stop] + b"\0"
     return payload[:start] + varint(len(header)) + header + payload[stop:]

@@ -12,7 +12,8 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build import spatial_clips
 from tools.vectors.build.edits import headed, plus, put, says, stream
 from tools.vectors.build.files import Broken, file_of, rehash
@@ -74,7 +75,7 @@ def _windows(shelf: Broken, name: str) -> None:
 def _signal(shelf: Broken, name: str) -> None:
     plan = Plan(name, 6, (8,))
     spec = spec_of(name, "CLIP")
-    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    twice = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
 
     def rows(found: Any) -> Any:
         return replace(found, signals=(replace(found.signals[0], samples_per_frame=2),))
@@ -82,14 +83,14 @@ def _signal(shelf: Broken, name: str) -> None:
     still_ = np.zeros((16, 6))
     data = silent(plan, CLIP=twice, CEND=rehash(still_), row=rows)
     shelf.add("samples", spec, "Two rows a frame.", data)
-    more = put(payloads.CLIP, "signals.0.n_resolutions", b"\2")
+    more = put(payloads.Clip, "signals.0.n_resolutions", b"\2")
     data = silent(plan, CLIP=more, segments=lambda made: [(h, [*s, b""]) for h, s in made])
     shelf.add("resolutions", spec, "Two resolutions.", data)
-    listed_ = put(payloads.CLIP, "signals.0.groups", b"\3\2\3\3")
+    listed_ = put(payloads.Clip, "signals.0.groups", b"\3\2\3\3")
     data = silent(plan, CLIP=listed_, segments=lambda made: [(h, [*s, *s]) for h, s in made])
     shelf.add("groups", spec, "Two groups.", data)
-    run = build(payloads.GRID_RUN, {"n_channels": 6, "grid": Grid(GridKind.INTEGER)}, "grids")
-    integers = put(payloads.CLIP, "signals.0.grids", b"\1" + run)
+    run = built(payloads.GridRun, {"n_channels": 6, "grid": Grid(GridKind.INTEGER)}, "grids")
+    integers = put(payloads.Clip, "signals.0.grids", b"\1" + run)
     data = silent(plan, CLIP=integers, CEND=rehash(np.zeros((8, 6), np.int64)))
     purpose = "All grids are INTEGER, but the codec decodes no ordinals."
     shelf.add("integers", f"{spec}; Codecs", purpose, data)

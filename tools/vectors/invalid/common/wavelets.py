@@ -49,7 +49,7 @@ def add(shelf: Broken, name: str) -> None:
     )
     for case, purpose, made, parts in said:
         add(case, purpose, made, silent_, CLIP=says(wavelet_clips.header(made, **parts)))
-    samples = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    samples = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
     edits = {"CLIP": samples, "CEND": rehash(np.zeros((32, 1))), "row": two_rows}
     add("samples", "Two rows a frame.", plan, silent_, **edits)
     edits = {"CLIP": all_integers(1), "CEND": rehash(np.zeros((16, 1), np.int64))}

@@ -16,7 +16,7 @@ from mcz.codecs.basis_models import Basis, build_bases
 from mcz.codecs.contract import Model, id_of
 from mcz.container import payloads
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build
+from tools.records import built
 from tools.vectors.build.edits import BAD_STEPS, binary64, headed, put, says, swap
 from tools.vectors.build.files import Broken, rehash
 from tools.vectors.build.online_clips import file_with
@@ -94,7 +94,7 @@ def _with_model(plan: Plan, kind: int, bases: Sequence[Basis]) -> bytes:
     """The file of ``plan`` with another model, which the clip names."""
     old, data = plan.space.model, build_bases(bases)
     assert old is not None
-    payload = build(payloads.MODL, {"kind": kind, "data": data}, "MODL")
+    payload = built(payloads.Modl, {"kind": kind, "data": data}, "MODL")
     named = swap(id_of(old), id_of(Model(kind, data)))
     return _silent(plan, MODL=lambda _: payload, CLIP=named)
 
@@ -128,21 +128,21 @@ def _models(shelf: Broken) -> None:
 def _signal(shelf: Broken) -> None:
     plan = Plan(("I8",), 6)
     spec = f"{HEADING}; CLIP"
-    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    twice = put(payloads.Clip, "signals.0.samples_per_frame", b"\2")
 
     def rows(found: Any) -> Any:
         return replace(found, signals=(replace(found.signals[0], samples_per_frame=2),))
 
     data = _silent(plan, CLIP=twice, CEND=rehash(np.zeros((16, 6))), row=rows)
     shelf.add("samples", spec, "Two rows a frame.", data)
-    more = put(payloads.CLIP, "signals.0.n_resolutions", b"\2")
+    more = put(payloads.Clip, "signals.0.n_resolutions", b"\2")
     data = _silent(plan, CLIP=more, segments=lambda made: [(h, [*s, b""]) for h, s in made])
     shelf.add("resolutions", spec, "Two resolutions.", data)
-    listed = put(payloads.CLIP, "signals.0.groups", b"\3\2\3\3")
+    listed = put(payloads.Clip, "signals.0.groups", b"\3\2\3\3")
     data = _silent(plan, CLIP=listed, segments=lambda made: [(h, [*s, *s]) for h, s in made])
     shelf.add("groups", spec, "Two groups.", data)
-    run = build(payloads.GRID_RUN, {"n_channels": 6, "grid": Grid(GridKind.INTEGER)}, "grids")
-    integers = put(payloads.CLIP, "signals.0.grids", b"\1" + run)
+    run = built(payloads.GridRun, {"n_channels": 6, "grid": Grid(GridKind.INTEGER)}, "grids")
+    integers = put(payloads.Clip, "signals.0.grids", b"\1" + run)
     data = _silent(plan, CLIP=integers, CEND=rehash(np.zeros((8, 6), np.int64)))
     purpose = "All grids are INTEGER, but the codec decodes no ordinals."
     shelf.add("integers", f"{spec}; Codecs", purpose, data)

@@ -31,7 +31,7 @@ def _attached(edit: Edit) -> bytes:
 def _attachments(shelf: Broken) -> None:
     def of(part: int, path: str, new: bytes) -> Edit:
         """Edit one of the two parts; its number is the ninth byte."""
-        edit = put(payloads.ATTA, path, new)
+        edit = put(payloads.Atta, path, new)
         return lambda payload: edit(payload) if payload[8] == part else payload
 
     def exchanged(payload: bytes) -> bytes:
@@ -39,12 +39,12 @@ def _attachments(shelf: Broken) -> None:
 
     cases: tuple[tuple[str, str, Edit], ...] = (
         ("order", "Part 1 comes first.", exchanged),
-        ("part-missing", "Part 1 of 3 is the last.", put(payloads.ATTA, "n_parts", b"\3")),
-        ("part-of-0", "A part of none.", put(payloads.ATTA, "n_parts", b"\0")),
+        ("part-missing", "Part 1 of 3 is the last.", put(payloads.Atta, "n_parts", b"\3")),
+        ("part-of-0", "A part of none.", put(payloads.Atta, "n_parts", b"\0")),
         ("parts-differ", "The parts state different counts.", of(1, "n_parts", b"\3")),
         ("hashes-differ", "The parts state different hashes.", of(0, "sha256", b"h" * 32)),
-        ("hash", "A hash that is not that of the parts.", put(payloads.ATTA, "sha256", b"h" * 32)),
-        ("size", "The parts are shorter than the size.", put(payloads.ATTA, "size", b"\x0d")),
+        ("hash", "A hash that is not that of the parts.", put(payloads.Atta, "sha256", b"h" * 32)),
+        ("size", "The parts are shorter than the size.", put(payloads.Atta, "size", b"\x0d")),
         ("part-size", "A part is shorter than it says.", of(1, "part_size", b"\7")),
         ("encoding", "An encoding beyond the table.", of(1, "encoding", b"\3")),
     )
@@ -64,7 +64,7 @@ def _paths(shelf: Broken) -> None:
         "NUL": b"a\0b.txt",
     }
     for name, path in cases.items():
-        data = _attached(put(payloads.ATTA, "name", varint(len(path)) + path))
+        data = _attached(put(payloads.Atta, "name", varint(len(path)) + path))
         shown = path.decode().replace("\0", "(NUL)")
         purpose = f"The name {shown!r} is no plain relative path."
         shelf.add(f"path-{name}", "ATTA; ALIA", purpose, data)
@@ -85,7 +85,7 @@ def _aliases(shelf: Broken) -> None:
     crafter.alias("copy.asf", payloads.OF_SKELETON, write_skeleton(crafter, puppet()))
     purpose = "An alias of a skeleton without a source."
     shelf.add("ALIA-skeleton-without-source", "ALIA", purpose, finished(crafter))
-    crafter = Crafter(ALIA=put(payloads.ALIA, "of", b"\3"))
+    crafter = Crafter(ALIA=put(payloads.Alia, "of", b"\3"))
     crafter.parts("b.txt", b"")
     crafter.alias("c.txt", payloads.OF_ATTACHMENT, b"b.txt")
     data = finished(crafter, index=False)
@@ -100,8 +100,8 @@ def _aliases(shelf: Broken) -> None:
 
 
 def _parts_and_names(shelf: Broken) -> None:
-    third = put(payloads.ATTA, "part", b"\2")
-    nothing = put(payloads.ATTA, "part_size", b"\0")
+    third = put(payloads.Atta, "part", b"\2")
+    nothing = put(payloads.Atta, "part_size", b"\0")
     crafter = Crafter()
     crafter.parts("a.txt", b"one", b"two")
     (row,) = crafter.directory.attachments.values()
@@ -126,7 +126,7 @@ def _numbers_of_parts(shelf: Broken) -> None:
         return payload[:6] + bytes((payload[6] + 1,)) + payload[7:]
 
     def second(payload: bytes) -> bytes:
-        return put(payloads.ATTA, "size", b"\7")(payload) if payload[6] else payload
+        return put(payloads.Atta, "size", b"\7")(payload) if payload[6] else payload
 
     cases: tuple[tuple[str, str, Edit], ...] = (
         ("part-first", "The parts are numbered from 1.", renumbered),

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from mcz.container import payloads
-from mcz.schema import build, deflate, varint
+from mcz.schema import deflate, varint
 from mcz.writing.clip_writer import write_skeleton
+from tools.records import built
 from tools.vectors.build.edits import Edit, plus, put, span
 from tools.vectors.build.files import Broken, Crafter, file_of, finished
 from tools.vectors.build.motions import puppet
@@ -20,11 +21,11 @@ INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
 _SKELETON: dict[str, Any] = {
     "name": "crowd",
     "flags": 0,
-    "unit_cm": [],
+    "unit_cm": None,
     "angle_unit": 0,
     "up_axis": 0,
-    "base": [],
-    "source": [],
+    "base": None,
+    "source": None,
     "joints": [],
     "extension": b"",
 }
@@ -105,7 +106,7 @@ def _skeletons(shelf: Broken) -> None:
     )
     for name, purpose, path, new, heading in cases:
         spec = f"SKEL; {heading}" if heading else "SKEL"
-        shelf.edited(name, spec, purpose, SKEL=put(payloads.SKEL, path, new))
+        shelf.edited(name, spec, purpose, SKEL=put(payloads.Skel, path, new))
     shelf.edited("axis-order", "SKEL", "An axis order beyond the table.", SKEL=_axis_order)
     crafter = Crafter()
     crafter.plain_chunk(b"MODL", b"")
@@ -114,9 +115,9 @@ def _skeletons(shelf: Broken) -> None:
 
 def _axis_order(payload: bytes) -> bytes:
     """Joint 2, which has neither offset nor axis, gets both."""
-    stop = span(payloads.SKEL, payload, "joints.2.offset")[1]
+    stop = span(payloads.Skel, payload, "joints.2.offset")[1]
     with_axis = payload[:stop] + _doubles(0, 0, 0) + b"\6" + payload[stop:]
-    return put(payloads.SKEL, "joints.2.flags", b"\7")(payload)[:stop] + with_axis[stop:]
+    return put(payloads.Skel, "joints.2.flags", b"\7")(payload)[:stop] + with_axis[stop:]
 
 
 def _templates(shelf: Broken) -> None:
@@ -125,7 +126,7 @@ def _templates(shelf: Broken) -> None:
     template, size = source.template, len(source.template)
 
     def field(path: str, new: bytes) -> Edit:
-        return put(payloads.SRCE, path, new)
+        return put(payloads.Srce, path, new)
 
     def stored(payload: bytes) -> bytes:
         return payload[:1] + b"\0" + varint(size + 1) + template
@@ -152,7 +153,7 @@ def _templates(shelf: Broken) -> None:
 def _bounds(shelf: Broken) -> None:
     nan = struct.pack("<3d", 0, float("nan"), 0)
     spec = "SRCE; Conventions"
-    ratio = {"SRCE": put(payloads.SRCE, "size", varint(2**20))}
+    ratio = {"SRCE": put(payloads.Srce, "size", varint(2**20))}
     data = file_of(take(PLAIN, "plain"), **ratio)
     purpose = "A template: 2^20 bytes stated, more than its deflate stream can make."
     shelf.add("SRCE-size-ratio", spec, purpose, data)
@@ -160,12 +161,12 @@ def _bounds(shelf: Broken) -> None:
     shelf.add("SRCE-deflate-block", spec, "A template: It is no deflate stream.", data)
     crafter = Crafter()
     huge = {"format": 3, "encoding": 1, "size": 2**26 + 1, "data": deflate(bytes(2**26 + 1))}
-    crafter.shared(b"SRCE", build(payloads.SRCE, huge, "SRCE"))
+    crafter.shared(b"SRCE", built(payloads.Srce, huge, "SRCE"))
     purpose = "A template of 2^26 + 1 bytes in the base profile."
     shelf.add("SRCE-limit", "SRCE; Limits and profiles", purpose, finished(crafter))
     crafter = Crafter()
     later = write_skeleton(Crafter(), puppet())
-    based = put(payloads.SKEL, "base", b"\1" + later)(_payload_of(puppet()))
+    based = put(payloads.Skel, "base", b"\1" + later)(_payload_of(puppet()))
     crafter.plain_chunk(b"SKEL", based)
     write_skeleton(crafter, puppet())
     purpose = "The base of a skeleton comes behind it."
@@ -189,9 +190,9 @@ def _with_axis(axis: bytes) -> Edit:
     """Joint 1, which has an offset, gets an axis."""
 
     def edit(payload: bytes) -> bytes:
-        stop = span(payloads.SKEL, payload, "joints.1.offset")[1]
+        stop = span(payloads.Skel, payload, "joints.1.offset")[1]
         longer = payload[:stop] + axis + b"\0" + payload[stop:]
-        start, end = span(payloads.SKEL, payload, "joints.1.flags")
+        start, end = span(payloads.Skel, payload, "joints.1.flags")
         return longer[:start] + bytes((payload[start] | 4,)) + longer[end:]
 
     return edit
@@ -206,22 +207,22 @@ def _text(shelf: Broken) -> None:
         "continuation": ("a byte that continues nothing", b"a\x80"),
     }
     for name, (purpose, text) in cases.items():
-        edit = put(payloads.SKEL, "joints.1.name", varint(len(text)) + text)
+        edit = put(payloads.Skel, "joints.1.name", varint(len(text)) + text)
         shelf.edited(f"text-{name}", "SKEL; Conventions", f"A name with {purpose}.", SKEL=edit)
 
 
 def _many_joints(shelf: Broken) -> None:
     joints = varint(4097) + b"\0" * 5 * 4097
     crafter = Crafter()
-    empty = build(payloads.SKEL, _SKELETON, "SKEL")
-    crafter.shared(b"SKEL", put(payloads.SKEL, "joints", joints)(empty))
+    empty = built(payloads.Skel, _SKELETON, "SKEL")
+    crafter.shared(b"SKEL", put(payloads.Skel, "joints", joints)(empty))
     purpose = "A skeleton of 4,097 joints in the base profile, and no clip."
     shelf.add("joints-limit", "SKEL; Limits and profiles", purpose, finished(crafter))
 
 
 def _infinite_unit(shelf: Broken) -> None:
     infinite = b"\1" + np.array([np.inf], "<f8").tobytes()
-    edit = put(payloads.SKEL, "unit_cm", infinite)
+    edit = put(payloads.Skel, "unit_cm", infinite)
     shelf.edited("unit-infinite", "SKEL", "An infinite length unit.", SKEL=edit)
 
 

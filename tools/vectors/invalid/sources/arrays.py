@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcz.formats.arrays.layout import ARRAY_DETAIL, Kind, Piece
+from mcz.formats.arrays.layout import ArrayDetail, Kind, Piece
 from mcz.motion import Motion, Signal, Source
-from mcz.schema import build, varint
+from mcz.schema import varint
+from tools.records import built
 from tools.vectors.build.array_files import (
     SPEC,
     floats,
@@ -68,7 +69,7 @@ def _fields(shelf: Unrestorable, plain: Motion) -> None:
 def _stated(plain: Motion, template: bytes, parts: list[bytes], whole: bytes) -> Motion:
     """``plain`` with a source of these parts that states size and hash of ``whole``."""
     assert plain.source is not None
-    detail = build(ARRAY_DETAIL, {"parts": parts}, "detail")
+    detail = built(ArrayDetail, {"parts": parts}, "detail")
     source = Source(plain.source.format, template, detail, path=plain.source.path)
     return with_source(replace(plain, source=source), whole)
 

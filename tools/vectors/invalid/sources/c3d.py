@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcz.formats.c3d_layout import C3D_DETAIL, C3D_TEMPLATE, MAX_ZEROS
+from mcz.formats.c3d_layout import MAX_ZEROS, C3dDetail, C3dField, C3dTemplate
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.schema import build, parse, varint
@@ -37,7 +37,7 @@ def _template(shelf: Unrestorable) -> None:
     beyond = b"\x80\x80\4"  # 65,536
 
     def field(path: str, new: bytes) -> Edit:
-        return put(C3D_TEMPLATE, path, new)
+        return put(C3dTemplate, path, new)
 
     cases: tuple[tuple[str, str, Motion, Edit], ...] = (
         ("processor", "a processor of 87", floats, field("processor", b"\x57")),
@@ -68,8 +68,8 @@ def _detail(shelf: Unrestorable) -> None:
     motion = take_c3d(c3d_file(first=3).build(), "prop")
     assert motion.source is not None
     cases: tuple[tuple[str, str, Edit], ...] = (
-        ("values-short", "its fields lack a byte", put(C3D_DETAIL, "values", b"\5" + bytes(5))),
-        ("values-long", "its fields have a byte more", put(C3D_DETAIL, "values", b"\7" + bytes(7))),
+        ("values-short", "its fields lack a byte", put(C3dDetail, "values", b"\5" + bytes(5))),
+        ("values-long", "its fields have a byte more", put(C3dDetail, "values", b"\7" + bytes(7))),
         ("values", "another number of the last frame", _last_frame),
         ("tail", "a byte behind it, which is closed", plus(b"\0")),
         ("cut", "it ends early", lambda data: data[:-1]),
@@ -86,11 +86,11 @@ def _zeros(shelf: Unrestorable) -> None:
     motion = take_c3d(whole, "prop")
     source = motion.source
     assert source is not None
-    n_zeros = parse(C3D_DETAIL, source.detail, "detail").zeros
+    n_zeros = parse(C3dDetail, source.detail, "detail").zeros
     whole += bytes(MAX_ZEROS + 1 - n_zeros)
     more = replace(
         source,
-        detail=put(C3D_DETAIL, "zeros", varint(MAX_ZEROS + 1))(source.detail),
+        detail=put(C3dDetail, "zeros", varint(MAX_ZEROS + 1))(source.detail),
         size=len(whole),
         sha256=hashlib.sha256(whole).digest(),
     )
@@ -111,7 +111,7 @@ def _signals(shelf: Unrestorable) -> None:
     )
 
     def field(path: str, new: int) -> Edit:
-        return put(C3D_TEMPLATE, path, bytes((new,)))
+        return put(C3dTemplate, path, bytes((new,)))
 
     cases: tuple[tuple[str, str, Motion, Sequence[Edit]], ...] = (
         ("points", "three points of two", floats, [field("points", 3)]),
@@ -135,34 +135,34 @@ def _fields(shelf: Unrestorable) -> None:
     text = c3d_file(first=3).build()
     motion = take_c3d(text, "prop")
     assert motion.source is not None
-    detail = parse(C3D_DETAIL, motion.source.detail, "detail")
-    values = detail["values"]
-    longer = put(C3D_DETAIL, "values", varint(len(values) + 1) + values + b"\0")
+    detail = parse(C3dDetail, motion.source.detail, "detail")
+    values = detail.values
+    longer = put(C3dDetail, "values", varint(len(values) + 1) + values + b"\0")
     purpose = "A detail of C3D: a byte behind the values of all fields."
     shelf.add(
         "c3d-detail-values-and-byte", C3D_SPEC, purpose, file_of(with_source(motion, text, longer))
     )
     swapped = values[2:4] + values[:2] + values[4:]
-    edit = put(C3D_DETAIL, "values", varint(len(values)) + swapped)
+    edit = put(C3dDetail, "values", varint(len(values)) + swapped)
     data = file_of(with_source(motion, text, edit), SRCE=with_template(_descending))
     purpose = "A template of C3D: its first two fields, with their values, in another order."
     shelf.add("c3d-template-field-descending", C3D_SPEC, purpose, data)
-    edit = put(C3D_DETAIL, "values", varint(len(values) + 2) + values + b"\0\0")
+    edit = put(C3dDetail, "values", varint(len(values) + 2) + values + b"\0\0")
     data = file_of(with_source(motion, text, edit), SRCE=with_template(_behind))
     purpose = "A template of C3D: a field more, the last byte of which is not in head."
     shelf.add("c3d-template-field-half", C3D_SPEC, purpose, data)
 
 
 def _descending(template: bytes) -> bytes:
-    fields = parse(C3D_TEMPLATE, template, "template")
+    fields = parse(C3dTemplate, template, "template")
     fields.fields[0], fields.fields[1] = fields.fields[1], fields.fields[0]
-    return build(C3D_TEMPLATE, fields, "template")
+    return build(fields, "template")
 
 
 def _behind(template: bytes) -> bytes:
-    fields = parse(C3D_TEMPLATE, template, "template")
-    fields.fields.append({"at": len(fields.head) - 1, "kind": 0})
-    return build(C3D_TEMPLATE, fields, "template")
+    fields = parse(C3dTemplate, template, "template")
+    fields.fields.append(C3dField(at=len(fields.head) - 1, kind=0))
+    return build(fields, "template")
 
 
 def _parts_and_signals(shelf: Unrestorable) -> None:
@@ -170,10 +170,10 @@ def _parts_and_signals(shelf: Unrestorable) -> None:
     text = c3d_file(first=3, tail=b"behind" + bytes(506)).build()
     motion = take_c3d(text, "prop")
     assert motion.source is not None
-    detail = parse(C3D_DETAIL, motion.source.detail, "detail")
+    detail = parse(C3dDetail, motion.source.detail, "detail")
     tail = detail.tail
-    moved = put(C3D_DETAIL, "tail", varint(len(tail) - 1) + tail[1:])
-    gap = put(C3D_TEMPLATE, "gap", b"\1" + tail[:1])
+    moved = put(C3dDetail, "tail", varint(len(tail) - 1) + tail[1:])
+    gap = put(C3dTemplate, "gap", b"\1" + tail[:1])
     data = file_of(with_source(motion, text, moved), SRCE=with_template(gap))
     purpose = "A template of C3D: the first byte of the tail as a gap before no rotations."
     shelf.add("c3d-template-gap-moved", C3D_SPEC, purpose, data)
@@ -186,7 +186,7 @@ def _parts_and_signals(shelf: Unrestorable) -> None:
     )
     whole = c3d_file(size=2).build() + rotations.values.astype("<i2").tobytes()
     motion = replace(integers, signals=(*integers.signals, rotations))
-    edit = put(C3D_TEMPLATE, "rotations", b"\1")
+    edit = put(C3dTemplate, "rotations", b"\1")
     data = file_of(with_source(motion, whole), SRCE=with_template(edit))
     purpose = "A template of C3D: rotations of integers, which the clip has."
     shelf.add("c3d-template-rotations-there", C3D_SPEC, purpose, data)
@@ -208,9 +208,9 @@ def _range(shelf: Unrestorable) -> None:
     whole = far + text[1:]
 
     def moved(template: bytes) -> bytes:
-        fields = parse(C3D_TEMPLATE, template, "template")
-        fields.update({"head": far + fields["head"][1:]})
-        return build(C3D_TEMPLATE, fields, "template")
+        fields = parse(C3dTemplate, template, "template")
+        fields.head = far + fields.head[1:]
+        return build(fields, "template")
 
     digest = hashlib.sha256(whole).digest()
     source = replace(left.source, size=len(whole), sha256=digest)

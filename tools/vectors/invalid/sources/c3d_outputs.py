@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mcz.formats.c3d_layout import C3D_OUTPUTS_TEMPLATE
+from mcz.formats.c3d_layout import C3dOutputsTemplate
 from mcz.schema import varint
 from tools.vectors.build.c3d_files import C3D_SPEC, c3d_outputs, take_c3d
 from tools.vectors.build.edits import Edit, plus, put
@@ -17,7 +17,7 @@ def add(shelf: Unrestorable) -> None:
     motion = take_c3d(c3d_outputs().build(), "prop")
 
     def runs(*sizes: int) -> Edit:
-        return put(C3D_OUTPUTS_TEMPLATE, "outputs", b"".join(map(varint, (len(sizes), *sizes))))
+        return put(C3dOutputsTemplate, "outputs", b"".join(map(varint, (len(sizes), *sizes))))
 
     cases = (
         ("run-of-none", "a run of no points, amid the right ones", runs(1, 1, 0, 0, 1, 1, 1)),

@@ -31,7 +31,7 @@ def _unsupported_source(shelf: Broken) -> None:
     first, second = (replace(take(PLAIN, name), name=name) for name in ("first", "second"))
     crafter = Crafter()
     crafter.clip(first, codec=replace(raw.CODEC, id=2**20))
-    crafter.edits["CEND"] = put(payloads.CEND, "source_sha256", b"\1" + b"s" * 32)
+    crafter.edits["CEND"] = put(payloads.Cend, "source_sha256", b"\1" + b"s" * 32)
     crafter.clip(second)
     purpose = "A source with another hash, behind one of a clip whose codec is unknown."
     shelf.add("hash-behind-unknown-codec", "CEND; Strict reading", purpose, finished(crafter))
@@ -49,12 +49,12 @@ def _clip(shelf: Broken) -> None:
         path = varint(len(text)) + text.encode()
         cases.append((f"path-{name}", "CLIP", f"The path {text!r}.", "source.0.path", path))
     for name, kind, purpose, path, new in cases:
-        edit = put(getattr(payloads, kind), path, new)
+        edit = put(getattr(payloads, kind.capitalize()), path, new)
         data = file_of(take(PLAIN, "plain"), **{kind: edit})
         shelf.add(name, f"{kind}; {HEADING}", f"A source: {purpose}", data)
     edits = {
-        "SRCE": put(payloads.SRCE, "format", b"\1"),
-        "CLIP": put(payloads.CLIP, "source.0.format", b"\1"),
+        "SRCE": put(payloads.Srce, "format", b"\1"),
+        "CLIP": put(payloads.Clip, "source.0.format", b"\1"),
     }
     purpose = "A clip whose source is an ASF file, which is one of a skeleton."
     data = file_of(take(PLAIN, "plain"), **edits)
@@ -68,7 +68,7 @@ def _acclaim(shelf: Broken) -> None:
         ("size", "size", b"\1"),
         ("template-missing", "template", b"t" * 16),
     ):
-        crafter = Crafter(SKEL=put(payloads.SKEL, f"source.0.{field}", new))
+        crafter = Crafter(SKEL=put(payloads.Skel, f"source.0.{field}", new))
         crafter.alias("small.asf", payloads.OF_SKELETON, write_skeleton(crafter, skeleton))
         purpose = f"The source of a skeleton: another {field}."
         shelf.add(f"ASF-{name}", f"SKEL; {HEADING}", purpose, finished(crafter))
@@ -92,7 +92,7 @@ def _other_skeletons(shelf: Unrestorable) -> None:
         ("parent", "another parent", "joints.2.parent", b"\1"),
     )
     for name, purpose, field, new in cases:
-        crafter = Crafter(SKEL=put(payloads.SKEL, field, new))
+        crafter = Crafter(SKEL=put(payloads.Skel, field, new))
         crafter.alias("small.asf", payloads.OF_SKELETON, write_skeleton(crafter, skeleton))
         said = f"A skeleton has {purpose}; its source, of right size and hash, has not."
         shelf.add(f"ASF-other-{name}", f"SKEL; {HEADING}", said, finished(crafter))
@@ -120,7 +120,7 @@ def _skeletons(shelf: Unrestorable) -> None:
         edits: dict[str, Edit] = {}
         for kind, new in formats.items():
             path = "format" if kind == "SRCE" else "source.0.format"
-            edits[kind] = put(getattr(payloads, kind), path, new)
+            edits[kind] = put(getattr(payloads, kind.capitalize()), path, new)
         crafter = Crafter(**edits)
         crafter.alias("small.asf", payloads.OF_SKELETON, write_skeleton(crafter, skeleton))
         purpose = f"The source of a skeleton: its format is {what}."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mcz.container.segments import FRAME_NOTES
-from mcz.formats.notes import NOTES
+from mcz.formats.notes import Notes
 from mcz.schema import varint
 from tools.vectors.build.edits import Edit, Made, plus, put, span, stream
 from tools.vectors.build.files import Broken, Unrestorable, file_of
@@ -22,9 +22,9 @@ def add(shelf: Unrestorable) -> None:
 
 def _notes(shelf: Broken) -> None:
     cases: tuple[tuple[str, str, Edit], ...] = (
-        ("pattern", "a pattern beyond the last", put(NOTES, "patterns.0.pattern", b"\x09")),
-        ("rows", "a run behind the last row", put(NOTES, "patterns.0.n_rows", b"\x09")),
-        ("no-rows", "a run of no rows", put(NOTES, "patterns.0.n_rows", b"\0")),
+        ("pattern", "a pattern beyond the last", put(Notes, "patterns.0.pattern", b"\x09")),
+        ("rows", "a run behind the last row", put(Notes, "patterns.0.n_rows", b"\x09")),
+        ("no-rows", "a run of no rows", put(Notes, "patterns.0.n_rows", b"\0")),
         ("tail", "a byte behind them, which are closed", plus(b"\0")),
     )
     for name, purpose, edit in cases:
@@ -80,7 +80,7 @@ def _without_effect(shelf: Unrestorable) -> None:
     """Notes that change nothing in the text."""
 
     def parted(notes: bytes) -> bytes:
-        start, _ = span(NOTES, notes, "patterns.0")
+        start, _ = span(Notes, notes, "patterns.0")
         assert notes[0] < 127
         return bytes((notes[0] + 1,)) + notes[1:start] + b"\0\0" + notes[start:]
 

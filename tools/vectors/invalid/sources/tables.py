@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.formats.layout import DETAIL, PATTERN
-from mcz.formats.table_layout import CLOCK, SECTION, TABLE_DETAIL, TABLE_TEMPLATE
-from mcz.formats.table_notes import TABLE_NOTES
+from mcz.formats.layout import Detail, PatternFields
+from mcz.formats.table_layout import ClockFields, SectionFields, TableDetail, TableTemplate
+from mcz.formats.table_notes import TableNotesFields
 from mcz.motion import Motion
 from mcz.numbers import GRID, Grid, GridKind
-from mcz.schema import build, parse, varint
+from mcz.schema import parse, varint
+from tools.records import built
 from tools.vectors.build.edits import Edit, plus, put
 from tools.vectors.build.files import Unrestorable, file_of
 from tools.vectors.build.source_files import restored, unhashed, with_source, with_template
@@ -28,7 +29,7 @@ def add(shelf: Unrestorable) -> None:
 
 
 def _field(path: str, new: bytes) -> Edit:
-    return put(TABLE_TEMPLATE, f"sections.0.{path}", new)
+    return put(TableTemplate, f"sections.0.{path}", new)
 
 
 def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
@@ -46,7 +47,7 @@ def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
         data = file_of(motion, SRCE=with_template(edit))
         shelf.add(f"table-{name}", SPEC, f"A template of a table: {purpose}.", data)
     assert plain.source is not None
-    detail = put(TABLE_DETAIL, "details.0.ends", b"\2")(plain.source.detail)
+    detail = put(TableDetail, "details.0.ends", b"\2")(plain.source.detail)
     data = file_of(replace(plain, source=replace(plain.source, detail=detail)))
     shelf.add("table-ends", SPEC, "A detail of a table: ends is 2.", data)
 
@@ -57,7 +58,7 @@ def _column(number: bytes) -> Edit:
 
 def _two_clocks(template: bytes) -> bytes:
     clock = {"grid": Grid(GridKind.FIXED, 3), "numerator": 1, "denominator": 1, "offset": 0}
-    return _field("clock", b"\2" + build(CLOCK, clock, "clock") * 2)(template)
+    return _field("clock", b"\2" + built(ClockFields, clock, "clock") * 2)(template)
 
 
 def _clocks(shelf: Unrestorable, plain: Motion) -> None:
@@ -106,12 +107,12 @@ def _both(first: Edit, then: Edit) -> Edit:
 
 
 def build_grid(grid: Grid) -> bytes:
-    return build(GRID, grid, "grid")
+    return bytes(GRID.build(grid))
 
 
 def _headers(shelf: Unrestorable, plain: Motion) -> None:
     assert plain.source is not None
-    header = parse(TABLE_TEMPLATE, plain.source.template, "template").sections[0].header
+    header = parse(TableTemplate, plain.source.template, "template").sections[0].header
     edit = _field("header", varint(len(header) + 1) + header + b"\0")
     data = file_of(with_source(plain, MARKERS), SRCE=with_template(edit))
     shelf.add("table-names", SPEC, "A template of a table: three names of two joints.", data)
@@ -126,31 +127,31 @@ def _sections(shelf: Unrestorable) -> None:
         data = file_of(with_source(motion, text))
         shelf.add(f"table-{name}", SPEC, f"Sections of a table: {purpose}.", data)
 
-    sections = parse(TABLE_TEMPLATE, plain.source.template, "template").sections
-    details = parse(TABLE_DETAIL, plain.source.detail, "detail").details
+    sections = parse(TableTemplate, plain.source.template, "template").sections
+    details = parse(TableDetail, plain.source.detail, "detail").details
 
-    def built(chosen: Any, own: Any) -> Motion:
-        template = build(TABLE_TEMPLATE, {"sections": chosen}, "template")
-        detail = build(TABLE_DETAIL, {"details": own}, "detail")
+    def with_sections(chosen: Any, own: Any) -> Motion:
+        template = built(TableTemplate, {"sections": chosen}, "template")
+        detail = built(TableDetail, {"details": own}, "detail")
         return replace(plain, source=replace(plain.source, template=template, detail=detail))
 
     parts = VICON.split(b"\n\n")
     parts[1:] = [b"\n" + part for part in parts[1:]]
     parts[0] += b"\n"
     parts[1] += b"\n"
-    add("sections-none", "there are none", built([], []), b"")
-    blank = {**sections[0], "header": b"", "patterns": [], "gaps": []}
-    more = [{**blank, "signals": [k]} for k in range(3, 65)]
+    add("sections-none", "there are none", with_sections([], []), b"")
+    blank = replace(sections[0], header=b"", patterns=[], gaps=[])
+    more = [replace(blank, signals=[k]) for k in range(3, 65)]
     add("sections-65", "there are 65", _many(plain, more))
-    fewer = built(sections, details[:-1])
+    fewer = with_sections(sections, details[:-1])
     add("sections-details", "a detail is missing", fewer, parts[0] + parts[1])
     for name, purpose, numbers in (
         ("none", "one has no signals", []),
         ("beyond", "a signal that there is not", [1, 3]),
     ):
-        odd = [{**sections[0], "signals": numbers}, *sections[1:]]
-        add(f"signals-{name}", purpose, built(odd, details))
-    again = built([*sections, sections[-1]], [*details, details[-1]])
+        odd = [replace(sections[0], signals=numbers), *sections[1:]]
+        add(f"signals-{name}", purpose, with_sections(odd, details))
+    again = with_sections([*sections, sections[-1]], [*details, details[-1]])
     add("signals-twice", "a signal that another has", again, VICON + parts[-1])
     add("rows", "signals that differ in their rows a frame", *_mixed(plain))
     _notes(shelf, plain)
@@ -182,7 +183,7 @@ def _notes(shelf: Unrestorable, plain: Motion) -> None:
 
 
 def _noted(shelf: Unrestorable, plain: Motion, name: str, purpose: str, each: Any) -> None:
-    notes = _Notes(build(TABLE_NOTES, {"sections": each}, "notes"))
+    notes = _Notes(built(TableNotesFields, {"sections": each}, "notes"))
     assert plain.source is not None
     noted = replace(plain, source=replace(plain.source, notes=notes))
     data = file_of(with_source(noted, VICON))
@@ -192,13 +193,13 @@ def _noted(shelf: Unrestorable, plain: Motion, name: str, purpose: str, each: An
 def _details(shelf: Unrestorable, plain: Motion) -> None:
     """What is said of patterns and details holds for the second section, too."""
     assert plain.source is not None
-    patterns = parse(TABLE_TEMPLATE, plain.source.template, "template").sections[1].patterns
-    pattern = build(PATTERN, patterns[0], "pattern")
+    patterns = parse(TableTemplate, plain.source.template, "template").sections[1].patterns
+    pattern = built(PatternFields, patterns[0], "pattern")
     own = "sections.1.patterns"
     template_cases: tuple[tuple[str, str, Edit], ...] = (
-        ("two-patterns", "two patterns", put(TABLE_TEMPLATE, own, b"\2" + pattern * 2)),
-        ("run-of-none", "no columns", put(TABLE_TEMPLATE, f"{own}.0.runs.1.n_columns", b"\0")),
-        ("column-twice", "a column twice", put(TABLE_TEMPLATE, f"{own}.0.runs.1.column", b"\0")),
+        ("two-patterns", "two patterns", put(TableTemplate, own, b"\2" + pattern * 2)),
+        ("run-of-none", "no columns", put(TableTemplate, f"{own}.0.runs.1.n_columns", b"\0")),
+        ("column-twice", "a column twice", put(TableTemplate, f"{own}.0.runs.1.column", b"\0")),
     )
     for name, purpose, edit in template_cases:
         data = file_of(with_source(plain, VICON), SRCE=with_template(edit))
@@ -209,7 +210,7 @@ def _details(shelf: Unrestorable, plain: Motion) -> None:
         ("gap-beyond", "a pattern with a gap that is not", "patterns", b"\1\0\x7f"),
     )
     for name, purpose, field, new in detail_cases:
-        edit = put(TABLE_DETAIL, f"details.1.{field}", new)
+        edit = put(TableDetail, f"details.1.{field}", new)
         data = file_of(with_source(plain, VICON, detail=edit))
         shelf.add(f"table-{name}", SPEC, f"The second section of a table: {purpose}.", data)
 
@@ -227,14 +228,16 @@ class _Notes:
 def _many(plain: Motion, more: Any) -> Motion:
     """As many sections of signals that say nothing."""
     assert plain.source is not None
-    fields = parse(TABLE_TEMPLATE, plain.source.template, "template")
-    own = parse(TABLE_DETAIL, plain.source.detail, "detail")
+    fields = parse(TableTemplate, plain.source.template, "template")
+    own = parse(TableDetail, plain.source.detail, "detail")
     signals = [replace(plain.signals[2], name=str(k)) for k in range(len(more))]
     usual = {"count": b"", "rows": 0, "gaps": [], "patterns": [], "ends": 0, "ending": b""}
     count = varint(3 + len(more))
-    template = count + b"".join(build(SECTION, s, "section") for s in [*fields.sections, *more])
+    template = count + b"".join(
+        built(SectionFields, s, "section") for s in [*fields.sections, *more]
+    )
     detail = count + b"".join(
-        build(DETAIL, d, "detail") for d in [*own.details, *[usual] * len(more)]
+        built(Detail, d, "detail") for d in [*own.details, *[usual] * len(more)]
     )
     source = replace(plain.source, template=template, detail=detail)
     return replace(plain, signals=(*plain.signals, *signals), source=source)
@@ -245,13 +248,13 @@ def _mixed(plain: Motion) -> tuple[Motion, bytes]:
     signals = tuple(signal.cut(0, 0) for signal in plain.signals)
     empty = unhashed(replace(plain, signals=signals, frame_numbers=None))
     assert empty.source is not None
-    fields = parse(TABLE_TEMPLATE, empty.source.template, "template")
+    fields = parse(TableTemplate, empty.source.template, "template")
     first, other, last = fields.sections
-    details = parse(TABLE_DETAIL, empty.source.detail, "detail").details
-    detail = build(TABLE_DETAIL, {"details": [details[0], details[2]]}, "detail")
+    details = parse(TableDetail, empty.source.detail, "detail").details
+    detail = built(TableDetail, {"details": [details[0], details[2]]}, "detail")
 
     def made() -> Motion:
-        template = build(TABLE_TEMPLATE, {"sections": [first, last]}, "template")
+        template = built(TableTemplate, {"sections": [first, last]}, "template")
         source = replace(plain.source, template=template, detail=detail, size=0, sha256=b"")
         return replace(empty, source=source)
 

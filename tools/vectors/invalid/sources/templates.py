@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from mcz.codecs.lossless import lossless
-from mcz.formats.layout import DETAIL, TEMPLATE
+from mcz.formats.layout import Detail, Template
 from mcz.motion import Motion
-from mcz.schema import build, parse, varint
+from mcz.schema import parse, varint
+from tools.records import built
 from tools.vectors.build.edits import Edit, plus, put, span
 from tools.vectors.build.files import Broken, Unrestorable, file_of
 from tools.vectors.build.source_files import (
@@ -39,7 +41,7 @@ def _template(shelf: Broken) -> None:
     plain = take(PLAIN, "plain")
 
     def field(path: str, new: bytes) -> Edit:
-        return put(TEMPLATE, path, new)
+        return put(Template, path, new)
 
     cases: tuple[tuple[str, str, Edit], ...] = (
         ("tail", "a byte behind it, which is closed", plus(b"\0")),
@@ -63,15 +65,15 @@ def _template(shelf: Broken) -> None:
 
 
 def _second_pattern(template: bytes) -> bytes:
-    start, stop = span(TEMPLATE, template, "patterns.0")
+    start, stop = span(Template, template, "patterns.0")
     pattern = template[start:stop]
-    return put(TEMPLATE, "patterns", b"\2" + pattern * 2)(template)
+    return put(Template, "patterns", b"\2" + pattern * 2)(template)
 
 
 def _shorter(motion: Motion) -> bytes:
     """The two parts of the header, the second without its last byte."""
     assert motion.source is not None
-    fields = parse(TEMPLATE, motion.source.template, "template")
+    fields = parse(Template, motion.source.template, "template")
     first, second = fields.header
     return b"\2" + varint(len(first)) + first + varint(len(second) - 1) + second[:-1]
 
@@ -90,7 +92,7 @@ def _details(shelf: Broken) -> None:
     )
     for name, purpose, motion, path, new in cases:
         assert motion.source is not None
-        detail = put(DETAIL, path, new)(motion.source.detail)
+        detail = put(Detail, path, new)(motion.source.detail)
         data = file_of(replace(motion, source=replace(motion.source, detail=detail)))
         spec = f"Templates and details; {HEADING}"
         shelf.add(f"detail-{name}", spec, f"A detail: {purpose}.", data)
@@ -105,9 +107,9 @@ def _limits(shelf: Broken) -> None:
     shelf.add("template-gaps-many", spec, "A template: 2^20 + 1 gaps.", data)
     purpose = "A template: more than 2^20 bytes of gaps in a row."
     shelf.add("template-gap-size", spec, purpose, _wide(2, b"\n" + b" " * 2**20))
-    no_patterns = put(TEMPLATE, "patterns", b"\0")
+    no_patterns = put(Template, "patterns", b"\0")
     assert plain.source is not None
-    own = put(DETAIL, "patterns", b"\1\0\0")(plain.source.detail)
+    own = put(Detail, "patterns", b"\1\0\0")(plain.source.detail)
     source = replace(plain.source, detail=own)
     data = file_of(replace(plain, source=source), SRCE=with_template(no_patterns))
     purpose = "A pattern of the detail, but none of the template."
@@ -122,7 +124,7 @@ def _limits(shelf: Broken) -> None:
 
 
 def _many_gaps(template: bytes) -> bytes:
-    start, stop = span(TEMPLATE, template, "gaps")
+    start, stop = span(Template, template, "gaps")
     old = template[start:stop]
     n = old[0]
     return template[:start] + varint(2**20 + 1) + old[1:] + bytes(2**20 + 1 - n) + template[stop:]
@@ -134,13 +136,13 @@ def _wide(n_rows: int, tail: bytes) -> bytes:
     row = b"1 2 3 4 5 6 7 8 9"
     motion = take(head + (row + b"\n") * n_rows, "bomb")
     assert motion.source is not None
-    fields = parse(TEMPLATE, motion.source.template, "template")
+    fields = parse(Template, motion.source.template, "template")
     place = fields.patterns[0].tail
     assert fields.gaps[place] == b"\n"
     fields.gaps[place] = tail
     whole = head + (row + tail) * n_rows
     digest = hashlib.sha256(whole).digest()
-    template = build(TEMPLATE, fields, "template")
+    template = built(Template, fields, "template")
     source = replace(motion.source, template=template, size=len(whole), sha256=digest)
     return file_of(replace(motion, source=source), codec=lossless.CODEC)
 
@@ -149,10 +151,10 @@ def _same_text(shelf: Unrestorable) -> None:
     plain = take(PLAIN, "plain")
 
     def third_part(template: bytes) -> bytes:
-        fields = parse(TEMPLATE, template, "template")
+        fields = parse(Template, template, "template")
         parts = [*fields.header, b""]
         listed = varint(3) + b"".join(varint(len(part)) + part for part in parts)
-        return put(TEMPLATE, "header", listed)(template)
+        return put(Template, "header", listed)(template)
 
     cases: tuple[tuple[str, str, Edit], ...] = (
         ("header-empty-part", "a third part of the header, which is empty", third_part),
@@ -160,7 +162,7 @@ def _same_text(shelf: Unrestorable) -> None:
         (
             "run-gap",
             "a run with a gap beyond the last",
-            put(TEMPLATE, "patterns.0.runs.1.gap", b"c"),
+            put(Template, "patterns.0.runs.1.gap", b"c"),
         ),
     )
     for name, purpose, edit in cases:
@@ -193,9 +195,9 @@ def _rows(rows: list[list[float]], *, numbered: bool = False) -> bytes:
 
 
 def _edit_runs(template: bytes, edit: Callable[[list[dict[str, int]]], object]) -> bytes:
-    fields = parse(TEMPLATE, template, "template")
+    fields = parse(Template, template, "template")
     edit(fields.patterns[0].runs)
-    return build(TEMPLATE, fields, "template")
+    return built(Template, fields, "template")
 
 
 def _run_of_none(template: bytes) -> bytes:
@@ -206,8 +208,8 @@ def _run_of_none(template: bytes) -> bytes:
 def _first_again(template: bytes) -> bytes:
     run = {"gap": 1, "column": 1, "n_columns": 1, "width": 0}
 
-    def edit(runs: list[dict[str, int]]) -> None:
-        run["gap"] = runs[-1]["gap"]
+    def edit(runs: list[Any]) -> None:
+        run["gap"] = runs[-1].gap
         runs.append(run)
 
     return _edit_runs(template, edit)
@@ -216,8 +218,8 @@ def _first_again(template: bytes) -> bytes:
 def _with_number(template: bytes) -> bytes:
     """One run of ten columns behind a blank each, from the frame number on."""
 
-    def edit(runs: list[dict[str, int]]) -> None:
-        runs[:] = [{"gap": runs[-1]["gap"], "column": 0, "n_columns": 10, "width": 0}]
+    def edit(runs: list[Any]) -> None:
+        runs[:] = [{"gap": runs[-1].gap, "column": 0, "n_columns": 10, "width": 0}]
 
     return _edit_runs(template, edit)
 
@@ -232,13 +234,13 @@ def _patterns(shelf: Unrestorable) -> None:
     """Patterns that no row needs, or that the template should have."""
     plain = take(PLAIN, "plain")
     many = varint(1024) + b"\0\0" * 1024
-    data = file_of(with_source(plain, PLAIN, put(DETAIL, "patterns", many)))
+    data = file_of(with_source(plain, PLAIN, put(Detail, "patterns", many)))
     purpose = "A detail: 1,024 further patterns that no row has."
     shelf.add("detail-patterns-unused", TEMPLATE_SPEC, purpose, data)
     assert plain.source is not None
-    start, stop = span(TEMPLATE, plain.source.template, "patterns.0")
+    start, stop = span(Template, plain.source.template, "patterns.0")
     pattern = plain.source.template[start:stop]
-    motion = with_source(plain, PLAIN, put(DETAIL, "patterns", b"\1" + pattern))
-    data = file_of(motion, SRCE=with_template(put(TEMPLATE, "patterns", b"\0")))
+    motion = with_source(plain, PLAIN, put(Detail, "patterns", b"\1" + pattern))
+    data = file_of(motion, SRCE=with_template(put(Template, "patterns", b"\0")))
     purpose = "A detail: the pattern of all rows, which the template should have."
     shelf.add("detail-pattern-of-all", TEMPLATE_SPEC, purpose, data)

@@ -44,7 +44,7 @@ WAVES = ("mrdwt", "dwt", "awt")
 WINDOWS = (CLIP, MDTT, PCA_RDO)
 LONG = 66_000  # frames, more than 65,535
 FRAMES = 7  # of a sample
-OPENED = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+OPENED = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
 
 
 def add(shelf: Whole, name: str) -> None:

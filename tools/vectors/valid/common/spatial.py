@@ -46,7 +46,7 @@ def add(shelf: Spaces) -> None:
         ("joint", b"\1", "of the only joint"),
         ("listed", b"\3\1\3", "that is listed"),
     ):
-        said = put(payloads.CLIP, "signals.0.groups", kind)
+        said = put(payloads.Clip, "signals.0.groups", kind)
         purpose = f"One group of all channels, {purpose}."
         shelf.plan(f"groups-{name}", purpose, plan, [(2, 3)], spec="CLIP", CLIP=said)
     plan = Plan(shelf.codec, 9, (16, 16, 18), apart=True)

@@ -79,7 +79,7 @@ def _waves(shelf: Whole, name: str) -> None:
     )
     hold("resolutions-2", "2 resolutions of 3 levels: the finest details are not stored.", plan, 2)
     plan = wavelet_clips.Plan(12, wavelet_clips.DB2, 2)
-    listed = put(payloads.CLIP, "signals.0.groups", b"\3\3\1\1\1")
+    listed = put(payloads.Clip, "signals.0.groups", b"\3\3\1\1\1")
     purpose = "Groups by another name (listed), still one a channel."
     hold("groups-listed", purpose, plan, 3, CLIP=listed)
     purpose = "Values are not rounded to the grids, one of which is INTEGER."

@@ -53,7 +53,7 @@ def _groups(shelf: Streams) -> None:
         spec = f"{HEADING}; CLIP"
         name = f"groups-{grouping}"
         shelf.code(name, purpose, motion, (), spec, grouping=grouping, parts=parts)
-    listed = put(payloads.CLIP, "signals.0.groups", b"\3\1\6")
+    listed = put(payloads.Clip, "signals.0.groups", b"\3\1\6")
     purpose = "Groups of kind 3, one of all channels."
     part = {"parts": parts, "grouping": "all", "CLIP": listed}
     shelf.code("groups-listed", purpose, motion, (), f"{HEADING}; CLIP", **part)

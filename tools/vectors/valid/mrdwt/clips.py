@@ -13,8 +13,8 @@ from mcz.codecs.wavelet.streams import CONSTANT
 from mcz.container import payloads
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build
 from mcz.transforms.wavelets import MAX_LEVELS
+from tools.records import built
 from tools.vectors.build.cuts import CUT_HEADING, as_shown, cut, shown, window
 from tools.vectors.build.edits import Made, put
 from tools.vectors.build.files import Crafter, file_of, finished
@@ -124,7 +124,7 @@ def _groups(shelf: Waves) -> None:
     spec, requests = f"{HEADING}; CLIP", [(1, (3, 9), (2, 0))]
     for name, how in (
         ("joint", {"grouping": "joint"}),
-        ("listed", {"CLIP": put(payloads.CLIP, "signals.0.groups", b"\3\3\1\1\1")}),
+        ("listed", {"CLIP": put(payloads.Clip, "signals.0.groups", b"\3\3\1\1\1")}),
     ):
         purpose = f"Groups by another name ({name}), still one a channel."
         about: dict[str, Any] = {"spec": spec, "motion": motion, "requests": requests}
@@ -236,7 +236,7 @@ def _cuts(shelf: Waves) -> None:
 
 def _record(entries: dict[str, str], extension: bytes = b"") -> bytes:
     rows = [{"key": key, "value": value} for key, value in entries.items()]
-    return build(payloads.QUAL, {"entries": rows, "extension": extension}, "QUAL")
+    return built(payloads.Qual, {"entries": rows, "extension": extension}, "QUAL")
 
 
 def _of_spine(motion: Motion) -> Motion:

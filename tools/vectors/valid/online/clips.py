@@ -71,7 +71,7 @@ def _clips(shelf: Groups) -> None:
     motion = motion_of(plan, signals=(Signal(values_of(plan), grids),))
     purpose = "Values are not rounded to the grids, one of which is INTEGER."
     shelf.plan("grids", purpose, plan, motion=motion, spec="Codecs; CLIP")
-    said = put(payloads.CLIP, "signals.0.groups", b"\3\1\3")
+    said = put(payloads.Clip, "signals.0.groups", b"\3\1\3")
     purpose = "One group of all channels, that is listed."
     shelf.plan("groups-listed", purpose, plan, [(2, 3)], spec="CLIP", CLIP=said)
     plan = Plan(("I16 L8", "L8", "I18"), 9, apart=True)
@@ -127,7 +127,7 @@ def _live(shelf: Groups) -> None:
     )
     for name, said, made in both("live", purpose, plan):
         shelf.plan(name, said, made, requests, **about, **live)
-    opened = edits.both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+    opened = edits.both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
     purpose = "The same, of a clip that did not know its frames, without INDX"
     for name, said, made in both("live-open", purpose, plan):
         shelf.plan(name, said, made, requests, **about, **live, CLIP=opened, index=False)

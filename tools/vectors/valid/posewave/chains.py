@@ -80,7 +80,7 @@ def _live(shelf: Poses) -> None:
     live: dict[str, Any] = {"packets": True, "frames": 1}
     purpose = "A frame a packet, of kind 2 behind the first, every fourth fresh."
     shelf.plan("live", purpose, plan, LIVE, requests, **live)
-    opened = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
+    opened = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
     purpose = "The same, of a clip that did not know its frames, without INDX."
     shelf.plan("live-open", purpose, plan, LIVE, requests, **live, CLIP=opened, index=False)
     mask = np.ones(plan.source.shape, np.bool_)

@@ -384,7 +384,7 @@ def _segments(shelf: Poses) -> None:
 def _signals(shelf: Poses) -> None:
     skeleton = acclaim()
     plan = Plan(skeleton, waves(12, skeleton))
-    listed = put(payloads.CLIP, "signals.0.groups", b"\3\1\x0c")
+    listed = put(payloads.Clip, "signals.0.groups", b"\3\1\x0c")
     shelf.plan("groups-listed", "One group of all channels, that is listed.", plan, CLIP=listed)
     motion = motion_of(plan)
     signal = replace(motion.signals[0], grids=(UNROUNDED * 4))

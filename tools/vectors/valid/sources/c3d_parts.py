@@ -11,7 +11,7 @@ import numpy as np
 from mcz.codecs import raw
 from mcz.codecs.contract import Codec
 from mcz.formats import c3d
-from mcz.formats.c3d_layout import C3D_DETAIL, C3D_TEMPLATE
+from mcz.formats.c3d_layout import C3dDetail, C3dTemplate
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.schema import build, parse
@@ -148,15 +148,15 @@ def _renumbered(shelf: Whole) -> None:
         _hold(shelf, f"renumbered{name}", purpose, motion, f"{C3D_SPEC}; Registry")
     whole = take_c3d(c3d_rotations().build(), "renumbered-rotations")
     assert whole.source is not None
-    fields = parse(C3D_DETAIL, whole.source.detail, "detail")
-    template = parse(C3D_TEMPLATE, whole.source.template, "template")
+    fields = parse(C3dDetail, whole.source.detail, "detail")
+    template = parse(C3dTemplate, whole.source.template, "template")
     kinds = [field.kind for field in template.fields]
     sizes = [4 if kind in (1, 4, 5) else 2 for kind in kinds]
     at = sum(sizes[: kinds.index(6)])
-    values = bytearray(fields["values"])
+    values = bytearray(fields.values)
     values[at : at + 2] = b"\x63\0"
-    fields.update({"values": bytes(values)})
-    source = replace(whole.source, detail=build(C3D_DETAIL, fields, "detail"))
+    fields.values = bytes(values)
+    source = replace(whole.source, detail=build(fields, "detail"))
     motion = replace(whole, source=source, frame_numbers=np.array([9, 10]))
     purpose = (
         "Other numbers of all frames: the block of the rotations stays as stated, a wrong one."

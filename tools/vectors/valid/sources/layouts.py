@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mcz.formats import amc
-from mcz.formats.layout import TEMPLATE
+from mcz.formats import amc, layout
+from mcz.formats.layout import Template
 from mcz.formats.notes import RowNotes
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
-from mcz.schema import build, parse
+from mcz.schema import parse
+from tools.records import built
 from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.source_files import (
     AMC,
@@ -40,7 +41,7 @@ def _layouts(shelf: Whole) -> None:
     motion = unhashed(blank(2, grids, "signs"))
     motion = replace(motion, signals=(Signal(table, tuple(grids)),))
     motion = _with_template(motion, lambda fields: fields.patterns[0].runs.__setitem__(
-        slice(None), [run | {"width": 1} for run in fields.patterns[0].runs]
+        slice(None), [replace(run, width=1) for run in fields.patterns[0].runs]
     ))  # fmt: skip
     _hold_text(shelf, "signs", "Width 1: a blank where no sign is, of either sort.", motion)
     for name, runs in (
@@ -67,16 +68,18 @@ def _runs(listed: Sequence[tuple[int, int, int, int]]) -> Callable[[Any], None]:
     names = "gap", "column", "n_columns", "width"
 
     def edit(fields: Any) -> None:
-        fields.patterns[0].runs[:] = [dict(zip(names, run, strict=True)) for run in listed]
+        fields.patterns[0].runs[:] = [
+            layout.RunFields(**dict(zip(names, run, strict=True))) for run in listed
+        ]
 
     return edit
 
 
 def _with_template(motion: Motion, edit: Callable[[Any], Any]) -> Motion:
     assert motion.source is not None
-    fields = parse(TEMPLATE, motion.source.template, "template")
+    fields = parse(Template, motion.source.template, "template")
     edit(fields)
-    template = build(TEMPLATE, fields, "template")
+    template = built(Template, fields, "template")
     return replace(motion, source=replace(motion.source, template=template))
 
 

@@ -14,8 +14,9 @@ from mcz.container.segments import GROUP_NOTES
 from mcz.formats import amc, asf
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
-from mcz.schema import build, varint
+from mcz.schema import varint
 from mcz.transforms.wavelets import Wavelet
+from tools.records import built
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.cuts import CUT_HEADING, cut, shown
 from tools.vectors.build.edits import Made, both, put
@@ -249,7 +250,7 @@ def _changes(shelf: Whole) -> None:
         (first, (header, streams)) = made
         none: dict[str, Any] = {"exceptions": []}
         notes = [
-            build(payloads.GROUP_NOTES, none | changes[c], "notes") if c in changes else b""
+            built(payloads.GroupNotes, none | changes[c], "notes") if c in changes else b""
             for c in range(signal.n_channels)
         ]
         return [first, (replace(header, flags=header.flags | GROUP_NOTES), [*notes, *streams])]
@@ -314,8 +315,8 @@ def _beside(shelf: Whole) -> None:
     header = wavelet_clips.header(plan)
     edits: dict[str, Callable[..., Any]] = {
         "CLIP": both(
-            put(payloads.CLIP, "signals.1.codec", b"\2"),
-            put(payloads.CLIP, "signals.1.header", varint(len(header)) + header),
+            put(payloads.Clip, "signals.1.codec", b"\2"),
+            put(payloads.Clip, "signals.1.header", varint(len(header)) + header),
         ),
         "segments": lambda made: [
             (head, wavelet_clips._segments(plan, channels)[0].streams if head.signal else streams)

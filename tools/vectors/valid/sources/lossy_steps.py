@@ -14,8 +14,8 @@ from mcz.formats import bvh, c3d
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.numbers import GridFlag as F
-from mcz.schema import build
 from tests.formats.c3d_files import DEC, SGI
+from tools.records import built
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.c3d_files import C3D_SPEC, c3d_file, take_c3d
 from tools.vectors.build.edits import Made
@@ -89,7 +89,7 @@ def _lossy_exceptions(shelf: Whole) -> None:
         found = []
         for (header, streams), column, text in zip(segments, columns, texts, strict=True):
             entry = {"row": 0, "channel": 0, "text": text}
-            note = build(payloads.GROUP_NOTES, {"grid_changes": [], "exceptions": [entry]}, "")
+            note = built(payloads.GroupNotes, {"grid_changes": [], "exceptions": [entry]}, "")
             notes = [note if c == column else b"" for c in range(6)]
             flagged = replace(header, flags=header.flags | GROUP_NOTES)
             found.append((flagged, [*notes, *streams]))

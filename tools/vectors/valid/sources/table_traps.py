@@ -9,6 +9,7 @@ import numpy as np
 
 from mcz.motion import Motion, Skeleton
 from mcz.numbers import Grid, GridKind
+from tools.records import update
 from tools.vectors.build.cuts import cut
 from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.source_files import BOTH, path_of, restored, unhashed
@@ -44,8 +45,8 @@ def _names() -> Motion:
 
     def edit(fields: Any) -> None:
         for section, header in zip(fields.sections, headers, strict=True):
-            section.update({"header": header, "marks": int(header != b"")})
-        fields.sections[2].update({"header": b"\0\0\0", "marks": 0})  # text: three of two joints
+            update(section, {"header": header, "marks": int(header != b"")})
+        update(fields.sections[2], {"header": b"\0\0\0", "marks": 0})  # text: three of two joints
 
     return with_fields(replace(plain, skeleton=Skeleton(joints)), edit)
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from mcz.formats import FORMATS
-from mcz.formats.table_layout import PHRASES, TABLE_DETAIL, TABLE_TEMPLATE
+from mcz.formats import FORMATS, layout
+from mcz.formats.table_layout import PHRASES, TableDetail, TableTemplate
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, parse
+from mcz.schema import parse
+from tools.records import built, update
 from tools.vectors.build.edits import put
 from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.source_files import BOTH, called, path_of, restored, unhashed
@@ -75,9 +76,9 @@ def with_fields(motion: Motion, edit: Callable[[Any], Any]) -> Motion:
     """``motion`` with its template edited, without the size and hash of its file."""
     motion = unhashed(motion)
     assert motion.source is not None
-    fields = parse(TABLE_TEMPLATE, motion.source.template, "template")
+    fields = parse(TableTemplate, motion.source.template, "template")
     edit(fields)
-    template = build(TABLE_TEMPLATE, fields, "template")
+    template = built(TableTemplate, fields, "template")
     return replace(motion, source=replace(motion.source, template=template))
 
 
@@ -97,10 +98,10 @@ def _sections(shelf: Whole) -> None:
 
     def timed(fields: Any) -> None:
         section = fields.sections[0]
-        section.clock.append(clock)
+        update(section, {"clock": clock})
         runs = section.patterns[0].runs  # what was the number within the frame is the time now
         last = max(run.column + run.n_columns for run in runs)
-        runs.append({**runs[-1], "column": last, "n_columns": 1})
+        runs.append(replace(runs[-1], column=last, n_columns=1))
 
     purpose = "A clock of two rows a frame, and the numbers within frames behind."
     _hold(shelf, "sections-clock", purpose, with_fields(plain, timed))
@@ -136,7 +137,7 @@ def _clocks(shelf: Whole) -> None:
             fields: Any, given: tuple[int, int, int] = (offset, numerator, denominator)
         ) -> None:
             names = ("offset", "numerator", "denominator")
-            fields.sections[0].clock[0].update(zip(names, given, strict=True))
+            update(fields.sections[0].clock, dict(zip(names, given, strict=True)))
 
         purpose = f"A clock that is {name}: its quotients are rounded down."
         _hold(shelf, f"clock-{name}", purpose, with_fields(plain, edit))
@@ -145,17 +146,19 @@ def _clocks(shelf: Whole) -> None:
 def _headers(shelf: Whole) -> None:
     plain = take_table(MARKERS, "marks.trc")
     every = b"".join(bytes((mark,)) + b"|" for mark in (*range(4), *PHRASES, 2, 1, 3, 0))
-    marked = with_fields(plain, lambda fields: _first(fields).update({"header": every, "marks": 1}))
+    marked = with_fields(
+        plain, lambda fields: update(_first(fields), {"header": every, "marks": 1})
+    )
     _hold(shelf, "odd-marks", "Every mark of a header.", marked)
-    text = with_fields(plain, lambda fields: _first(fields).update({"header": every, "marks": 0}))
+    text = with_fields(plain, lambda fields: update(_first(fields), {"header": every, "marks": 0}))
     _hold(shelf, "odd-no-marks", "The same bytes, which are text.", text)
-    empty = with_fields(plain, lambda fields: _first(fields).update({"header": b"", "marks": 1}))
+    empty = with_fields(plain, lambda fields: update(_first(fields), {"header": b"", "marks": 1}))
     _hold(shelf, "odd-no-header", "No header at all.", empty)
     for rows, what in ((plain.n_frames, "these"), (plain.n_frames + 1, "other")):
         assert marked.source is not None
-        fields = parse(TABLE_DETAIL, marked.source.detail, "detail")
-        fields.details[0].update({"count": b"0x5", "rows": rows})
-        source = replace(marked.source, detail=build(TABLE_DETAIL, fields, "detail"))
+        fields = parse(TableDetail, marked.source.detail, "detail")
+        update(fields.details[0], {"count": b"0x5", "rows": rows})
+        source = replace(marked.source, detail=built(TableDetail, fields, "detail"))
         purpose = f"A count as printed for {what} rows."
         _hold(shelf, f"odd-count-{what}", purpose, replace(marked, source=source))
 
@@ -166,7 +169,7 @@ def _missing(shelf: Whole) -> None:
     assert forces.signals[0].mask is not None
     for name, word in (("long", b"a word that is longer than its column"), ("empty", b"")):
         motion = with_fields(
-            forces, lambda fields, word=word: _first(fields).update({"missing": word})
+            forces, lambda fields, word=word: update(_first(fields), {"missing": word})
         )
         _hold(shelf, f"missing-{name}", f"Padded columns, {name} where invalid.", motion)
 
@@ -188,12 +191,12 @@ def _patterns(shelf: Whole) -> None:
         runs = [(n, 1, 8), (0, 1, -4), (2, n - 2, 0)]
         names = ("gap", "column", "n_columns", "width")
         _first(fields).patterns[0].runs[:] = [
-            dict(zip(names, (1, column, count, width), strict=True))
+            layout.RunFields(**dict(zip(names, (1, column, count, width), strict=True)))
             for column, count, width in runs
         ]
 
     motion = with_fields(times, edit)
     assert motion.source is not None
-    detail = put(TABLE_DETAIL, "details.0.ends", b"\1")(motion.source.detail)
+    detail = put(TableDetail, "details.0.ends", b"\1")(motion.source.detail)
     motion = replace(motion, source=replace(motion.source, detail=detail))
     _hold(shelf, "odd-order", "Channels of two signals in another order; one is left out.", motion)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.formats import amc, asf, c3d
-from mcz.formats.layout import TEMPLATE
+from mcz.formats.layout import Template
 from mcz.motion import Motion
 from mcz.schema import parse
 from mcz.writing.clip_writer import write_skeleton
@@ -109,7 +109,7 @@ def _padded(style: str) -> bytes:
 
 def _has_widths(motion: Motion) -> bool:
     assert motion.source is not None
-    patterns = parse(TEMPLATE, motion.source.template, "template").patterns
+    patterns = parse(Template, motion.source.template, "template").patterns
     return any(run.width for pattern in patterns for run in pattern.runs)
 
 

@@ -1,0 +1,99 @@
+"""Records from plain fields, and where a field of a record lies in its bytes.
+
+Vectors and tests write what no writer would: they name fields and give numbers, lists and
+mappings, which become the records of ``mcz.schema``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from io import BytesIO
+from typing import Any, TypeVar
+
+import construct
+
+from mcz.schema import Record, build
+from mcz.schema.records import RecordType
+from mcz.schema.types import Counted
+
+R = TypeVar("R", bound=Record)
+
+
+def record_of(kind: type[R], fields: Any) -> R:
+    """The record of kind ``kind`` with these fields, mappings for the records within."""
+    fields = vars(fields) if isinstance(fields, Record) else fields
+    types = {field.name: field.metadata["construct"] for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    return kind(**{name: _value(types[name], value) for name, value in fields.items()})
+
+
+def _value(type_: Any, value: Any) -> Any:
+    """``value`` with records in the place of mappings."""
+    if isinstance(value, Mapping | Record):
+        while not isinstance(type_, type):
+            type_ = type_.record if isinstance(type_, RecordType) else _inner(type_)
+        return record_of(type_, value)
+    if isinstance(value, list | tuple) and not isinstance(type_, type):
+        return [_value(_inner(type_), item) for item in value] if _holds(type_) else value
+    return value
+
+
+def _holds(type_: Any) -> bool:
+    """Whether the type has records within."""
+    while not isinstance(type_, RecordType | type):
+        if not hasattr(type_, "subcon") and not hasattr(type_, "thensubcon"):
+            return False
+        type_ = _inner(type_)
+    return True
+
+
+def _inner(type_: Any) -> Any:
+    return type_.thensubcon if isinstance(type_, construct.IfThenElse) else type_.subcon
+
+
+def built(kind: type[Record], fields: Any, where: str) -> bytes:
+    """The bytes of the record of kind ``kind`` with these fields."""
+    return build(record_of(kind, fields), where)
+
+
+def empty_context() -> construct.Container:
+    """The context in which construct reads the fields of a record."""
+    states = {"_parsing": True, "_building": False, "_sizing": False}
+    return construct.Container(_params=construct.Container(left={}), **states)
+
+
+def span(kind: Any, payload: bytes, path: str) -> tuple[int, int]:
+    """Where the field at ``path``, such as "signals.0.codec", begins and ends in ``payload``.
+
+    Parses what lies before it, and raises KeyError where there is none.
+    """
+    stream, type_ = BytesIO(payload), kind
+    start = 0
+    for name in path.split("."):
+        stream.seek(start)
+        context = empty_context()
+        while not isinstance(type_, type | RecordType | Counted):
+            type_ = _inner(type_)
+        if isinstance(type_, Counted):
+            count = type_.count(stream, context, "")
+            if not int(name) < count:
+                raise KeyError(path)
+            items = [(str(index), type_.subcon) for index in range(int(name) + 1)]
+        else:
+            record = type_ if isinstance(type_, RecordType) else type_.construct_type()
+            items = record.rows
+        for field, inner in items:
+            start, type_ = stream.tell(), inner
+            context[field] = inner._parsereport(stream, context, "")
+            if field == name:
+                break
+        else:
+            raise KeyError(path)
+    return start, stream.tell()
+
+
+def update(record: Record, changes: Mapping[str, Any]) -> None:
+    """Set fields of a record, mappings standing for the records within."""
+    types = {f.name: f.metadata["construct"] for f in dataclasses.fields(record)}  # type: ignore[arg-type]
+    for name, value in changes.items():
+        setattr(record, name, _value(types[name], value))
