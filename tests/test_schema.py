@@ -126,8 +126,8 @@ def read(name: str, data: bytes, limits: dict[str, int], compiled_from: int) -> 
 
 
 @given(changed_bytes())
-@example(("container.payloads.Cend", b"\x80\x00"))  # a varint with a zero too many
-@example(("container.payloads.Cend", b"\xff" * 9))
+@example(("container.payloads.CEND", b"\x80\x00"))  # a varint with a zero too many
+@example(("container.payloads.CEND", b"\xff" * 9))
 def test_compiled_schemas_read_the_same(given: tuple[str, bytes]) -> None:
     name, data = given
     for limits in ({}, {"joints": 1, "channels": 2, "runs": 1}):
