@@ -28,9 +28,10 @@ from mcz.errors import FormatError
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import validate
-from mcz.schema import parse, varint
+from mcz.schema import parse
 from mcz.writing.clip_writer import write_clip
 from tests import overlap_codec
+from tests.commands import run
 from tests.motions import smooth
 from tests.repair import flipped, flips, joined, parts_of, replaced, use
 from tools.records import built, update
@@ -226,20 +227,6 @@ def test_streams_are_copied_byte_for_byte(codec: str) -> None:
         assert len(streams) < len(streams_of(whole))
 
 
-@pytest.mark.parametrize(("start", "stop"), [(0, 200), (3, 4), (31, 33), (90, 170), (64, 64)])
-@pytest.mark.parametrize("resolution", [0, 1, 2])
-def test_wavelets_are_cut(start: int, stop: int, resolution: int) -> None:
-    """A codec whose header counts frames, whose segments overlap and have many resolutions."""
-    out = io.BytesIO()
-    mcz.write(smooth(200), out, "mrdwt", segment_frames=32)
-    whole = out.getvalue()
-    part = extracted(whole, frames=(start, stop), resolution=resolution, joints=["hips", "knee"])
-    check(whole, part, start, stop, ["hips", "knee"], resolution)
-    if stop - start > 20:
-        part = extracted(part, frames=(9, 20), resolution=1, joints=["knee"])
-        check(whole, part, start + 9, start + 20, ["knee"], resolution + 1)
-
-
 def segments_of(data: bytes, signal: int = 0) -> list[tuple[int, int, int, bool]]:
     with mcz.open(data) as file:
         rows = next(iter(file.clips.values())).signals[signal].rows
@@ -322,11 +309,6 @@ def test_joints_that_cannot_be_cut() -> None:
     )
     with pytest.raises(mcz.OptionError, match="channels of its own, no joints"):
         extracted(written(replace(smooth(4), signals=(signal,))), joints=["spine"])
-
-
-def test_only_codecs_with_resolutions_are_cut_so() -> None:
-    with pytest.raises(mcz.OptionError, match="1 finest resolutions cannot be cut, it has 1"):
-        extracted(written(rich()), resolution=1)
 
 
 def test_a_failed_extraction_leaves_nothing(tmp_path: Path) -> None:
@@ -587,15 +569,6 @@ def test_resolution_beside_a_signal_without_any() -> None:
 # Decimation
 
 
-def test_decimate_takes_whole_frames() -> None:
-    from mcz.reading.decimation import decimated_rows
-
-    values = np.arange(21)[:, None]
-    assert decimated_rows(values, 3, 2)[:, 0].tolist() == [0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, 20]
-    assert decimated_rows(values, 1, 8)[:, 0].tolist() == [0, 8, 16]
-    assert decimated_rows(values[:0], 3, 4).shape == (0, 1)
-
-
 @pytest.mark.parametrize("step", [2, 3, 8, 64])
 def test_decimated_motions(step: int) -> None:
     from mcz.reading.decimation import decimated
@@ -687,36 +660,6 @@ def clip_with(data: bytes, *, flags: int = 0, n_frames: int | None = None, **sig
     return joined(replaced(parts, which, built(payloads.Clip, fields, "CLIP")))
 
 
-@pytest.mark.parametrize("name", ["skip", "spare"])
-@pytest.mark.parametrize("more", [1, 2**20, 2**52, 2**53 - 41, 2**53 - 40, 2**53 - 10])
-def test_stored_frames_that_are_not_there(name: str, more: int) -> None:
-    for whole in (written(rich()), extracted(written(rich()), frames=(3, 30))):
-        with mcz.open(whole) as file:
-            before = getattr(file.clips["smooth"].signals[0], name)
-        data = clip_with(whole, **{name: before + more})
-        with pytest.raises(FormatError):
-            use(data)
-        try:
-            use(data, salvage=True)
-        except mcz.MczError as error:
-            assert str(error)
-
-
-def test_shown_frames_move_and_the_hash_tells() -> None:
-    part = extracted(written(rich()), frames=(9, 30))
-    with mcz.open(part) as file:
-        info = file.clips["smooth"].signals[0]
-        assert (info.skip, info.spare) == (2, 4)  # grid changes begin a segment at 20
-    with pytest.raises(mcz.ChecksumError, match="value hash"):
-        use(clip_with(part, skip=3, spare=3))
-
-
-def test_an_open_clip_skips_nothing() -> None:
-    part = extracted(written(rich()), frames=(9, 30))
-    with pytest.raises(FormatError, match="n_frames is open, but a signal has skip"):
-        use(clip_with(part, flags=1, n_frames=0))
-
-
 def test_a_clip_without_an_end_shows_what_is_there() -> None:
     part = extracted(written(rich()), frames=(9, 30))
     parts = [p for p in parts_of(part) if p[0].type != b"CEND"]
@@ -730,12 +673,11 @@ def test_a_clip_without_an_end_shows_what_is_there() -> None:
         assert f.clips["smooth"].n_frames == 5
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_flipped_bits_of_a_cut_file(seed: int) -> None:
+def test_flipped_bits_of_a_cut_file() -> None:
     data = extracted(written(motion_for("lossless"), "lossless"), frames=(9, 30), joints=JOINTS[:2])
     parts = parts_of(data)
     for which, (_, payload) in enumerate(parts):
-        for byte, bit in flips(len(payload), 40, seed=seed * 100 + which):
+        for byte, bit in flips(len(payload), 12, seed=which):
             changed = joined(replaced(parts, which, flipped(payload, byte, bit)))
             for act in (use, lambda file: extracted(file, frames=(1, 4), joints=["hips"])):
                 try:
@@ -744,32 +686,7 @@ def test_flipped_bits_of_a_cut_file(seed: int) -> None:
                     assert str(error)
 
 
-def test_index_says_what_is_skipped() -> None:
-    from tests.repair import with_index_content
-
-    part = extracted(written(rich()), frames=(9, 30))
-    with mcz.open(part) as file:
-        row = file.container.directory.clips["smooth"]
-        assert [(s.skip, s.spare) for s in row.signals] == [(2, 4), (2, 5)]
-    old = varint(10) + varint(1) + varint(2) + varint(4)
-    new = varint(10) + varint(1) + varint(1) + varint(5)
-
-    def swap(content: bytes) -> bytes:
-        assert content.count(old) == 1
-        return content.replace(old, new)
-
-    with pytest.raises(FormatError, match="but the index says"):
-        use(with_index_content(part, swap))
-
-
 # The command
-
-
-def run(*arguments: str) -> int:
-    from mcz.cli.common import run as run_command
-    from mcz.cli.main import cli
-
-    return run_command(cli, "mcz", list(arguments))
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -818,36 +735,3 @@ def test_decode_at_a_resolution(samples: Path, tmp_path: Path, target: str) -> N
     else:
         assert len(Path(b).read_text().splitlines()) == 1 + len(wanted)
     assert run("decode", a, "-o", b, "--decimate", "--force") == 2
-
-
-# Real files
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", ["amc/01_01.amc", "bvh/01_01.bvh", "c3d/01_01.c3d"])
-def test_real_clips(data: Path, tmp_path: Path, name: str) -> None:
-    path = data / "cmu" / name
-    mcz.encode(path, tmp_path / "a.mcz")
-    found = mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(500, 700))
-    assert found.clips[0].data_bytes < found.clips[0].data_bytes_before
-    assert mcz.verify(tmp_path / "b.mcz") == []
-    with mcz.open(tmp_path / "a.mcz") as old, mcz.open(tmp_path / "b.mcz") as new:
-        before, after = old.clips["01_01"], new.clips["01_01"]
-        assert after.source_bytes() == before.source_bytes((500, 700))
-        np.testing.assert_array_equal(after.read(), before.read((500, 700)))
-
-
-@pytest.mark.real
-def test_real_copies(data: Path, tmp_path: Path) -> None:
-    """In CMU's files the left clavicle is a copy of the right one."""
-    mcz.encode(data / "cmu/amc/01_01.amc", tmp_path / "a.mcz")
-    with pytest.raises(mcz.OptionError, match=r"joint \w+clavicle, which must be extracted, too"):
-        for joint in ("lclavicle", "rclavicle"):
-            mcz.extract(tmp_path / "a.mcz", tmp_path / f"{joint}.mcz", joints=[joint])
-    both = ["lclavicle", "rclavicle"]
-    found = mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", joints=both)
-    assert found.clips[0].data_bytes < 0.2 * found.clips[0].data_bytes_before
-    with mcz.open(tmp_path / "a.mcz") as old, mcz.open(tmp_path / "b.mcz") as new:
-        assert validate(new) == []
-        wanted = old.clips["01_01"].read(joints=sorted(both, key=old.clips["01_01"].skeleton.find))
-        np.testing.assert_array_equal(new.clips["01_01"].read(), wanted)

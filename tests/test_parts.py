@@ -22,7 +22,7 @@ from mcz.codecs import CODECS, by_name
 from mcz.sample import bvh_walk
 from tests.motions import smooth
 
-N_FLIPS = 40  # of each codec
+N_FLIPS = 12  # of each codec
 Read = Callable[[mcz.Clip], NDArray[Any]]
 
 

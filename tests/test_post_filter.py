@@ -311,21 +311,3 @@ def test_vectors(vector) -> None:
         answer = conformance.answer(vector.data, request.arguments)
         assert run.judge(request, *answer) is None, request.arguments
     assert len(list(run.requests(row, []))) == 1
-
-
-# Real clips
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", ["17_10", "14_08", "01_01"])
-def test_real_clips_coded_coarsely(data: Path, name: str) -> None:
-    """Places that are off by four centimeters come nearer."""
-    clip = mcz.read(data / f"cmu/amc/{name}.amc")
-    motion = replace(mcz.in_positions(clip), frame_rate=Fraction(120))
-    with mcz.open(written(motion, codec="lsdt-frame", step=2.0).getvalue()) as file:
-        coarse = next(iter(file.clips.values())).motion()
-    before, after = (
-        np.linalg.norm((m.values - motion.values).reshape(-1, 3), axis=1).mean()
-        for m in (coarse, mcz.post_filter(coarse))
-    )
-    assert after < 0.9 * before

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.cli.main import main
 from mcz.errors import OptionError
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
 from mcz.reading.preview_motion import preview_motion
 from mcz.reading.signal_info import SignalInfo
 from tests import overlap_codec
+from tests.commands import run
 from tests.motions import skeleton, smooth
 
 
@@ -178,29 +178,6 @@ def test_details_are_not_read(codec: str) -> None:
     assert sum(int(seen[place].sum()) for place in details) == 0
     assert n_bytes <= n_coarse + 2500 + len(tables) * 64
     assert n_bytes < len(data) / 2
-
-
-@pytest.mark.real
-def test_bytes_of_14_02(data: Path) -> None:
-    motion = mcz.read(next(data.rglob("14_02.amc")), rate=120)
-    values = np.resize(motion.values, (100_000, motion.values.shape[1]))
-    tiled = Motion(motion.skeleton, (Signal(values, motion.signals[0].grids),), name="tiled")
-    shares = []
-    for clip in (motion, tiled):
-        whole = written(clip, "qbc")
-        with mcz.open(whole, unverified=True) as file:
-            frames, found = only(file).preview()
-            shares.append(file.container.source.n_bytes / len(whole))
-            assert np.array_equal(found, only(file).read()[frames])
-    assert shares[0] < 0.25
-    assert shares[1] < 0.2
-
-
-def run(*arguments: Any) -> int:
-    with pytest.raises(SystemExit) as ended, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.argv", ["mcz", *map(str, arguments)])
-        main()
-    return int(ended.value.code or 0)
 
 
 @pytest.fixture

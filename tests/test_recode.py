@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.main import main
 from mcz.codecs import by_name
 from mcz.container.writer import Writer
 from mcz.editing.recoding import recorded_options
 from mcz.errors import OptionError
 from mcz.writing.tuning import write_tuned
+from tests.commands import run
 from tests.motions import smooth
 
 CHANNELS = {"posewave": {"step": 0.01}, "pca": {}}
@@ -41,13 +41,6 @@ def written(motions: list[mcz.Motion], codec: str) -> bytes:
 def motion(name: str = "one", n_frames: int = 40) -> mcz.Motion:
     found = replace(smooth(n_frames), name=name)
     return replace(found, skeleton=replace(found.skeleton, unit_cm=1.0))
-
-
-def run(*arguments: Any) -> int:
-    with pytest.raises(SystemExit) as ended, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.argv", ["mcz", *map(str, arguments)])
-        main()
-    return int(ended.value.code or 0)
 
 
 def clip(data: bytes, name: str = "one") -> Any:
@@ -174,33 +167,6 @@ def test_what_cannot_be_coded_anew() -> None:
 def stored(data: bytes) -> list[int]:
     """The frames that each signal of a clip stores."""
     return [sum(row.header.n_frames for row in info.rows) for info in clip(data).signals]
-
-
-@pytest.mark.parametrize("codec", [*CODECS, "mrdwt", "lossless", "fast", "best", "raw"])
-@pytest.mark.parametrize("frames", [(5, 30), (0, 7), (39, 40), (12, None), (8, 8)])
-def test_frames_that_are_cut_off_are_gone(codec: str, frames: tuple[int, int | None]) -> None:
-    whole, out, kept = io.BytesIO(), io.BytesIO(), io.BytesIO()
-    mcz.write(motion(), whole, codec=codec, **CODECS.get(codec, {}))
-    data = whole.getvalue()
-    found = mcz.extract(data, out, frames=frames, recode=True)
-    start, stop = frames[0], 40 if frames[1] is None else frames[1]
-    before, after = clip(data), clip(out.getvalue())
-    assert (after.n_frames, after.codec) == (stop - start, codec)
-    assert stored(out.getvalue()) == [stop - start]
-    assert found.clips[0].stored_frames == stop - start
-    off = np.abs(after.values[:] - before.values[start:stop])
-    assert off.max(initial=0.0) <= (0.0 if by_name(codec).lossless else 1.0)
-    assert after.frame_numbers.tolist() == before.frame_numbers[start:stop].tolist()
-    assert mcz.verify(out.getvalue()) == []
-    if found.clips[0].recoded and after.quality:
-        assert after.quality["cut-recoded"] == "yes"
-        assert after.quality["cut-frames"] == f"{start}:{stop}"
-    # What an earlier cut left stored goes, too.
-    mcz.extract(data, kept, frames=frames)
-    again = io.BytesIO()
-    mcz.extract(kept.getvalue(), again, clip="one", recode=True)
-    assert stored(again.getvalue()) == [stop - start]
-    assert mcz.verify(again.getvalue()) == []
 
 
 def test_what_is_cut_off_is_not_in_the_bytes() -> None:

@@ -15,18 +15,16 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.cli.main import main
 from mcz.codecs import raw
 from mcz.codecs.lossless import lossless
 from mcz.codecs.wavelet import mrdwt
-from mcz.conversion import convert
 from mcz.editing.recoding import recorded_options
-from mcz.editing.replacing import edited_quality
 from mcz.errors import AccessError, MotionError, OptionError
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.clip import Clip
 from tests import overlap_codec
+from tests.commands import run
 from tests.motions import motions, smooth
 
 CASES = {
@@ -530,18 +528,6 @@ def test_a_stranger_among_copies() -> None:
     assert lossless.CODEC.regroup is not None
 
 
-def test_edited_quality_adds_the_codec() -> None:
-    record = edited_quality({"edit-joints": "hip"}, "qbc", "knee", {"mse": "1"})
-    assert record == {"codec": "qbc", "edit-joints": "hip,knee", "edit_mse": "1"}
-
-
-def run(*arguments: Any) -> int:
-    with pytest.raises(SystemExit) as ended, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.argv", ["mcz", *map(str, arguments)])
-        main()
-    return int(ended.value.code or 0)
-
-
 @pytest.fixture
 def walk(samples: Path, tmp_path: Path) -> Path:
     target = tmp_path / "walk.mcz"
@@ -616,18 +602,3 @@ def test_command_refuses_other_tables(
 def test_command_needs_files(walk: Path, tmp_path: Path) -> None:
     assert run("replace", walk, "-", "--joint", "1", "--values", walk) == 2
     assert run("replace", walk, tmp_path / "o.mcz", "--joint", "1", "--values", "none.csv") == 1
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("codec", ["raw", "lossless", "mrdwt", "qbc"])
-def test_a_real_foot(data: Path, codec: str) -> None:
-    motion = mcz.read(next(data.rglob("17_10.amc")), rate=120)
-    before = written(motion, codec)
-    new = np.round(values_of(before, "lfoot") * 0.9, 4)
-    after, found = edited(before, "lfoot", new)
-    assert changed_groups(before, after) - groups_of(before, "lfoot") == set()
-    with mcz.open(after) as file:
-        clip = only(file)
-        assert clip.source and len(clip.source_bytes()) == clip.source.size
-        assert convert(clip.motion(), "bvh").n_frames == motion.n_frames
-    assert found.max_error == 0 if codec in LOSSLESS else found.max_error < 2

@@ -171,14 +171,6 @@ def test_rewriting_drops_it(tmp_path) -> None:
     assert mcz.verify(path) == []
 
 
-def test_its_flags_are_fixed() -> None:
-    data = b"".join(pieces())
-    chunk, payload = next(part for part in parts_of(data) if part[0].type == REPEAT)
-    bad = data.replace(build_chunk(REPEAT, payload, chunk.flags), build_chunk(REPEAT, payload, 3))
-    assert bad != data
-    assert mcz.verify(bad) != []
-
-
 def test_salvage_finds_a_clip_in_it() -> None:
     """Without CLIP before them, frames are found from the first REPT on."""
     parts = pieces()
@@ -401,7 +393,7 @@ def test_datagrams_lost(codec: str) -> None:
     parts = pieces(codec)
     whole, _ = read(b"".join(parts))
     random = np.random.default_rng(5)
-    for _ in range(40):
+    for _ in range(12):
         kept = random.random(60) < random.choice([0.6, 0.9, 0.97])
         middle = [part for part, keep in zip(parts[1:-1], kept, strict=True) if keep]
         data = b"".join([parts[0], *middle, parts[-1]])
@@ -489,7 +481,7 @@ def test_cut_at_every_byte(codec: str, lost: str) -> None:
     data = b"".join(pieces(codec, n=n))
     whole, _ = read(data)
     ends = [stop for _, stop in packet_spans(data)]
-    step = 1 if codec == "stairs" else 17
+    step = 3 if codec == "stairs" else 17
     for size in range(0, len(data), step):
         got: list[LiveFrame] = []
         reader = mcz.stream_decode(io.BytesIO(data[:size]), lost=lost)
@@ -509,7 +501,7 @@ def test_cut_at_every_byte(codec: str, lost: str) -> None:
 def test_every_flipped_bit(codec: str) -> None:
     data = b"".join(pieces(codec, n=13))  # a whole run of ten, and the start of another
     whole, _ = read(data)
-    for byte, bit in flips(len(data), 850, 3):
+    for byte, bit in flips(len(data), 400, 3):
         try:
             found, _ = read(flipped(data, byte, bit), lost="hold")
         except mcz.MczError as error:
@@ -643,7 +635,7 @@ def test_no_frame_in_the_wrong_place_is_said_to_be_decoded(codec: str, damage: s
     assert places == heads_and_bodies(old)
     random = np.random.default_rng(7)
     wrong = {"kind 3": 0, "kind 2": 0}
-    for _ in range(300 if codec == "stairs" else 100):
+    for _ in range(120 if codec == "stairs" else 30):
         seed = int(random.integers(2**32))
         how = ("missing", "hold", "linear")[seed % 3]
         for kind, sent in (("kind 3", data), ("kind 2", old)):
@@ -932,27 +924,3 @@ def _kept(reader: mcz.LiveReader, keep: Callable[[LiveFrame], None]) -> list[Liv
     for frame in reader:
         keep(frame)
     return []
-
-
-# Real clips ----------------------------------------------------------------------------------
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("codec", ["lsdt-frame", "online"])
-def test_a_real_clip_with_losses(data, codec: str) -> None:
-    motion = mcz.in_positions(mcz.read(data / "cmu/amc/17_10.amc"))
-    values = motion.values[:600]
-    names = [joint.name for joint in motion.skeleton.joints]
-    params = {"step": 0.5} | ({"segment_frames": 48} if codec == "lsdt-frame" else {})
-    sent = list(
-        mcz.stream_encode(values, names, codec=codec, params=params, frame_rate=Fraction(120))
-    )
-    whole, _ = read(b"".join(sent))
-    assert len(whole) == 600
-    random = np.random.default_rng(17)
-    for share in (0.01, 0.05, 0.1):
-        kept = [part for part in sent[1:-1] if random.random() > share]
-        found, summary = read(b"".join([sent[0], *kept, sent[-1]]), lost="linear")
-        assert [frame.number for frame in found] == list(range(600))
-        check_decoded(found, whole)
-        assert summary.decoded > 100
