@@ -14,16 +14,13 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.container import payloads
 from mcz.container.chunks import REPEAT, Chunk
-from mcz.container.clip_head import clip_head, source_sha256
 from mcz.container.scan import scan
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.editing.arranging import natural
 from mcz.live.writer import LiveWriter
 from mcz.sample import write_samples
-from mcz.schema import parse
 from tests import live_codec
 from tests.motions import skeleton
 
@@ -350,20 +347,3 @@ def test_ancillary_chunks_go_along_where_that_is_safe(files: tuple[Path, Path]) 
     assert b"dropped" not in a.read_bytes()
     assert "bADd" in report.left_out[0]
     sound(a)
-
-
-def test_heads_by_hand_say_what_the_schemas_say(files: tuple[Path, Path]) -> None:
-    for path in files:
-        with mcz.open(path) as file:
-            for name, row in file.container.directory.clips.items():
-                payload = file.container.payload(row.clip)
-                head, fields = clip_head(payload, name), parse(payloads.Clip, payload, name)
-                assert (head.name, head.skeleton) == (fields.name, fields.skeleton)
-                assert head.metadata == {pair.key: pair.value for pair in fields.metadata}
-                source = fields.source
-                assert source is not None
-                assert (head.template, head.format) == (source.template, source.format)
-                assert (head.path, head.size) == (source.path, source.size)
-                assert row.cend is not None
-                cend = file.container.payload(row.cend)
-                assert source_sha256(cend, name) == file.container.whole_cend(row).source_sha256

@@ -6,18 +6,19 @@ import json
 import pickle
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import mcz
 from mcz.codecs import CODECS, by_name
-from mcz.container.clip_head import ClipHead, clip_head
 from mcz.container.writer import Writer
 from mcz.errors import FormatError, OptionError
 from mcz.queries import Query
 from mcz.reading.fields import FIELDS
 from mcz.reading.file import File
 from mcz.reading.report import info, part_problems
+from mcz.schema import parse_until
 from mcz.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.conftest import Call
@@ -124,7 +125,7 @@ def test_bytes_are_those_of_info(
                 total = sum(told[f"{part}_bytes"] for part in parts)
                 shared = file.container.directory.shared
                 source = clip._fields.source
-                template = shared[b"SRCE", bytes(source[0].template)].size if source else 0
+                template = shared[b"SRCE", source.template].size if source else 0
                 assert FIELDS["bytes"](clip) == total - template, path
 
 
@@ -214,11 +215,11 @@ def test_metadata_of_clips_are_read_once(archive: Path, monkeypatch: pytest.Monk
     """Also where the clips are others by then, and for a key that nobody has."""
     calls: list[str] = []
 
-    def counted(payload: bytes, where: str) -> ClipHead:
+    def counted(record: Any, payload: bytes, where: str, before: str) -> Any:
         calls.append(where)
-        return clip_head(payload, where)
+        return parse_until(record, payload, where, before)
 
-    monkeypatch.setattr("mcz.container.metadata.clip_head", counted)
+    monkeypatch.setattr("mcz.container.metadata.parse_until", counted)
     for most in (2**20, 0):  # bytes that are kept
         monkeypatch.setattr("mcz.container.metadata.MOST_KEPT", most)
         calls.clear()

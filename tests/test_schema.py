@@ -186,7 +186,7 @@ def test_every_record_is_tried() -> None:
 class Leaf(Record):
     """A leaf of TREE."""
 
-    size: int = field(Checked(UVARINT, lambda value, context: value > 0), "bytes")
+    size: int = field(Checked(UVARINT, lambda value: value > 0), "bytes")
 
 
 class Tree(Record):

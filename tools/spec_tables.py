@@ -63,6 +63,7 @@ NAMED = {
     id(payloads.ID): "id",
     id(numbers.GRID): "grid",
 }
+NUMBERS = {"B": "u8", "L": "u32", "Q": "u64", "f": "binary32", "d": "binary64"}
 SPEC = Path(__file__).parent.parent / "SPEC.md"
 MARK = re.compile(r"(<!-- table: (\S+) -->\n)((?:\|.*\n)*)")
 CONTENTS = re.compile(r"(<!-- contents -->\n)(.*?)(<!-- end of contents -->\n)(.*)", re.DOTALL)
@@ -125,11 +126,13 @@ def type_name(field: Any) -> str:
         case construct.Array():
             return f"{field.count} {type_name(field.subcon)}"
         case construct.Bytes():
-            return f"{field.length} bytes"
+            return "bytes" if callable(field.length) else f"{field.length} bytes"
         case construct.IfThenElse():
             return type_name(field.thensubcon) + ", or absent"
         case construct.FormatField():
-            return {"B": "u8", "f": "binary32", "d": "binary64"}[field.fmtstr[-1]]
+            return {"B": "u8", "L": "u32", "Q": "u64", "f": "binary32", "d": "binary64"}[
+                field.fmtstr[-1]
+            ]
     return "bytes to the end" if field is construct.GreedyBytes else type_name(field.subcon)
 
 

@@ -36,7 +36,7 @@ class SpaceFields(Record):
     """Transform of a frame into coefficients, in headers."""
 
     flags: int = field(
-        Checked(Int8ul, lambda obj, ctx: obj < 16),
+        Checked(Int8ul, lambda value: value < 16),
         "bit 0: x, y and z apart; 1: has weights; 2: the model has a mean; 3: it has courses",
     )
     basis: int = field(one_of(Int8ul, (COSINES, LEARNED)), "0 cosines, 1 the bases of a model")

@@ -26,19 +26,11 @@ from mcz.container.directory import Directory
 from mcz.container.limits import check
 from mcz.container.source import ByteSource
 from mcz.container.strict import decoded
-from mcz.errors import FormatError, TruncatedError
-from mcz.schema import build, deflate, parse, read_varint, varint
+from mcz.errors import FormatError
+from mcz.schema import build, deflate, parse, parse_all
 
 MOST_BYTES = 64 * 1024  # of the copies in one COPY, decoded, so that a bad byte costs no more
 SMALL_PART = 64  # a model is copied where the file has this many times its bytes
-TYPE_SIZE = 4
-
-# Each copy in a COPY: (name, type, meaning).
-COPIED_FIELDS = (
-    ("distance", "varint", "bytes from where the chunk begins to where this COPY begins"),
-    ("type", "4 bytes", "its type"),
-    ("payload", "sized", "its payload"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,10 +76,11 @@ def worth_it(copy: Copy, n_bytes: int) -> bool:
 
 def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
     """The payload of a COPY that will begin at ``offset``."""
-    content = b"".join(
-        varint(offset - copy.offset) + copy.type + varint(len(copy.payload)) + copy.payload
+    records = (
+        payloads.CopiedChunk(distance=offset - copy.offset, type=copy.type, payload=copy.payload)
         for copy in copies
     )
+    content = b"".join(build(record, "COPY") for record in records)
     packed = deflate(content)
     encoding = payloads.DEFLATED if len(packed) < len(content) else payloads.STORED
     data = packed if encoding else content
@@ -103,13 +96,11 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
     check(f"chunk {chunk.label}: bytes of the copies", fields.size, limit)  # LIMIT-16
     content = decoded(fields.data, fields.encoding, fields.size, chunk.label)
     copies: list[Copy] = []
-    at = end = 0
-    while at < len(content):
-        try:
-            copy, at = _read_copy(content, at, chunk)
-        except FormatError as error:
-            error.add(where=f"chunk {chunk.label}")
-            raise
+    end = 0
+    for stored in parse_all(payloads.CopiedChunk, content, f"chunk {chunk.label}"):
+        if stored.type not in COPIED:  # COPY-01
+            raise FormatError(f"chunk {chunk.label}: a copy of a chunk of type {stored.type!r}")
+        copy = Copy(chunk.offset - stored.distance, stored.type, stored.payload)
         if not end <= copy.offset <= copy.stop <= chunk.offset:  # COPY-03
             raise FormatError(
                 f"chunk {chunk.label}: the copy of {copy.label}, which would end at {copy.stop}, "
@@ -164,16 +155,3 @@ def check_copies(
         same = there is not None and (there.offset, there.type) == (copy.offset, copy.type)
         if there is None or not same or payload_of(there) != copy.payload:  # COPY-02
             raise FormatError(f"chunk {chunk.label}: no {copy.label} is as its copy says")
-
-
-def _read_copy(content: bytes, at: int, chunk: Chunk) -> tuple[Copy, int]:
-    """The copy at offset ``at`` of the decoded ``content``, and the offset after it."""
-    distance, at = read_varint(content, at)
-    kind = content[at : at + TYPE_SIZE]
-    length, start = read_varint(content, at + TYPE_SIZE)
-    stop = start + length
-    if stop > len(content):
-        raise TruncatedError(f"a copy ends at {stop} of {len(content)} bytes")  # CONV-13
-    if kind not in COPIED:  # COPY-01
-        raise FormatError(f"a copy of a chunk of type {kind!r}")
-    return Copy(chunk.offset - distance, kind, content[start:stop]), stop

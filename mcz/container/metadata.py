@@ -11,25 +11,16 @@ from sys import intern
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
-from mcz.container.clip_head import clip_head
-from mcz.container.cursor import Cursor
 from mcz.container.directory import ClipRow
 from mcz.container.limits import MIB, check, metadata_limit
 from mcz.container.metadata_keys import INTERPRETED
 from mcz.container.packed import smallest
 from mcz.container.strict import decoded
 from mcz.errors import FormatError
-from mcz.schema import build, parse, varint
+from mcz.schema import build, parse, parse_all, parse_until
 
 MOST_KEPT = 16 * MIB  # bytes, about: 40,000 clips of three keys
 PAIR = 100  # bytes that Python takes for a pair, beside its letters
-
-# Each record in a META: (name, type, meaning).
-META_RECORD_FIELDS = (
-    ("clip", "text", "name of the clip; empty: the whole file"),
-    ("removed", "counted text", "keys that are not there any more"),
-    ("entries", "counted METADATA", "pairs of key and value"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +49,8 @@ class Remembered:
         """What the CLIP of ``row`` says; its payload is asked for where that is not kept."""
         found = self._pairs.get(row.name)
         if found is None:
-            said = clip_head(payload(row.clip), row.clip.label).metadata
-            found = {intern(key): value for key, value in said.items()}
+            clip = parse_until(payloads.Clip, payload(row.clip), row.clip.label, "source")
+            found = {intern(pair.key): pair.value for pair in clip.metadata}
             self._size += PAIR + sum(PAIR + len(key) + len(found[key]) for key in found)
             if self._size <= MOST_KEPT:
                 self._pairs[row.name] = found
@@ -107,15 +98,9 @@ def _payload(content: bytes, short: bool) -> bytes:
 
 def record_bytes(record: Record) -> bytes:
     """A record as META has it."""
-    texts = [record.name, *record.removed]
-    out = _text(record.name) + varint(len(texts) - 1) + b"".join(map(_text, record.removed))
-    pairs = b"".join(_text(key) + _text(value) for key, value in record.entries.items())
-    return out + varint(len(record.entries)) + pairs
-
-
-def _text(text: str) -> bytes:
-    data = text.encode("utf-8")
-    return varint(len(data)) + data
+    entries = payloads.metadata_records(record.entries)
+    stored = payloads.MetaRecord(clip=record.name, removed=list(record.removed), entries=entries)
+    return build(stored, "META")
 
 
 def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
@@ -127,14 +112,12 @@ def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
     fields = parse(payloads.Meta, payload, where)
     check(f"{where}: bytes of the records", fields.size, metadata_limit(file_bytes))
     content = decoded(fields.data, fields.encoding, fields.size, where)
-    read, records = Cursor(content, where), []
-    while read.at < len(content):
-        name = read.text()
-        removed = tuple(read.text() for _ in range(read.varint()))
-        pairs = [(read.text(), read.text()) for _ in range(read.varint())]
-        _check_keys(removed, where)
-        _check_keys([key for key, _ in pairs], where)
-        records.append(Record(name, dict(pairs), removed))
+    records = []
+    for stored in parse_all(payloads.MetaRecord, content, where):
+        _check_keys(stored.removed, where)
+        _check_keys([pair.key for pair in stored.entries], where)
+        pairs = payloads.metadata_pairs(stored.entries)
+        records.append(Record(stored.clip, pairs, tuple(stored.removed)))
     return records
 
 

@@ -299,12 +299,28 @@ class Copy(Record):
     data: bytes = field(GreedyBytes, "the copies, encoded")
 
 
+class CopiedChunk(Record):
+    """A copy in the decoded data of COPY."""
+
+    distance: int = field(UVARINT, "bytes from where the chunk begins to where this COPY begins")
+    type: bytes = field(Exactly(4), "its type")
+    payload: bytes = field(SIZED, "its payload")
+
+
 class Meta(Record):
     """META, metadata of clips that lie before it."""
 
     encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
     size: int = field(UVARINT, "bytes of the records, decoded")
     data: bytes = field(GreedyBytes, "the records, encoded")
+
+
+class MetaRecord(Record):
+    """A record in the decoded data of META."""
+
+    clip: str = field(TEXT, "name of the clip; empty: the whole file")
+    removed: list[str] = field(counted(TEXT), "keys that are not there any more")
+    entries: list[Metadata] = field(counted(Metadata), "pairs of key and value")
 
 
 class Qual(Record):

@@ -67,7 +67,7 @@ from mcz.container.strict import decoded
 from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.motion import Skeleton
-from mcz.schema import MAX_COUNT, parse
+from mcz.schema import MAX_COUNT, parse, parse_until
 
 KEPT_SKELETONS = 8  # parsed ones, of a file
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
@@ -216,9 +216,6 @@ class Container:
         """The MODL with this id, its hash checked."""
         return parse(payloads.Modl, *self._shared_payload(b"MODL", id_))
 
-    def _skel(self, id_: bytes) -> payloads.Skel:
-        return parse_skel(*self._shared_payload(b"SKEL", id_), self.profile)
-
     def _shared_payload(self, kind: bytes, id_: bytes) -> tuple[bytes, str]:
         chunk = self.directory.shared.get((kind, id_))
         if chunk is None:
@@ -239,7 +236,7 @@ class Container:
     def _skeleton(self, id_: bytes) -> tuple[payloads.Skel, Skeleton]:
         """Both; the last ones are kept, since the clips of a file share them."""
         if id_ not in self._skeletons:
-            fields = self._skel(id_)
+            fields = parse_skel(*self._shared_payload(b"SKEL", id_), self.profile)
             found = fields, parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
             while len(self._skeletons) >= KEPT_SKELETONS:
                 self._skeletons.pop(next(iter(self._skeletons)), None)
@@ -274,6 +271,10 @@ class Container:
         if differs and not row.damage:
             raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
         return fields
+
+    def clip_head(self, row: ClipRow) -> payloads.Clip:
+        """The fields of CLIP before its signals, for a look at many clips."""
+        return parse_until(payloads.Clip, self.payload(row.clip), row.clip.label, "signals")
 
     def whole_cend(self, row: ClipRow) -> payloads.Cend:
         """The fields of CEND; raises FormatError where a damaged file has none."""

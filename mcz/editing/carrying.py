@@ -22,7 +22,6 @@ from mcz.container.chunks import (
     is_foot_at,
     read_chunk,
 )
-from mcz.container.clip_head import clip_head
 from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
 from mcz.container.index import packed_segments, parse_segments
 from mcz.container.metadata import Record, as_one
@@ -32,7 +31,7 @@ from mcz.container.reader import Container
 from mcz.container.source import Forward
 from mcz.container.writer import Writer, payload_id
 from mcz.errors import ChecksumError, FormatError
-from mcz.schema import build, parse
+from mcz.schema import build, parse, parse_until
 
 UNPROTECTED = "its recovery data, which are of the old file: mcz protect makes others"
 BLOCK = 1 << 20  # bytes of an open DATA that are copied at once
@@ -137,11 +136,11 @@ class Carrier:
         """Carry a clip over: its skeleton and template, CLIP to CEND, and what belongs to it."""
         row = self.container.directory.clips[name]
         payload = self.container.payload(row.clip)
-        head = clip_head(payload, row.clip.label)
+        head = parse_until(payloads.Clip, payload, row.clip.label, "signals")
         if head.name != name or head.skeleton != row.skeleton:
             raise FormatError(f"{row.clip.label}: clip {head.name!r}, the index says {name!r}")
-        if head.template:
-            self.shared(b"SRCE", head.template)
+        if head.source is not None:
+            self.shared(b"SRCE", head.source.template)
         self.skeleton(row.skeleton)
         if change != SAME:
             payload = _changed(payload, row.clip.label, change)

@@ -25,7 +25,7 @@ from mcz.recovery import making
 from mcz.recovery.code import LANE, encoded, recovered, runs_of
 from mcz.recovery.field import Ints
 from mcz.recovery.making import Step, made
-from mcz.recovery.packets import FIELDS, Key, Packet, find_packets, short_hash
+from mcz.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
 from mcz.recovery.shape import HASH, Shape
 from mcz.writing.clip_writer import Progress
 
@@ -109,7 +109,7 @@ def _keep(one: _Set, packet: Packet, place: int | None) -> None:
     if place is None:
         return
     if packet.kind:
-        one.blocks[packet.index] = packet.offset + FIELDS.size
+        one.blocks[packet.index] = packet.offset + BODY_AT
     else:
         one.sections[packet.index] = packet.body
     shift = packet.offset - place

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 from mcz.container import payloads
-from mcz.container.clip_head import clip_head
 from mcz.container.limits import BASE, Profile
 from mcz.container.locks import lock
 from mcz.container.reader import Container
@@ -85,9 +84,9 @@ def used_by(file: File, names: Iterable[str]) -> set[Shared]:
     has_models = any(kind == b"MODL" for kind, _ in container.directory.shared)
     for name in names:
         row = container.directory.clips[name]
-        template = clip_head(container.payload(row.clip), row.clip.label).template
-        if template:
-            used.add((b"SRCE", template))
+        source = container.clip_head(row).source
+        if source is not None:
+            used.add((b"SRCE", source.template))
         if (b"SKEL", row.skeleton) not in used:
             used |= used_by_skeleton(container, row.skeleton)
         for signal in file.clips[name].signals if has_models else ():
@@ -142,8 +141,8 @@ def _target(file: File, plan: Plan, alias: str) -> tuple[int, bytes]:
 
 def source_path(file: File, name: str) -> str:
     """The path of the source of a clip; "" where it has none, or that has none."""
-    row = file.container.directory.clips[name]
-    return clip_head(file.container.payload(row.clip), row.clip.label).path
+    source = file.container.clip_head(file.container.directory.clips[name]).source
+    return source.path if source is not None else ""
 
 
 def writer_like(stream: Any, files: Iterable[File]) -> Writer:

@@ -8,12 +8,11 @@ from contextlib import suppress
 from functools import partial
 
 from mcz.container import payloads
-from mcz.container.clip_head import clip_head, source_sha256
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.errors import FormatError
 from mcz.reading.file import File
-from mcz.schema import parse
+from mcz.schema import parse, parse_until
 from mcz.writing.draft import Digest
 
 Content = dict[bytes, tuple[int, bytes]]  # SHA-256 of a file -> what ALIA says of it
@@ -48,10 +47,11 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
 
 
 def _of_clip(container: Container, row: ClipRow) -> tuple[str, bytes]:
-    head = clip_head(container.payload(row.clip), row.clip.label)
-    if not head.template or row.cend is None:
+    source = container.clip_head(row).source
+    if source is None or row.cend is None:
         return "", b""
-    return head.path, source_sha256(container.payload(row.cend), row.cend.label)
+    cend = parse_until(payloads.Cend, container.payload(row.cend), row.cend.label, "value_sha256")
+    return source.path, cend.source_sha256 or b""
 
 
 def _restoring(file: File, of: int, target: bytes) -> Callable[[], bytes]:

@@ -22,7 +22,6 @@ from mcz.formats.c3d_shape import COUNTED, ROTATION_WORDS
 from mcz.schema import (
     SIZED,
     UVARINT,
-    Checked,
     Record,
     bounded,
     build,
@@ -55,6 +54,8 @@ class Kind(IntEnum):
 
 _WORD = bounded(UVARINT, 0, COUNTED)  # C3D-05
 
+_POSITIVE_WORD = bounded(_WORD, 1, COUNTED)
+
 
 class C3dField(Record):
     """A field of the head of a C3D that differs by clip."""
@@ -72,14 +73,12 @@ class C3dTemplate(Record):
     )  # C3D-02
     points: int = field(_WORD, "points")
     channels: int = field(_WORD, "analog channels")
-    subframes: int = field(Checked(_WORD, lambda obj, ctx: obj >= 1), "analog samples a frame")
+    subframes: int = field(_POSITIVE_WORD, "analog samples a frame")
     unsigned: int = field(
         bounded(Int8ul, 0, 1), "1: analog words are 0 to 65535; 0: they have a sign, or word is 4"
     )  # C3D-03
     rotations: int = field(_WORD, "rotations; 0 where word is 2")
-    ratio: int = field(
-        Checked(_WORD, lambda obj, ctx: obj >= 1), "samples a frame of a rotation"
-    )  # C3D-06
+    ratio: int = field(_POSITIVE_WORD, "samples a frame of a rotation")  # C3D-06
     head: bytes = field(SIZED, "the file up to the data section, fields filled with zeros")
     fields: list[C3dField] = field(counted(C3dField), "the fields of head, in order")
     gap: bytes = field(

@@ -39,7 +39,7 @@ WORDS, FULL, BLANKS, FREE = -1, 0, 1, 2  # what the tokens of a row are: text_ke
 
 
 # SRC-12
-_WIDTH = Checked(SVARINT, lambda obj, ctx: -MAX_WIDTH <= obj <= MAX_WIDTH and obj != -1)
+_WIDTH = Checked(SVARINT, lambda width: -MAX_WIDTH <= width <= MAX_WIDTH and width != -1)
 BIT = bounded(UVARINT, 0, 1)  # SRC-13
 
 

@@ -4,33 +4,49 @@ from __future__ import annotations
 
 import hashlib
 import re
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import construct
+from construct import Int8ul, Int32ul, Int64ul
+
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError
 from mcz.recovery.shape import HASH, HEAD, Shape
+from mcz.schema import Exactly, Record, bounded, build, field, parse_until
 
 MAGIC = b"\x89RCV\r\n\x1a\n"
-FIELDS = struct.Struct("<8sB16sQQQIII")  # magic, kind, set, the five sizes of Shape, index
 WINDOW = 1 << 22
+BODY_AT = HEAD - HASH  # offset of the body in a packet
 
-# Each packet of a RECV: (name, type, meaning).
-RECV_PACKET_FIELDS = (
-    ("magic", "8 bytes", "`89 52 43 56 0D 0A 1A 0A`"),
-    ("kind", "u8", "0 section of the table, 1 recovery block"),
-    ("set", "16 bytes", "first 16 bytes of the SHA-256 of the stream"),
-    ("start", "u64", "offset in the file of the first byte that is protected"),
-    ("a_size", "u64", "bytes that are protected before the RECV"),
-    ("t_size", "u64", "bytes that are protected behind the RECV"),
-    ("block_size", "u32", "bytes of a block, a multiple of 8"),
-    ("n_recovery", "u32", "recovery blocks"),
-    ("index", "u32", "which section or recovery block this is, from 0"),
-    ("body", "bytes", "the section or block, of the size that follows"),
-    ("check", "8 bytes", "first 8 bytes of the SHA-256 of all before in the packet"),
-)
+
+def body_size(packet: RecvPacket) -> int:
+    """Bytes of the body of a packet; raises FormatError or LimitError."""
+    shape = shape_of(packet)
+    return shape.block_size if packet.kind else shape.section_size
+
+
+def shape_of(packet: RecvPacket) -> Shape:
+    """The sizes that a packet states; raises FormatError or LimitError."""
+    sizes = packet.start, packet.a_size, packet.t_size, packet.block_size, packet.n_recovery
+    return Shape(*sizes)
+
+
+class RecvPacket(Record):
+    """A packet of RECV, its body and the check behind that included."""
+
+    magic: bytes = field(construct.Const(MAGIC), "`89 52 43 56 0D 0A 1A 0A`", default=MAGIC)
+    kind: int = field(bounded(Int8ul, 0, 1), "0 section of the table, 1 recovery block")
+    set: bytes = field(Exactly(16), "first 16 bytes of the SHA-256 of the stream")
+    start: int = field(Int64ul, "offset in the file of the first byte that is protected")
+    a_size: int = field(Int64ul, "bytes that are protected before the RECV")
+    t_size: int = field(Int64ul, "bytes that are protected behind the RECV")
+    block_size: int = field(Int32ul, "bytes of a block, a multiple of 8")
+    n_recovery: int = field(Int32ul, "recovery blocks")
+    index: int = field(Int32ul, "which section or recovery block this is, from 0")
+    body: bytes = field(Exactly(body_size), "the section or block, of the size that follows")
+    check: bytes = field(Exactly(HASH), "first 8 bytes of the SHA-256 of all before in the packet")
 
 
 class Key(NamedTuple):
@@ -55,28 +71,37 @@ def short_hash(data: bytes | memoryview) -> bytes:
 
 
 def build_packet(key: Key, kind: int, index: int, body: bytes) -> bytes:
+    """The bytes of a packet."""
     s = key.shape
-    sizes = s.start, s.a_size, s.t_size, s.block_size, s.n_recovery
-    data = FIELDS.pack(MAGIC, kind, key.set_id, *sizes, index) + body
+    packet = RecvPacket(
+        kind=kind,
+        set=key.set_id,
+        start=s.start,
+        a_size=s.a_size,
+        t_size=s.t_size,
+        block_size=s.block_size,
+        n_recovery=s.n_recovery,
+        index=index,
+        body=body,
+        check=bytes(HASH),
+    )
+    data = build(packet, "RECV")[:-HASH]
     return data + short_hash(data)
 
 
 def read_packet(source: ByteSource, offset: int) -> tuple[Key, Packet] | None:
     """The packet at ``offset``, or None where there is no whole one."""
-    if offset + HEAD > source.size:
-        return None
-    magic, kind, set_id, *sizes, index = FIELDS.unpack(source.read(offset, FIELDS.size))
     try:
-        key = Key(set_id, Shape(*sizes))
+        head = parse_until(RecvPacket, source.read(offset, BODY_AT), "RECV", "body")
+        shape, size = shape_of(head), body_size(head)
     except (FormatError, LimitError):
         return None
-    size = key.shape.block_size if kind else key.shape.section_size
-    if magic != MAGIC or kind > 1 or offset + HEAD + size > source.size:
+    if offset + HEAD + size > source.size:
         return None
     data = source.read(offset, HEAD + size)
     if short_hash(memoryview(data)[:-HASH]) != data[-HASH:]:
         return None
-    return key, Packet(kind, index, data[FIELDS.size : -HASH], offset)
+    return Key(head.set, shape), Packet(head.kind, head.index, data[BODY_AT:-HASH], offset)
 
 
 def find_packets(source: ByteSource) -> Iterator[tuple[Key, Packet]]:

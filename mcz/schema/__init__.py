@@ -13,6 +13,8 @@ from mcz.schema.records import Record as Record
 from mcz.schema.records import build as build
 from mcz.schema.records import field as field
 from mcz.schema.records import parse as parse
+from mcz.schema.records import parse_all as parse_all
+from mcz.schema.records import parse_until as parse_until
 from mcz.schema.types import EXTENSION as EXTENSION
 from mcz.schema.types import FINITE as FINITE
 from mcz.schema.types import POSITIVE as POSITIVE
@@ -22,6 +24,7 @@ from mcz.schema.types import TEXT as TEXT
 from mcz.schema.types import UVARINT as UVARINT
 from mcz.schema.types import Adapted as Adapted
 from mcz.schema.types import Checked as Checked
+from mcz.schema.types import CheckedBeside as CheckedBeside
 from mcz.schema.types import Exactly as Exactly
 from mcz.schema.types import bounded as bounded
 from mcz.schema.types import counted as counted

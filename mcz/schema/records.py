@@ -21,16 +21,19 @@ from __future__ import annotations
 
 import dataclasses
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
+from itertools import takewhile
 from typing import Any, TypeVar, cast, dataclass_transform
 
 import construct
 
 from mcz.errors import FormatError, MczError, TruncatedError
-from mcz.schema.types import as_construct, field_path
+from mcz.schema.types import CheckedBeside, as_construct, field_path
 
+LOOKS_BACK = (construct.IfThenElse, CheckedBeside)  # types that need the fields before them
 COMPILED_FROM = 4096  # bytes from which a schema is worth compiling, some milliseconds
 # What a value raises that is none of a field: of another type, too large, not there.
 NO_VALUE = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, struct.error)
@@ -56,52 +59,58 @@ class Record:
 
     @classmethod
     @cache
-    def construct_type(cls) -> RecordType:
-        """The construct type that reads and writes the record."""
-        return RecordType(cls)
+    def construct_type(cls, before: str | None = None) -> RecordType:
+        """The construct type of the record, or of its fields before ``before`` alone."""
+        return RecordType(cls, before)
 
     @classmethod
     @cache
-    def compiled_type(cls) -> construct.Construct:
+    def compiled_type(cls, before: str | None = None) -> construct.Construct:
         """The same, compiled: it reads faster, and does not know which field is at fault."""
-        return cls.construct_type().compile()
+        return RecordType(cls, before).compile()
 
 
 R = TypeVar("R", bound=Record)
+T = TypeVar("T")
 
 
 class RecordType(construct.Adapter):
     """Construct's Struct of the fields of ``record``, whose values are records."""
 
-    def __init__(self, record: type[Record]) -> None:
-        self.record = record
-        self.rows = [(f.name, as_construct(f.metadata["construct"])) for f in _fields(record)]
+    def __init__(self, record: type[Record], before: str | None = None) -> None:
+        self.record, self.is_whole = record, before is None
+        rows = [(f.name, as_construct(f.metadata["construct"])) for f in _fields(record)]
+        self.rows = list(takewhile(lambda row: row[0] != before, rows))
         super().__init__(construct.Struct(*(name / item for name, item in self.rows)))
 
+    def made(self, **values: Any) -> Record:
+        """The record of these values; of the first fields alone, the others are not there."""
+        if self.is_whole:
+            return self.record(**values)
+        record = object.__new__(self.record)
+        vars(record).update(values)
+        return record
+
     def _decode(self, obj: Any, context: Any, path: str) -> Record:
-        return self.record(**{name: obj[name] for name, _ in self.rows})
+        return self.made(**{name: obj[name] for name, _ in self.rows})
 
     def _encode(self, obj: Record, context: Any, path: str) -> dict[str, Any]:
         return {name: getattr(obj, name) for name, _ in self.rows}
 
     def _emitparse(self, code: Any) -> str:
-        """Emit a function that reads the fields without a container for each record."""
-        code.linkedinstances[id(self)] = self
-        lines = [
-            f"    {name} = this[{name!r}] = {item._compileparse(code)}" for name, item in self.rows
-        ]
+        """Emit a function that reads the fields, with a context of theirs where one is needed."""
+        code.linkedinstances[id(self)] = self.record if self.is_whole else self.made
+        lines = [f"def parse_{id(self)}(io, this):"]
+        has_context = any(isinstance(item, LOOKS_BACK) for _, item in self.rows)
+        if has_context:
+            lines.append("    states = dict(_parsing=True, _building=False, _sizing=False)")
+            lines.append("    this = Container(_=this, _params=this['_params'], **states)")
+        for name, item in self.rows:
+            kept = f"{name} = this[{name!r}]" if has_context else name
+            lines.append(f"    {kept} = {item._compileparse(code)}")
         names = ", ".join(f"{name}={name}" for name, _ in self.rows)
-        code.append(
-            "\n".join(
-                [
-                    f"def parse_{id(self)}(io, this):",
-                    "    states = dict(_parsing=True, _building=False, _sizing=False)",
-                    "    this = Container(_=this, _params=this['_params'], **states)",
-                    *lines,
-                    f"    return linkedinstances[{id(self)}].record({names})",
-                ]
-            )
-        )
+        lines.append(f"    return linkedinstances[{id(self)}]({names})")
+        code.append("\n".join(lines))
         return f"parse_{id(self)}(io, this)"
 
 
@@ -111,13 +120,70 @@ def parse(record: type[R], data: bytes, where: str, limits: Mapping[str, int] | 
     ``limits`` says how many items of some kinds, see ``Counted``, there may be in all. Raises
     TruncatedError, LimitError or FormatError; ``where`` opens the message.
     """
-    if len(data) >= COMPILED_FROM:
+
+    def read(schema: construct.Construct) -> R:
+        stream = BytesIO(data)
+        found = schema.parse_stream(stream, left=dict(limits or {}))
+        if stream.tell() < len(data):  # CONV-12
+            raise FormatError(f"{len(data) - stream.tell()} bytes behind its end")
+        return cast(R, found)
+
+    return _read(read, record, where, compiled=len(data) >= COMPILED_FROM)
+
+
+def parse_until(record: type[R], data: bytes, where: str, before: str) -> R:
+    """The record of ``data`` with the fields before ``before`` alone; the others are not there.
+
+    For a look at many records. Raises what ``parse`` does of these fields.
+    """
+
+    def read(schema: construct.Construct) -> R:
+        return cast(R, schema.parse_stream(BytesIO(data)))
+
+    return _read(read, record, where, before=before, compiled=True)
+
+
+def parse_all(record: type[R], data: bytes, where: str) -> list[R]:
+    """The records that ``data`` is, one behind the other; raises what ``parse`` does."""
+
+    def read(schema: construct.Construct) -> list[R]:
+        stream, found = BytesIO(data), []
+        while stream.tell() < len(data):
+            found.append(schema.parse_stream(stream))
+        return found
+
+    return _read(read, record, where, compiled=len(data) >= COMPILED_FROM)
+
+
+def _read(
+    read: Callable[[construct.Construct], T],
+    record: type[Record],
+    where: str,
+    *,
+    before: str | None = None,
+    compiled: bool,
+) -> T:
+    """Read with the compiled schema, if asked to, and with the plain one where that fails."""
+    if compiled:
         try:
-            return cast(R, _parsed(record.compiled_type(), data, limits))
+            return read(record.compiled_type(before))
         except (MczError, construct.ConstructError, *NO_VALUE):
-            pass  # the plain schema, which knows the place, says what is at fault
+            pass  # the plain one knows which field is at fault
+    with _our_errors(where):
+        return read(record.construct_type(before))
+
+
+def build(record: Record, where: str) -> bytes:
+    """The bytes of ``record``; raises FormatError where its schema does not admit a value."""
+    with _our_errors(where):
+        return bytes(record.construct_type().build(record))
+
+
+@contextmanager
+def _our_errors(where: str) -> Iterator[None]:
+    """Turn errors of construct into ours, which say the field at fault."""
     try:
-        return cast(R, _parsed(record.construct_type(), data, limits))
+        yield
     except construct.StreamError as error:  # CONV-13
         raise TruncatedError(_message(error), where=_place(where, error)) from None
     except construct.ConstructError as error:
@@ -125,28 +191,8 @@ def parse(record: type[R], data: bytes, where: str, limits: Mapping[str, int] | 
     except MczError as error:
         error.add(where=where)
         raise
-
-
-def _parsed(schema: Any, data: bytes, limits: Mapping[str, int] | None) -> Any:
-    stream = BytesIO(data)
-    record = schema.parse_stream(stream, left=dict(limits or {}))
-    if stream.tell() < len(data):  # CONV-12
-        raise FormatError(f"{len(data) - stream.tell()} bytes behind its end")
-    return record
-
-
-def build(record: Record, where: str) -> bytes:
-    """The bytes of ``record``; raises FormatError where its schema does not admit a value."""
-    try:
-        data: bytes = record.construct_type().build(record)
-    except construct.ConstructError as error:
-        raise FormatError(_message(error), where=_place(where, error)) from None
-    except MczError as error:
-        error.add(where=where)
-        raise
     except NO_VALUE as error:
         raise FormatError(f"{type(error).__name__}: {error}", where=where) from None
-    return data
 
 
 def _message(error: construct.ConstructError) -> str:

@@ -75,18 +75,35 @@ class Text(Sized):
         return obj
 
 
-class Checked(construct.ExprValidator):
-    """A value that passes a test: ``Checked(UVARINT, lambda value, context: value >= 1)``."""
+class Checked(construct.Adapter):
+    """A value that passes a test: ``Checked(UVARINT, lambda value: value >= 1)``."""
+
+    def __init__(self, kind: Any, test: Callable[..., bool]) -> None:
+        super().__init__(kind)
+        self.test = test
 
     def _decode(self, obj: Any, context: Any, path: str) -> Any:
-        if not self._validate(obj, context, path):
+        if not self.test(obj):
             raise construct.ValidationError(f"{obj!r} is not allowed", path=path)
         return obj
+
+    _encode = _decode
 
     def _emitparse(self, code: Any) -> str:
         code.linkedinstances[id(self)] = self
         value = self.subcon._compileparse(code)
         return f"linkedinstances[{id(self)}]._decode({value}, this, '')"
+
+
+class CheckedBeside(Checked):
+    """The same with a test of the value and the fields before it in its record."""
+
+    def _decode(self, obj: Any, context: Any, path: str) -> Any:
+        if not self.test(obj, context):
+            raise construct.ValidationError(f"{obj!r} is not allowed", path=path)
+        return obj
+
+    _encode = _decode
 
 
 class Adapted(construct.Adapter):
@@ -126,7 +143,7 @@ class Counted(Subconstruct):
         """Read and check the count."""
         count: int = UVARINT._parse(stream, context, path)
         self._check(count, path)
-        left = context._params.get("left") or {}
+        left = context._params.get("left", {})
         if count > left.get(self.kind, count):
             raise LimitError(
                 f"{self.kind}: {count} are over the limit, which leaves {left[self.kind]}",
@@ -187,17 +204,17 @@ def optional(item: Any) -> Optional:
 
 def one_of(kind: Any, values: Container[Any]) -> Checked:
     """One of ``values``."""
-    return Checked(kind, lambda value, context: value in values)
+    return Checked(kind, lambda value: value in values)
 
 
 def bounded(kind: Any, least: float, most: float) -> Checked:
     """A number from ``least`` to ``most``; NaN is none."""
-    return Checked(kind, lambda value, context: least <= value <= most)
+    return Checked(kind, lambda value: least <= value <= most)
 
 
 def flags(*names: str) -> Checked:
     """One byte of flags, bit 0 first; the bits without a name are reserved and must be 0."""
-    return Checked(construct.Int8ul, lambda value, context: value < 1 << len(names))  # CONV-14
+    return Checked(construct.Int8ul, lambda value: value < 1 << len(names))  # CONV-14
 
 
 def as_construct(kind: Any) -> Any:
@@ -228,5 +245,5 @@ SIZED = Sized()
 TEXT = Text()
 # CONV-10
 EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kept on rewriting
-FINITE = Checked(Float64l, lambda value, context: value - value == 0)  # SKEL-08
-POSITIVE = Checked(UVARINT, lambda value, context: value >= 1)
+FINITE = Checked(Float64l, lambda value: value - value == 0)  # SKEL-08
+POSITIVE = Checked(UVARINT, lambda value: value >= 1)

@@ -84,7 +84,7 @@ class QbcHeader(Record):
     )  # QBC-02
     coded_frames: int = field(UVARINT, "frames of the signal that was coded, from frame 0 on")
     decimals: int = field(
-        Checked(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED),
+        Checked(Int8ul, lambda value: value <= MAX_DECIMALS or value == SCALED),
         "decimals of control points, 0 to 15; 255: they are multiples of steps",
     )  # QBC-03
     step: float | None = field(STEP, "2^-100 to 2^100, only where decimals is 255")

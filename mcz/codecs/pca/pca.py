@@ -52,7 +52,7 @@ class PcaHeader(Record):
     """Header of pca."""
 
     decimals: int = field(
-        Checked(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED),
+        Checked(Int8ul, lambda value: value <= MAX_DECIMALS or value == SCALED),
         "decimals of means and coefficients, 0 to 15; 255: they are multiples of a step",
     )  # PCA-05
 

@@ -28,7 +28,17 @@ from mcz.motion import (
     VECTOR_KINDS,
     Skeleton,
 )
-from mcz.schema import UVARINT, Checked, Record, bounded, build, counted, field, parse
+from mcz.schema import (
+    UVARINT,
+    Checked,
+    CheckedBeside,
+    Record,
+    bounded,
+    build,
+    counted,
+    field,
+    parse,
+)
 from mcz.skeleton import first_columns
 
 Floats = NDArray[np.float64]
@@ -45,7 +55,7 @@ class PosewaveHeader(Record):
 
     levels: int = field(bounded(Int8ul, 0, MAX_LEVELS), "levels, 0 to 8")  # PWAVE-05
     borrowing: int = field(
-        Checked(Int8ul, lambda n, ctx: n <= ctx.levels),
+        CheckedBeside(Int8ul, lambda n, fields: n <= fields.levels),
         "finest levels of details that take the metric of the next coarser one",
     )  # PWAVE-06
     start: int = field(Int8ul, "start table of the model, 0 or 1")
@@ -81,7 +91,7 @@ class PosewaveHeader(Record):
         counted(Int8ul, 2**14), "of each joint the step code of its weight; none: all 1"
     )
     orders: list[int] = field(
-        counted(Checked(Int8ul, lambda n, ctx: n < N_ORDERS), 2**14),
+        counted(Checked(Int8ul, lambda n: n < N_ORDERS), 2**14),
         "of each joint the code of its axis order, 0 to 6; none: all 0",
     )
     exact: list[int] = field(

@@ -21,7 +21,7 @@ from mcz.schema import Checked, Record, counted, field, one_of
 Ints = NDArray[np.int64]
 
 ADAPTIVE, PREFIX = 0, 1  # coder
-_LENGTHS = counted(Checked(Int8ul, lambda n, ctx: n <= MAX_LENGTH), N_CLASSES)
+_LENGTHS = counted(Checked(Int8ul, lambda n: n <= MAX_LENGTH), N_CLASSES)
 
 
 class CodeFields(Record):

@@ -28,7 +28,7 @@ from mcz.codecs.space import APART, WEIGHTED, Space, SpaceFields, check, space_o
 from mcz.codecs.spatial.prefix_streams import NO_CODES, CodeFields, Codes, codes_from, fields_of
 from mcz.codecs.spatial.window_streams import MAX_INDEX, build_window, parse_window, windows_of
 from mcz.errors import FormatError, MotionError
-from mcz.schema import UVARINT, Checked, Record, bounded, build, field, parse
+from mcz.schema import UVARINT, CheckedBeside, Record, bounded, build, field, parse
 from mcz.transforms.dct import dct_matrix
 
 Floats = NDArray[np.float64]
@@ -43,7 +43,8 @@ class WindowsHeader(Record):
 
     window: int = field(bounded(UVARINT, 1, MAX_WINDOW), "frames, 1 to 2048")
     n_frequencies: int = field(
-        Checked(UVARINT, lambda n, ctx: 1 <= n <= ctx.window), "coefficients of a row, 1 to window"
+        CheckedBeside(UVARINT, lambda n, fields: 1 <= n <= fields.window),
+        "coefficients of a row, 1 to window",
     )  # WIND-06
     space: SpaceFields = field(SpaceFields, "how a frame becomes coefficients")
     code: CodeFields = field(CodeFields, "how coefficients become bits")

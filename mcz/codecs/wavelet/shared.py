@@ -46,7 +46,7 @@ class WaveletHeader(Record):
     levels: int = field(bounded(Int8ul, 0, MAX_LEVELS), "levels, 0 to 16")  # MRDWT-08
     coded_frames: int = field(UVARINT, "frames of the signal that was transformed, from frame 0 on")
     decimals: int = field(
-        Checked(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED),
+        Checked(Int8ul, lambda value: value <= MAX_DECIMALS or value == SCALED),
         "decimals of a coefficient, 0 to 15; 255: it is scaled",
     )  # MRDWT-09
     unit: float | None = field(
