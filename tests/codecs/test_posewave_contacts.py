@@ -16,9 +16,8 @@ import mcz
 from mcz.codecs import by_name
 from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs_of
 from mcz.codecs.posewave.contact_keeper import Keeper, Outcome, Piece
-from mcz.codecs.posewave.contact_kernels import LEANING, STANDING, aim, correct, lanes_of, place
+from mcz.codecs.posewave.contact_kernels import STANDING, correct, lanes_of, place
 from mcz.codecs.posewave.contact_plan import MOST_STEPS, Contacts, Held, make_held, parse_contacts
-from mcz.codecs.posewave.displacement_kernels import Track
 from mcz.codecs.posewave.skeleton_plan import Plan, make_plan
 from mcz.errors import ContactWarning, FormatError, MotionError, OptionError
 from mcz.kinematics.points import first_points, positions_of
@@ -230,47 +229,6 @@ def test_what_is_out_of_reach_stays_bounded(bend: float, far: float) -> None:
     assert np.abs(values - before).max() <= MOST_STEPS + 1e-9
 
 
-def test_both_feet_and_a_toe_at_once() -> None:
-    plan, held, values = leg(20.0, (3, 0), (4, 1), (7, 0))
-    wanted = np.array([[[0.1, 0.05, 0.0]], [[0.1, 0.05, 0.0]], [[-0.1, 0.05, 0.02]]])
-    assert np.allclose(shifted(plan, held, values, wanted), wanted, atol=1e-6)
-
-
-def test_points_that_lean_give_way() -> None:
-    """A foot and its own toe that cannot both be where they are asked to."""
-    plan, held, values = leg(20.0, (3, 0), (4, 0))
-    before, after = np.empty((2, 1, 3)), np.empty((2, 1, 3))
-    place(plan, held, lanes_of(plan, 1), values, before)
-    shifts = np.array([[[0.1, 0.1, 0.1]], [[0.0, 0.0, 0.0]]])
-    active = np.array([[STANDING], [LEANING]])
-    correct(plan, held, lanes_of(plan, 1), values, active, shifts, 4)
-    place(plan, held, lanes_of(plan, 1), values, after)
-    assert np.allclose((after - before)[0], shifts[0], atol=1e-7)
-
-
-def test_shifts_come_and_go() -> None:
-    stands = np.array([0, 0, 0, 1, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0])
-    starts, moves = np.zeros((2, 15, 3), np.int64)
-    starts[3], starts[8], moves[4] = (16, 0, 0), (0, 16, 0), (1, -1, 3)
-    shifts, active = np.zeros((15, 3)), np.zeros(15, np.int64)
-    aim(np.zeros((15, 3)), Track(stands, starts, moves), 2.0, 4, shifts, active)
-    assert active.tolist() == [1, 1, 1, 2, 2, 1, 1, 1, 2, 1, 1, 1, 1, 0, 0]
-    assert np.allclose(shifts[:5, 0], [0.8, 1.2, 1.6, 2.0, 4.0])
-    assert np.allclose(shifts[4:9, 0], [4.0, 3.0, 2.0, 1.0, 0.0])  # of 3 frames, not of 4
-    assert np.allclose(shifts[4:9, 1], [-2.0, -1.0, 0.0, 1.0, 2.0])
-    assert np.allclose(shifts[8:14, 1], [2.0, 1.6, 1.2, 0.8, 0.4, 0.0])
-
-
-def test_points_without_angles_do_nothing() -> None:
-    skeleton = biped(angle_unit="")
-    n = skeleton.n_channels
-    plan = make_plan(skeleton, np.ones(n, np.bool_), np.ones(n), radius=1.0)
-    held = make_held(contacts_of(skeleton, (3, 0)), plan, np.arange(n), np.ones(n))
-    values = np.zeros((2, n))
-    shifted(plan, held, values, np.ones(3))
-    assert not values.any()
-
-
 def test_runs_that_cannot_be() -> None:
     for wrong in ("", "lfoot,", "lfoot:-1+2,", 7, [(1, 2)], [("a", -1, 2)], [("a", 3, 0)]):
         with pytest.raises(OptionError, match="contacts"):
@@ -340,11 +298,3 @@ def test_hostile_bytes(seed: int) -> None:
     for extra in (b"\0", b"\1"):
         with pytest.raises(FormatError, match="contacts do not take"):
             coded.read(changes=coded.with_stream(finest, stream + extra))
-
-
-def test_a_file(tmp_path: Path) -> None:
-    motion = walking()
-    path = tmp_path / "walk.mcz"
-    mcz.write(motion, path, codec="posewave", step=0.1, contacts="LeftFoot:5+40")
-    found = np.asarray(mcz.read(path).values)
-    assert errors_cm(motion, found, [("LeftFoot", 5, 40)]).max() <= TOLERANCE

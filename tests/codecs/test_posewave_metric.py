@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mcz.codecs.posewave.apply_kernels import into_metric, out_of_metric
-from mcz.codecs.posewave.metric_kernels import factor, inverse_root
-from mcz.codecs.posewave.skeleton_plan import MAX_PATH, PLAIN, Plan, make_plan
+from mcz.codecs.posewave.metric_kernels import factor
+from mcz.codecs.posewave.skeleton_plan import MAX_PATH, Plan, make_plan
 from mcz.codecs.posewave.turns import RULES, sine_cosine
-from mcz.codecs.posewave.whole_turn_kernels import exponential
 from mcz.kinematics.chain import chain_of
 from mcz.kinematics.points import points_of, positions_of
 from mcz.motion import POSITION_KINDS, ROTATION_KINDS, TURNING_KINDS, Channel, Joint, Skeleton
@@ -128,18 +126,6 @@ def test_metric_is_that_of_numeric_jacobians(skeleton: Skeleton, seed: int, whol
     assert_near(metric_of(plan, values), expected, 3e-6 if whole else 3e-7)
 
 
-@given(st.floats(0, 255.9))
-def test_the_exponential_of_the_metric(square: float) -> None:
-    t = np.sqrt(square)
-    a, b, c = exponential(square)
-    assert a == pytest.approx(np.sinc(t / np.pi), abs=1e-13)
-    assert b == pytest.approx(np.sinc(t / (2 * np.pi)) ** 2 / 2, abs=1e-13)
-    if t > 0.1:
-        assert c == pytest.approx((t - np.sin(t)) / t**3, abs=1e-13)
-    else:
-        assert c == pytest.approx(1 / 6 - square / 120, abs=1e-7)
-
-
 @given(skeletons(), st.integers(1, 20), st.integers(0, 1000))
 def test_rows_come_back(skeleton: Skeleton, n_poses: int, seed: int) -> None:
     plan = plan_of(skeleton, 1e-4)
@@ -182,47 +168,6 @@ def test_long_paths_are_cut_at_joints() -> None:
     block = np.arange(150) // MAX_PATH
     expected[block[:, None] != block] = 0.0
     assert_near(metric_of(plan, values), expected)
-
-
-def test_a_joint_that_would_exceed_the_path_begins_a_block() -> None:
-    plan = plan_of(chain(20, (*MOVING, *TURNING, *MOVING, *TURNING)))
-    assert np.diff(plan.starts).tolist() == [*range(1, MAX_PATH + 1)] * 2 + [*range(1, 49)]
-    plan = plan_of(chain(10, (*MOVING, *TURNING, Channel("rx"), *MOVING, *TURNING)))
-    assert np.diff(plan.starts).tolist() == [*range(1, 92), *range(1, 40)]
-    plan = plan_of(chain(1, TURNING * 70))
-    assert np.diff(plan.starts).tolist() == [*range(1, 97), *range(1, 97), *range(1, 19)]
-
-
-def test_plain_channels_stand_alone() -> None:
-    kinds = ("rx", "", "sy", "qx", "length", "tz")
-    own = tuple(Channel(kind, "smile" if not kind else "") for kind in kinds)
-    skeleton = chain(2, own)
-    added = np.linspace(0.5, 6, 12)
-    plan = make_plan(skeleton, np.ones(12, np.bool_), added, radius=1.0)
-    plain = [*range(1, 5), *range(7, 11)]
-    assert np.flatnonzero(plan.joints == PLAIN).tolist() == plain
-    root = dense(plan, factor(plan, values_for(skeleton, 1)))
-    square = root.T @ root
-    assert np.allclose(square[plain][:, plain], np.diag(added[plain]))
-    others = np.delete(np.arange(12), plain)
-    assert not square[plain][:, others].any()
-    assert (np.diag(square)[others] > added[others]).all()
-
-
-def test_an_unknown_angle_unit_makes_all_plain() -> None:
-    unknown = chain(3, (*MOVING, *TURNING), angle_unit="")
-    assert (plan_of(unknown).joints == PLAIN).all()
-    markers = Skeleton(tuple(Joint(f"{n}", channels=MOVING) for n in range(3)), angle_unit="")
-    plan = plan_of(markers)
-    assert plan.joints.tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2]
-    assert np.allclose(metric_of(plan, np.zeros(9)), np.eye(9) / 3)
-
-
-def test_a_singular_metric_is_held_by_its_regularization() -> None:
-    joints = [Joint(f"{n}", n - 1, channels=TURNING) for n in range(4)]
-    plan = plan_of(Skeleton(tuple(joints)), 0.01, radius=0.0)
-    factors = factor(plan, np.zeros((1, 12)))
-    assert np.allclose(dense(plan, factors), 0.1 * np.eye(12))
 
 
 LARGE = st.sampled_from([0.0, 1.0, -3e11, 1e12, -1.1e12, 5e15, 1e300, -1e308, 1e-300])
@@ -270,19 +215,6 @@ def test_sine_and_cosine(angle: float, unit: str) -> None:
     exact = np.radians(np.fmod(angle, 360.0)) if unit == "deg" else angle
     assert abs(sine - np.sin(exact)) < 1e-12
     assert abs(cosine - np.cos(exact)) < 1e-12
-
-
-@given(st.floats(2.0**-102, 2.0**121))
-def test_inverse_root(value: float) -> None:
-    assert inverse_root(value) * np.sqrt(value) == pytest.approx(1.0, abs=5e-16)
-
-
-def test_angles_of_whole_quarters_are_exact() -> None:
-    quarters = [sine_cosine(90.0 * n, RULES["deg"]) for n in range(-4, 5)]
-    assert quarters[4:8] == [(0, 1), (1, 0), (0, -1), (-1, 0)]
-    assert quarters[:5] == quarters[4:]
-    assert sine_cosine(2.0**40, RULES["deg"]) == (0, 1)
-    assert sine_cosine(float("nan"), RULES["rad"]) == (0, 1)
 
 
 EXAMPLE = [

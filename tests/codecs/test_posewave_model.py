@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.decision_kernels import bucket_of
-from mcz.codecs.posewave.model import log_table, make_model, new_rows, no_rows, start_tables
+from mcz.codecs.posewave.model import make_model, new_rows, no_rows, start_tables
 from mcz.codecs.posewave.model_kernels import NO_CHOICE, begin_level, code_rows
-from mcz.codecs.posewave.state import MAX_INDEX, N_CLASSES, N_SLOTS, Model
+from mcz.codecs.posewave.state import MAX_INDEX, N_CLASSES, Model
 from mcz.coding import mixing
 from mcz.kernels.types import Floats, Ints
 
@@ -111,14 +110,6 @@ def test_choices() -> None:
         np.testing.assert_array_equal(q, found)
 
 
-def test_too_large() -> None:
-    q = np.zeros((2, 3), np.int64)
-    q[1, 1] = MAX_INDEX + 1
-    model, data = make_model(np.zeros(3, np.int64), start_tables()[0]), np.zeros(1000, np.uint8)
-    mixing.start(model.coder, data, 1)
-    assert code_level(model, 0, data, q, []) == 1
-
-
 @settings(max_examples=30, deadline=None)
 @given(st.binary(max_size=300), st.integers(1, 66))
 def test_hostile_bytes(noise: bytes, n: int) -> None:
@@ -133,27 +124,3 @@ def test_hostile_bytes(noise: bytes, n: int) -> None:
         assert (np.abs(q) <= MAX_INDEX).all()
         if found >= 0:
             break
-
-
-def test_buckets() -> None:
-    found = [bucket_of(size) for size in range(1, 60)]
-    assert found == sorted(found)
-    assert [found.index(k) + 1 for k in range(1, N_SLOTS + 1)] == [
-        1,
-        2,
-        3,
-        4,
-        5,
-        7,
-        9,
-        13,
-        17,
-        25,
-        33,
-        49,
-    ]
-
-
-def test_log_table() -> None:
-    np.testing.assert_array_equal(log_table()[[0, 1, 2, 4, 12, 60, 1020]], [0, 1, 3, 6, 12, 24, 48])
-    assert (np.diff(log_table()) >= 0).all()

@@ -14,12 +14,10 @@ from mcz.angles import FULL_TURN, unwrap
 from mcz.codecs.posewave.arc import arc
 from mcz.codecs.posewave.choices import choose
 from mcz.codecs.posewave.header import parse_header
-from mcz.codecs.posewave.metric_kernels import factor
 from mcz.codecs.posewave.order_choices import choose_orders
 from mcz.codecs.posewave.orders import SEQUENCES, Orders, own_sequence
 from mcz.codecs.posewave.posewave import CODEC
 from mcz.codecs.posewave.segment import decode_segment, encode_segment
-from mcz.codecs.posewave.skeleton_plan import make_plan
 from mcz.codecs.posewave.turns import RULES, sine_cosine
 from mcz.errors import FormatError, MotionError
 from mcz.kinematics.points import positions_of
@@ -78,11 +76,6 @@ def test_arc(y: float, x: float, unit: str) -> None:
     )
     sine, cosine = sine_cosine(found, RULES[unit])
     assert abs(sine * x - cosine * y) <= 1e-12 * np.hypot(x, y)
-
-
-def test_arc_of_axes_is_exact() -> None:
-    found = [arc(y, x, RULES["deg"]) for y, x in ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (0, 0))]
-    assert found == [0, 45, 90, 180, -90, 0]
 
 
 @given(SEQUENCE, CODES, UNITS, st.booleans(), st.lists(st.tuples(*[QUARTERS] * 3), min_size=1))
@@ -166,19 +159,6 @@ def test_wild_notes(data: bytes, n_frames: int) -> None:
     assert np.isfinite(orders.values(wild, told)).all()
 
 
-def test_joints_that_have_no_order() -> None:
-    skeleton = single((0, 1, 2), "deg")
-    channels = skeleton.joints[0].channels
-    for joint, unit in (
-        (Joint("two", channels=channels[:3]), "deg"),
-        (Joint("twice", channels=(*channels, channels[0])), "deg"),
-        (Joint("of two axes", channels=(channels[0], channels[2], channels[0])), "deg"),
-        (Joint("with a quaternion", channels=(*channels, Channel("qw"))), "deg"),
-        (skeleton.joints[0], ""),
-    ):
-        assert own_sequence(joint, replace(skeleton, joints=(joint,), angle_unit=unit)) is None
-
-
 def source_of(skeleton: Skeleton, values: Floats) -> MemorySource:
     """A motion as an encoder sees it."""
     return MemorySource(Motion(skeleton, (Signal(values),)), 0, CODEC, 2**26)
@@ -225,22 +205,3 @@ def test_codec() -> None:
     wild[7, 3] = 2.0**40
     with pytest.raises(MotionError, match="an angle of"):
         encode_segment(header, skeleton, wild, choice.weights)
-
-
-@given(SEQUENCE, CODES, st.integers(0, 100))
-def test_metric_of_coded_angles(own: tuple[int, ...], code: int, seed: int) -> None:
-    """It is that of a skeleton whose channels have the coded order."""
-    skeleton, other = single(own, "deg"), single(SEQUENCES[code - 1], "deg")
-    values = np.random.default_rng(seed).uniform(-180, 180, (1, 4))
-    there = values.copy()
-    there[:, Orders([1], other).places[0].columns] = values[
-        :, Orders([1], skeleton).places[0].columns
-    ]
-    kept, added = np.array([False, True, False, False]), np.ones(1)
-    for kind in ROTATION_KINDS:
-        found = []
-        for one, pose, orders in ((skeleton, values, [code]), (other, there, [])):
-            kept = np.array([channel.kind == kind for channel in one.channels])
-            plan = make_plan(one, kept, added, radius=1.0, orders=orders)
-            found.append(factor(plan, pose))
-        assert np.array_equal(found[0], found[1])

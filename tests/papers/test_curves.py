@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,9 @@ import pytest
 import mcz
 from mcz.bench.cases import Case, Variant, load
 from mcz.bench.tasks import Task, perform
-from mcz.errors import MotionError, OptionError
+from mcz.errors import OptionError
 from tools.papers import curves
-from tools.papers.curves import at, curve, point_of, referenced, references, walk
+from tools.papers.curves import curve, point_of, referenced, references, walk
 from tools.papers.kinds import KINDS
 
 FRAME = Variant("lsdt-frame")
@@ -39,25 +38,6 @@ def test_a_walk_covers_the_errors_of_the_tables(start: float, slope: float) -> N
     inside = [e for e in errors if curves.LOW <= e <= curves.HIGH]
     assert 4 <= len(inside) <= 9
     assert max(b / a for a, b in zip(inside, inside[1:], strict=False)) < 3
-
-
-def test_a_walk_ends_where_the_codec_does() -> None:
-    def measured(setting: float) -> dict[str, Any]:
-        if not 0.2 < setting < 3:
-            raise MotionError("no further")
-        return _record(setting, setting)
-
-    points = walk(measured, 1.0, lambda s: s)
-    assert all(0.2 < point["setting"] < 3 for point in points)
-    assert len(points) >= 3
-
-
-def test_figures_between_points_lie_on_lines_in_logarithms() -> None:
-    points = [_record(s, 0.1 * s) for s in (1.0, 4.0, 16.0)]
-    assert at(points, "cm", 0.2, "cr") == pytest.approx(100 * math.sqrt(0.2))
-    assert at(points, "cr", 100 * math.sqrt(0.8), "cm") == pytest.approx(0.8)
-    assert at(points, "cm", 0.05, "cr") is None
-    assert at(points[:1], "cm", 0.1, "cr") is None
 
 
 def test_a_point_has_96_bits_a_point_and_frame(case: Case, tmp_path: Path) -> None:
@@ -93,11 +73,3 @@ def test_without_a_unit_there_is_no_curve(samples: Path) -> None:
     assert "length unit" in found["error"]
     with pytest.raises(OptionError, match="nothing to turn"):
         curve(Case(str(samples / "walk.amc")), Variant("raw"))
-
-
-def test_speeds_beside_each_other(case: Case) -> None:
-    rows = curves.speeds_beside(case, [(Variant("mrdwt"), 1.0), (FRAME, 0.1)])
-    assert [(row["label"], row["live"]) for row in rows] == [
-        *(("mrdwt", False), ("lsdt-frame", False), ("lsdt-frame", True))
-    ]
-    assert all(row["encode_fps"] > 0 and row["decode_fps"] > 0 for row in rows)

@@ -13,9 +13,7 @@ import pytest
 
 import mcz
 from mcz.bench import plots
-from mcz.bench.cache import Cache
-from mcz.bench.cases import Case, Variant
-from mcz.bench.tasks import Runner
+from mcz.bench.cases import Case
 from mcz.cli.common import run as run_command
 from mcz.codecs import by_name
 from mcz.codecs.online.units import Unit
@@ -23,7 +21,6 @@ from mcz.errors import OptionError
 from tests.papers.walks import put_walk
 from tools import fit_bit_allocation
 from tools.papers.__main__ import command
-from tools.papers.kinds import KINDS
 from tools.papers.kwak import (
     claims,
     clips,
@@ -35,11 +32,9 @@ from tools.papers.kwak import (
     tables,
     tasks,
     versus,
-    work,
 )
 from tools.papers.kwak.clips import (
     MADE,
-    MARKED,
     POINTS,
     VIRTUAL,
     Clip,
@@ -51,17 +46,13 @@ from tools.papers.kwak.fit import Point
 from tools.papers.kwak.losses import INTRA, LTR, STR, received, regardless
 from tools.papers.kwak.measure import (
     code,
-    dialed,
     errors,
     group_bytes,
-    live_basis,
     rate_point,
     rates,
 )
-from tools.papers.kwak.run import kwak
 from tools.papers.kwak.tasks import (
     CHAINED,
-    CODED,
     FIL,
     MOD,
     OURS,
@@ -70,8 +61,7 @@ from tools.papers.kwak.tasks import (
     Found,
     rates_task,
 )
-from tools.papers.kwak.versus import bd, kbps_at
-from tools.papers.outcome import Outcome
+from tools.papers.kwak.versus import bd
 
 
 @pytest.fixture(scope="module")
@@ -99,11 +89,6 @@ def test_clips_are_markers_then_skeletons(folder: Path) -> None:
     ]
 
 
-def test_without_clips_there_is_a_word(samples: Path) -> None:
-    with pytest.raises(OptionError, match="17_10"):
-        find_clips([str(samples / "walk.bvh")], None)
-
-
 def test_a_set_of_41_markers_in_mm(folder: Path) -> None:
     case = Case(str(folder / "13_29.amc"))
     made, whole = motion_in_positions(Clip(case, MADE)), motion_in_positions(Clip(case, VIRTUAL))
@@ -119,22 +104,6 @@ def test_a_set_of_41_markers_in_mm(folder: Path) -> None:
     with pytest.raises(OptionError, match="no virtual marker"):
         bvh = mcz.read(folder / "unknown.bvh")
         clips._made(replace(bvh, skeleton=replace(bvh.skeleton, unit_cm=1.0)))
-
-
-def test_of_bvh_the_first_pose_is_left_out(folder: Path) -> None:
-    whole = mcz.read(folder / "unknown.bvh")
-    found = motion_in_positions(Clip(Case(str(folder / "unknown.bvh"), "cm"), POINTS))
-    assert found.n_frames == whole.n_frames - 1
-
-
-def test_frames_at_the_ends_that_show_nothing_are_left_out(folder: Path) -> None:
-    motion = motion_in_positions(Clip(Case(str(folder / "86_02.c3d")), MARKED))
-    signal = motion.signals[0]
-    mask = np.ones(signal.values.shape, np.bool_)
-    mask[:3] = mask[-2:] = mask[10] = False
-    found = clips._seen(replace(motion, signals=(replace(signal, mask=mask),)))
-    assert found.n_frames == motion.n_frames - 5
-    np.testing.assert_array_equal(found.signals[0].mask, mask[3:-2])
 
 
 # Rates and errors
@@ -175,26 +144,12 @@ def test_errors_are_those_of_valid_places() -> None:
     assert cm == pytest.approx(0.1 * 0.25)
 
 
-def test_a_live_encoder_has_known_bases_or_cosines(folder: Path, clip: Clip) -> None:
-    assert live_basis(clip) == "known"
-    assert live_basis(Clip(Case(str(folder / "13_29.amc")), MADE)) == "cosines"
-    assert OURS.variant(clip).params == (("rate_control", "steady"), ("basis", "known"))
-    learned = rate_point(motion_in_positions(clip), {"step": 0.5, "basis": "learned"})
-    assert learned["model_kbps"] > 0
-
-
 def test_bytes_of_whole_groups_alone_count() -> None:
     units = [
         *(Unit(2, 30, b"a" * 7), Unit(1, 20, b"b" * 5), Unit(0, 10, b"c" * 4)),
         Unit(1, 3, b"d"),
     ]
     assert group_bytes(units, 30) == [7, 9]
-
-
-@pytest.mark.parametrize("start", [1e-3, 1.0, 300.0])
-def test_settings_are_found_by_rate(start: float) -> None:
-    points = dialed(lambda s: {"setting": s, "kbps": 4 * s**-0.6}, start, (3.0, 7.0))
-    assert [p["kbps"] for p in points] == pytest.approx([3.0, 7.0], rel=0.003)
 
 
 # Coders
@@ -209,14 +164,6 @@ def test_indices_come_back(clip: Clip) -> None:
         assert kinds[0] == INTRA and kinds[1] == STR
         # Coded again, they take as many bits as the signs at least.
         assert rice_bits(found, motion) > np.count_nonzero(indices)
-
-
-def test_rice_codes_alone_take_a_bit_a_coefficient(clip: Clip) -> None:
-    motion = motion_in_positions(clip)
-    found = code(motion, {"preset": "mod", "step": 1e4})
-    assert not indices_of(found)[0].any()
-    n_groups = -(-motion.n_frames // 30)
-    assert rice_bits(found, motion) <= motion.n_frames + 8 * n_groups
 
 
 # Losses
@@ -248,12 +195,6 @@ def test_a_live_decoder_goes_on_where_it_can(clip: Clip) -> None:
     assert (out[40:] == whole[40:]).all()
 
 
-def test_the_first_frame_always_comes() -> None:
-    assert not losses.lost_frames(1000, 1.0, 1)[0]
-    assert losses.lost_frames(1000, 1.0, 1)[1:].all()
-    assert losses.lost_frames(4000, 0.05, 1).mean() == pytest.approx(0.05, abs=0.02)
-
-
 # Fits
 
 
@@ -264,11 +205,6 @@ def test_a_line_without_outliers() -> None:
     assert (found.a, found.b) == (pytest.approx(0.25), pytest.approx(-1.5))
     assert (found.n_points, found.n_outliers) == (99, 1)
     assert found.residual == pytest.approx(0, abs=1e-9)
-
-
-def test_variances_are_those_of_decoded_coefficients() -> None:
-    values = np.array([0.0, 1, 2, 10, 11, 12, 20])[:, None]
-    assert fit.variances(values, 3) == (100, 1)
 
 
 def test_g_follows_from_the_best_ratio(clip: Clip) -> None:
@@ -349,12 +285,6 @@ def test_claims_are_judged_by_the_figures(clip: Clip) -> None:
     assert bd(found, clip, MOD, OURS) == (None, None)
 
 
-def test_rates_at_an_error_lie_on_lines_in_logarithms() -> None:
-    points = [{"kbps": r, "cm": 8 / r} for r in (2.0, 4.0, 8.0)]
-    assert kbps_at(points, "cm", 8 / 3) == pytest.approx(3)
-    assert kbps_at(points, "cm", 0.5) is None
-
-
 # The whole run
 
 
@@ -409,35 +339,3 @@ def test_all_tables_of_generated_clips(
         assert {"kwak_sqnr_markers.png", "kwak_sizes.png", "kwak_losses.png"} <= names
     monkeypatch.setattr("mcz.bench.tasks.perform", lambda *given: pytest.fail("measured again"))
     assert run_command(command, "papers", arguments) == 0
-
-
-def test_what_cannot_be_measured_is_left_out(folder: Path) -> None:
-    clip = Clip(Case(str(folder / "17_10.amc")), POINTS)
-    found = Found([clip])
-    for method in (MOD, *CODED):
-        found.results[rates_task(clip, method, printed.TARGETS)] = {"error": "no"}
-    assert {len(table.rows) for table in tables.tables(found)} >= {0}
-    (judged,) = [table for table in tables.tables(found) if "claim" in table.title]
-    assert {row[2] for row in judged.rows} == {"-"}
-
-
-def test_a_folder_without_its_clips_is_refused(samples: Path) -> None:
-    with pytest.raises(OptionError, match="kwak"):
-        kwak(Outcome(), [str(samples)], None, Runner(1, Cache(None), KINDS))
-
-
-def test_studies_have_names(clip: Clip) -> None:
-    found = work.perform(clip.case, Variant("online"), "packets", POINTS, (8.0,))
-    keys = ("stored", "terminated", "streams", "packets", "with_entries")
-    for row in found:
-        assert sorted(row[key] for key in keys) == [row[key] for key in keys]
-
-
-@pytest.mark.real
-def test_the_papers_rates_on_a_clip_of_the_paper(data: Path) -> None:
-    here = {clip.name: clip for clip in find_clips([str(data)], None)}
-    assert {"01_01.c3d", "13_29.amc, 41 markers", "17_10.amc", "14_08.bvh"} <= set(here)
-    assert here["01_01.c3d"].form == MARKED
-    for method in (RC, RCA, OURS, CHAINED):
-        for point in rates(here["17_10.amc"], method.params, printed.TARGETS):
-            assert point["kbps"] == pytest.approx(point["target"], rel=0.01)
