@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import struct
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,6 @@ from mcz.container.segments import FRESH
 from mcz.container.source import open_source
 from mcz.container.value_hash import canonical
 from mcz.container.writer import Writer
-from mcz.errors import FormatError
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import validate
@@ -39,24 +37,6 @@ from tools.records import built, update
 JOINTS = ("hips", "spine", "fixed", "knee")
 
 
-def _counted_encode(source: Any, params: Any) -> Encoded:
-    """The overlap codec with a header that counts frames and channels."""
-    encoded = overlap_codec.encode(source, params)
-    size = struct.pack("<II", source.layout.n_frames, source.layout.n_channels)
-    return Encoded(size, encoded.segments, encoded.n_resolutions)
-
-
-def _counted_decode(header: bytes, layout: Any, *rest: Any) -> Any:
-    if struct.unpack("<II", header) != (layout.n_frames, layout.n_channels):
-        raise FormatError("counted: a header of another signal")
-    return overlap_codec.decode(b"overlap", layout, *rest)
-
-
-def _counted_cut(header: bytes, layout: Any, first: int, stop: int, groups: Any) -> bytes:
-    assert header == struct.pack("<II", layout.n_frames, layout.n_channels)
-    return struct.pack("<II", stop - first, sum(len(layout.groups[g]) for g in groups))
-
-
 def _running_encode(source: Any, params: Any) -> Encoded:
     """Raw, but only every third segment is said to start fresh."""
     encoded = raw.encode(source, params)
@@ -66,18 +46,10 @@ def _running_encode(source: Any, params: Any) -> Encoded:
 
 EXTRA = (
     overlap_codec.CODEC,
-    replace(
-        overlap_codec.CODEC,
-        id=252,
-        name="counted",
-        encode=_counted_encode,
-        decode=_counted_decode,
-        cut=_counted_cut,
-    ),
     replace(raw.CODEC, id=253, name="running", encode=_running_encode),
     replace(raw.CODEC, id=254, name="one", grouping="all"),
 )
-LENGTH = {"overlap": "length", "counted": "length"}  # else segment_frames
+LENGTH = {"overlap": "length"}  # else segment_frames
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -156,7 +128,7 @@ def check(whole: bytes, part: bytes, start: int, stop: int, joints: Any, resolut
                 assert canonical(piece) == canonical(found[a * one.layout.samples_per_frame :])
 
 
-CODECS = ("raw", "lossless", "overlap", "counted", "running")
+CODECS = ("raw", "lossless", "overlap", "running")
 
 
 def motion_for(codec: str) -> mcz.Motion:

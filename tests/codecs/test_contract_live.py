@@ -91,7 +91,7 @@ def walk(name: str, n_frames: int, seed: int = 0) -> Motion:
 
 
 @EVERY
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(st.integers(1, 25), st.integers(0, 99), st.data())
 def test_a_file_of_the_packets_has_what_came_live(
     name: str, n_frames: int, seed: int, data: st.DataObject
@@ -111,7 +111,7 @@ def test_a_file_of_the_packets_has_what_came_live(
 
 
 @EVERY
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(lost=st.sets(st.integers(0, 29), max_size=6), damaged=st.integers(0, 29))
 def test_after_a_loss_no_frame_is_wrong(name: str, lost: set[int], damaged: int) -> None:
     """Frames that need a lost or damaged one are refused up to the next that starts fresh."""

@@ -266,33 +266,6 @@ def test_details_up_to_the_limit_are_coded() -> None:
             streams.build_streams(bands, 0, coding)
 
 
-@given(st.data())
-def test_bands_of_any_integers(data) -> None:
-    """Streams give back any bands, and any first part of them."""
-    least = data.draw(st.sampled_from([1, 2, 7, 2**39]))
-    scaled, shift = data.draw(st.booleans()), data.draw(st.integers(0, 31))
-    coding = streams.Coding("mrdwt", scaled, least, shift)
-    sizes = st.integers(0, 40).map(lambda bits: 2**bits)
-    counts = data.draw(st.lists(st.integers(1, 12), min_size=1, max_size=5))
-    bands = []
-    for place, count in enumerate(counts):
-        most = 2**40 - 1 if place else 2**40
-        drawn = data.draw(
-            st.lists(
-                sizes.flatmap(lambda size: st.integers(-size, size)), min_size=count, max_size=count
-            )
-        )
-        drawn = [max(-most, min(most, v)) for v in drawn]
-        bands.append(np.array([v if not place or abs(v) >= least else 0 for v in drawn], np.int64))
-    step = data.draw(st.integers(0, 255))
-    packed = streams.build_streams(bands, step, coding)
-    wanted = [data.draw(st.integers(0, count)) for count in counts]
-    found, code = streams.parse_streams(packed.__getitem__, counts, wanted, coding)
-    assert code == (step if scaled and packed[0] else 0)
-    for band, meant, n in zip(found, bands, wanted, strict=True):
-        np.testing.assert_array_equal(band, meant[:n])
-
-
 def test_radians_are_coded_like_degrees() -> None:
     motion = wandering(200, ["rx", "ry", "rz"])
     for rule in ("flat", "depth", "sensitivity"):

@@ -107,25 +107,6 @@ def test_a_mean_of_each_frame_is_a_component_of_ones() -> None:
 # Streams
 
 
-def test_any_integers_survive() -> None:
-    random = np.random.default_rng(0)
-    for n_frames, n_channels, count in ((1, 1, 1), (1, 3, 2), (9, 3, 3), (40, 8, 5), (3, 9, 4)):
-        parts = []
-        for shape in ((n_channels,), (count, n_channels), (n_frames, count)):
-            powers = random.integers(0, 41, shape)
-            parts.append(np.rint(random.uniform(-1, 1, shape) * 2.0**powers).astype(np.int64))
-        shifts = random.integers(0, 41, count)
-        given_ = Components(200, parts[0], shifts, parts[1], parts[2])
-        data = streams.build_stream(given_, scaled=True)
-        for wanted in {0, 1, n_frames // 2, n_frames}:
-            found = streams.parse_stream(data, n_channels, n_frames, wanted, scaled=True)
-            assert found.step == 200
-            np.testing.assert_array_equal(found.means, parts[0])
-            np.testing.assert_array_equal(found.basis, parts[1])
-            np.testing.assert_array_equal(found.shifts, shifts)
-            np.testing.assert_array_equal(found.coefficients, parts[2][:wanted])
-
-
 def test_integers_beyond_the_limit_are_refused() -> None:
     most = np.array([2**40], np.int64)
     one, none = np.array([[1]], np.int64), np.zeros(1, np.int64)

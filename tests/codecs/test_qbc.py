@@ -239,43 +239,6 @@ def test_points_up_to_the_limit_are_coded() -> None:
         saved(clip_of(values + 1, ["tx", "ty"]), Q=0, d2_lmt=0)
 
 
-@given(st.data())
-def test_streams_of_any_integers(data) -> None:
-    """Both streams give back any points and lengths."""
-    n_channels, delta = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 9))
-    n_marks = data.draw(st.integers(1, 5))
-    sizes = st.integers(0, 40).map(lambda bits: 2**bits)
-    one = sizes.flatmap(lambda size: st.integers(-size, size))
-    points = st.lists(one, min_size=n_channels, max_size=n_channels)
-    marks = np.array([data.draw(points) for _ in range(n_marks)], np.int64)
-    frames = np.arange(n_marks) * delta
-    lengths: list[int] = []
-    for _ in range(n_marks - 1):
-        left = delta
-        while left:
-            lengths.append(data.draw(st.integers(1, left)))
-            left -= lengths[-1]
-    shape = len(lengths), n_channels
-    ends, mids = (
-        np.array([data.draw(points) for _ in lengths], np.int64).reshape(shape) for _ in range(2)
-    )
-    at_mark = np.flatnonzero(np.cumsum(lengths) % delta == 0)
-    ends[at_mark] = marks[1:]
-    starts = np.concatenate([marks[:1], ends[:-1]])[: len(lengths)]
-    single = np.array(lengths, np.int64) == 1
-    mids[single] = (starts[single] + ends[single]) >> 1
-    packed = streams.build_marks(marks)
-    np.testing.assert_array_equal(streams.parse_marks(packed, n_marks, n_channels, "qbc"), marks)
-    first = streams.parse_first_mark(packed, n_channels, "qbc")
-    np.testing.assert_array_equal(first, marks[:1])
-    curves = streams.Curves(np.array(lengths, np.int64), ends, mids)
-    fine = streams.build_curves(marks, frames, curves)
-    found = streams.parse_curves(fine, marks, frames, "qbc", whole=True)
-    np.testing.assert_array_equal(found.lengths, curves.lengths)
-    np.testing.assert_array_equal(found.ends, ends)
-    np.testing.assert_array_equal(found.mids, mids)
-
-
 # Parameters
 
 
