@@ -81,43 +81,15 @@ def values_of(data: bytes, joint: str | None = None) -> np.ndarray:
         return only(file).read(joints=None if joint is None else [joint])
 
 
-def streams_of(data: bytes) -> dict[tuple[int, int, str, int], bytes]:
-    """Every stream of the only clip: (signal, segment, kind, group) -> bytes."""
-    found = {}
-    with mcz.open(data) as file:
-        for info in only(file).signals:
-            groups = range(info.counts.n_groups)
-            for number, row in enumerate(info.rows):
-                table, streams = file.container.streams(row, info.counts, None)
-                at = table.frame_notes()
-                found[info.index, number, "frame notes", 0] = b"" if at is None else streams[at]
-                for kind, place in (("notes", table.group_notes), ("mask", table.mask)):
-                    for group in groups:
-                        index = place(group)
-                        found[info.index, number, kind, group] = (
-                            b"" if index is None else streams[index]
-                        )
-                for resolution in range(info.counts.n_resolutions):
-                    for group in groups:
-                        stream = streams[table.codec(resolution, group)]
-                        found[info.index, number, f"codec {resolution}", group] = stream
-    return found
-
-
-def changed_groups(before: bytes, after: bytes) -> set[int]:
-    """The groups of the motion of which any stream differs; all other streams are the same."""
-    old, new = streams_of(before), streams_of(after)
-    assert old.keys() == new.keys()
-    differing = {key for key in old if old[key] != new[key]}
-    assert {(signal, kind == "frame notes") for signal, _, kind, _ in differing} <= {(0, False)}
-    return {group for _, _, _, group in differing}
-
-
-def groups_of(data: bytes, joint: str) -> set[int]:
-    with mcz.open(data) as file:
-        clip = only(file)
-        columns = set(clip.skeleton.columns(clip.skeleton.find(joint)))
-        return {g for g, group in enumerate(clip.signals[0].layout.groups) if columns & {*group}}
+def check_others(before: bytes, after: bytes, *joints: str) -> None:
+    """All joints but these have the bits that they had, segments and headers are the same."""
+    with mcz.open(before) as a, mcz.open(after) as b:
+        old, new = only(a), only(b)
+        others = [n for n in old.skeleton.addresses() if n not in joints]
+        assert new.read(joints=others).tobytes() == old.read(joints=others).tobytes()
+        for one, other in zip(old.signals, new.signals, strict=True):
+            assert one.header == other.header
+            assert [row.header for row in one.rows] == [row.header for row in other.rows]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -125,27 +97,17 @@ def groups_of(data: bytes, joint: str) -> set[int]:
 def test_the_joint_changes_and_nothing_else(case: str, joint: str) -> None:
     codec, params = CASES[case]
     data = written(smooth(500), codec, **params)
-    old = values_of(data)
     wave = np.round(10 * np.cos(np.arange(500) * 0.11), 4)
     new = np.round(values_of(data, joint) + wave[:, None], 4)
     after, found = edited(data, joint, new)
     assert (found.clip, found.joint, found.codec, found.recoded) == ("smooth", joint, codec, ())
-    assert changed_groups(data, after) == groups_of(data, joint)
-    with mcz.open(data) as a, mcz.open(after) as b:
-        assert only(a).signals[0].header == only(b).signals[0].header
-        assert [r.header for r in only(a).signals[0].rows] == [
-            r.header for r in only(b).signals[0].rows
-        ]
-        columns = only(b).skeleton.columns(only(b).skeleton.find(joint))
-    decoded = values_of(after)
-    others = [c for c in range(10) if c not in columns]
-    assert np.array_equal(decoded[:, others], old[:, others])
-    error = np.abs(decoded[:, list(columns)] - new)
+    check_others(data, after, joint)
+    error = np.abs(values_of(after, joint) - new)
     assert found.max_error == error.max()
     if codec in LOSSLESS:
         assert not error.any()
-        whole = smooth(500).with_values(decoded)
-        assert np.array_equal(values_of(written(whole, codec, **params)), decoded)
+        whole = smooth(500).with_values(values_of(after))
+        assert len(written(whole, codec, **params)) == len(after)
     else:
         assert 0 < error.max() < 9
 
@@ -185,7 +147,6 @@ def test_the_same_values_give_the_same_streams() -> None:
     for codec in LOSSLESS:
         data = written(smooth(300), codec, segment_frames=70)
         after, found = edited(data, "hips", values_of(data, "hips"))
-        assert streams_of(after) == streams_of(data)
         assert found.joint_bytes == found.joint_bytes_before
         assert after == data
 
@@ -205,13 +166,7 @@ def test_groups_that_repeat_the_joint_are_coded_anew_where_they_do() -> None:
     assert found.recoded == ("knee",)
     assert np.array_equal(values_of(after, "knee"), values_of(data, "knee"))
     assert np.array_equal(values_of(after, "spine"), new)
-    old, now = streams_of(data), streams_of(after)
-    differing = {key for key in old if old[key] != now[key]}
-    spine, knee = groups_of(data, "spine"), groups_of(data, "knee")
-    assert {(n, g) for _, n, _, g in differing} == {
-        *((n, g) for n in range(3) for g in spine),
-        *((n, g) for n in (1, 2) for g in knee),
-    }
+    check_others(data, after, "spine")
 
 
 def test_a_joint_that_repeats_another_leaves_it_alone() -> None:
@@ -219,7 +174,7 @@ def test_a_joint_that_repeats_another_leaves_it_alone() -> None:
     new = np.round(values_of(data, "knee") + 1, 4)
     after, found = edited(data, "knee", new)
     assert found.recoded == ()
-    assert changed_groups(data, after) == groups_of(data, "knee")
+    check_others(data, after, "knee")
     assert np.array_equal(values_of(after, "knee"), new)
 
 
@@ -271,7 +226,7 @@ def test_markers_keep_their_source(samples: Path) -> None:
         clip = only(file)
         assert np.allclose(clip.read(joints=[name]), moved, equal_nan=True, atol=1e-3)
         assert clip.source and len(clip.source_bytes()) == clip.source.size
-    assert changed_groups(data, after) == groups_of(data, name)
+    check_others(data, after, name)
     bad = moved.copy()
     bad[5, 1] = np.nan
     with pytest.raises(MotionError, match=r"frame 5 of .*ty is NaN"):
@@ -318,7 +273,7 @@ def test_nan_is_invalid_where_there_is_no_source(codec: str) -> None:
     after, _ = edited(data, "spine", new)
     found = values_of(after, "spine")
     assert np.array_equal(np.isnan(found), np.isnan(new))
-    assert changed_groups(data, after) == groups_of(data, "spine")
+    check_others(data, after, "spine")
     assert np.array_equal(values_of(after, "hips"), values_of(data, "hips"))
     new[:] = 1.0
     after, _ = edited(after, "spine", new)
@@ -334,7 +289,7 @@ def test_a_clip_that_was_cut(case: str, tmp_path: Path) -> None:
     data = part.read_bytes()
     new = np.round(values_of(data, "spine") * 0.5 + 3, 4)
     after, found = edited(data, "spine", new)
-    assert changed_groups(data, after) == groups_of(data, "spine")
+    check_others(data, after, "spine")
     assert np.abs(values_of(after, "spine") - new).max() == found.max_error < 8
     assert np.array_equal(values_of(after)[:, :6], values_of(data)[:, :6])
     with mcz.open(after) as file:
@@ -350,7 +305,7 @@ def test_a_clip_without_its_finest_details(codec: str, tmp_path: Path) -> None:
     mcz.extract(whole, part, resolution=1)
     new = np.linspace(0, 50, 300)
     after, found = edited(part.read_bytes(), "knee", new)
-    assert changed_groups(part.read_bytes(), after) <= groups_of(after, "knee")
+    check_others(part.read_bytes(), after, "knee")
     assert found.max_error < 2
 
 
@@ -513,7 +468,7 @@ def test_any_values_come_back(motion: Motion, codec: str, seed: int) -> None:
     after, _ = edited(data, "spine", new)
     found = values_of(after, "spine")
     assert np.array_equal(found.view(np.int64), np.where(np.isnan(new), np.nan, new).view(np.int64))
-    assert changed_groups(data, after) <= groups_of(data, "spine")
+    check_others(data, after, "spine")
 
 
 def test_a_stranger_among_copies() -> None:
