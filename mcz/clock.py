@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import OptionError
+from mcz.hints import Hint
 from mcz.numbers import Grid, GridKind
 from mcz.skeleton import Channel, Skeleton
 from mcz.source import SourceClock
@@ -270,8 +271,7 @@ def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
     """The timeline of ``name``, a motion or clip; raises OptionError where it is unknown."""
     if timeline is None:
         raise OptionError(
-            f"{name!r}: its frame rate is unknown, and so are its times; say the rate when "
-            "reading (rate=, --rate)"
+            "its frame rate is unknown, and so are its times", clip=name, hint=Hint.RATE
         )
     return timeline
 

@@ -26,30 +26,16 @@ known is a warning: SkeletonWarning, ContactWarning.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from typing import TYPE_CHECKING, ClassVar, TypedDict
+
+from mcz.hints import PYTHON_HINTS, Hint, Remark, Words, with_hint
 
 if TYPE_CHECKING:
     from typing import Unpack
 
 Value = str | int | float
-
-
-class Hint(StrEnum):
-    """The way out of an error, as a code; ``PYTHON_HINTS`` words it for calls of this package."""
-
-    FORCE = "force"
-    UNIT = "unit"
-    RATE = "rate"
-
-
-PYTHON_HINTS: Mapping[Hint, str] = {
-    Hint.FORCE: "use force to replace it",
-    Hint.UNIT: "give the unit (unit=)",
-    Hint.RATE: "give the rate (rate=)",
-}
 
 
 class Fields(TypedDict, total=False):
@@ -117,8 +103,15 @@ class MczError(Exception):
         if inner is not None and (outer := fields.get("where")) is not None:
             self.where = f"{outer}: {inner}"
 
-    def describe(self, hints: Mapping[Hint, str] = PYTHON_HINTS, *, with_path: bool = True) -> str:
+    def describe(self, hints: Words = PYTHON_HINTS, *, with_path: bool = True) -> str:
         """The message and its fields as one text; ``hints`` words the hint."""
+        return with_hint(self.words(with_path=with_path), self.hint, hints)
+
+    def __str__(self) -> str:
+        return self.describe()
+
+    def words(self, *, with_path: bool = True) -> str:
+        """The text without the hint."""
         places = (
             self.path if with_path else None,
             None if self.clip is None else f"clip {self.clip!r}",
@@ -128,11 +121,7 @@ class MczError(Exception):
             self.message,
         )
         text = ": ".join(place for place in places if place)
-        hint = None if self.hint is None else hints[self.hint]
-        return "; ".join(part for part in (text, self.note, hint) if part)
-
-    def __str__(self) -> str:
-        return self.describe()
+        return f"{text}; {self.note}" if self.note else text
 
 
 @contextmanager
@@ -222,6 +211,14 @@ class SkeletonWarning(UserWarning):
 
 class ContactWarning(UserWarning):
     """A lossy codec could not keep a point in its place as it was asked to."""
+
+
+def remark_of(error: MczError | OSError, **fields: Unpack[Fields]) -> Remark:
+    """The text of an error as part of a report; ``fields`` as of ``MczError.add``."""
+    if isinstance(error, OSError):
+        error = MczError(reason_of(error), path=error.filename)
+    error.add(**fields)
+    return Remark(error.words(), error.hint)
 
 
 def reason_of(error: BaseException) -> str:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import ast
 import pickle
+import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz.errors import PYTHON_HINTS, Fields, FormatError, Hint, MczError, SourceError, error_context
+import mcz
+from mcz.cli.hints import OPTION_HINTS
+from mcz.errors import Fields, FormatError, MczError, SourceError, error_context
+from mcz.hints import PYTHON_HINTS, Hint, Remark, worded
 
 
 def classes(base: type[MczError] = MczError) -> Iterator[type[MczError]]:
@@ -74,5 +80,128 @@ def test_context_goes_in_front() -> None:
     }
 
 
-def test_every_hint_has_words() -> None:
-    assert set(PYTHON_HINTS) == set(Hint)
+def test_every_hint_has_words_for_python_and_for_the_command_line() -> None:
+    assert set(PYTHON_HINTS) == set(OPTION_HINTS) == set(Hint)
+    assert not [words for words in PYTHON_HINTS.values() if "--" in words]
+
+
+def test_a_remark_keeps_its_hint() -> None:
+    remark = pickle.loads(pickle.dumps(Remark("it exists", Hint.FORCE)))
+    assert remark == f"it exists; {PYTHON_HINTS[Hint.FORCE]}"
+    assert worded(remark, OPTION_HINTS) == f"it exists; {OPTION_HINTS[Hint.FORCE]}"
+    assert worded("it exists", OPTION_HINTS) == "it exists"
+
+
+# What the package does with them --------------------------------------------------
+
+PACKAGE = Path(mcz.__file__).parent
+TREES = {
+    path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text("utf-8"))
+    for path in sorted(PACKAGE.rglob("*.py"))
+}
+FORMS = {"startswith", "endswith", "replace", "removeprefix", "removesuffix", "partition", "find"}
+
+
+def rewrites(tree: ast.AST) -> Iterator[int]:
+    """Lines that assign to the arguments of something that is caught."""
+    for node in ast.walk(tree):
+        targets = getattr(node, "targets", None) or [getattr(node, "target", None)]
+        if isinstance(node, ast.Assign | ast.AugAssign | ast.AnnAssign):
+            for target in targets:
+                if isinstance(target, ast.Attribute) and target.attr == "args":
+                    yield node.lineno
+
+
+def texts_of_errors(tree: ast.AST) -> Iterator[ast.expr]:
+    """``str(error)``, ``error.message`` and ``error.args`` of our errors that are caught."""
+    for handler in ast.walk(tree):
+        if isinstance(handler, ast.ExceptHandler) and handler.name and _is_ours(handler.type):
+            for node in ast.walk(handler):
+                match node:
+                    case ast.Call(func=ast.Name(id="str"), args=[ast.Name(id=name)]):
+                        pass
+                    case ast.Attribute(value=ast.Name(id=name), attr="args" | "message"):
+                        pass
+                    case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr="describe")):
+                        pass
+                    case _:
+                        continue
+                if name == handler.name:
+                    yield node
+
+
+def _is_ours(caught: ast.expr | None) -> bool:
+    names = (
+        {node.id for node in ast.walk(caught) if isinstance(node, ast.Name)} if caught else set()
+    )
+    return bool(names & OURS)
+
+
+OURS = {kind.__name__ for kind in classes()} | {"Failure", "AmbiguousError"}
+
+
+def decisions(tree: ast.AST) -> Iterator[ast.AST]:
+    """What is decided on, and what takes texts apart."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):
+                yield test
+            case ast.Compare() | ast.Assert() | ast.Subscript():
+                yield node
+            case ast.comprehension(ifs=ifs):
+                yield from ifs
+            case ast.Match(subject=subject):
+                yield subject
+            case ast.Call(func=ast.Attribute(value=value, attr=form)) if form in FORMS:
+                yield value
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="re"))):
+                yield node
+
+
+def branches(tree: ast.AST) -> list[int]:
+    texts = {id(node): node.lineno for node in texts_of_errors(tree)}
+    within = (id(node) for test in decisions(tree) for node in ast.walk(test))
+    return sorted({texts[each] for each in within if each in texts})
+
+
+def test_nobody_rewrites_an_error() -> None:
+    assert not {path: lines for path, tree in TREES.items() if (lines := [*rewrites(tree)])}
+
+
+def test_nobody_takes_a_message_apart() -> None:
+    assert not {path: lines for path, tree in TREES.items() if (lines := branches(tree))}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "if 'x' in str(e): pass",
+        "a = 1 if str(e).startswith('x') else 2",
+        "a = str(e).replace('force', '--force')",
+        "a = re.search('line', e.message)",
+        "a = e.args[0]",
+        "a = [b for b in c if b in e.describe()]",
+    ],
+)
+def test_the_search_finds_what_it_is_for(line: str) -> None:
+    tree = ast.parse(f"try:\n    f()\nexcept (OSError, FormatError) as e:\n    {line}")
+    assert branches(tree) == [4]
+
+
+def test_the_library_names_no_option_of_the_command_line() -> None:
+    def options(tree: ast.AST) -> Iterator[str]:
+        documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                if id(node) not in documents and re.search(r"(?<![\w\-`])--[a-z]", node.value):
+                    yield node.value
+
+    library = {path: tree for path, tree in TREES.items() if not path.startswith("cli/")}
+    found = {path: texts for path, tree in library.items() if (texts := [*options(tree)])}
+    assert set(found) <= NO_LIBRARY, found
+
+
+NO_LIBRARY = {
+    "pictures/chart_pages.py",  # variables of CSS
+    "viewing/building.py",  # options of npm
+}

@@ -203,7 +203,7 @@ def test_a_disk_that_folds_names_loses_nothing(
     monkeypatch.setattr(safe_names.Folder, "note", folding)
     report = mcz.unpack(archive, out, force=force)
     assert [o.path for o in report.failures] == ["notes.txt"]
-    assert "--names portable keeps both" in report.failures[0].message
+    assert "names='portable' keeps both" in report.failures[0].message
     assert (out / "NOTES.TXT").read_bytes() == b"0 NOTES.TXT"
 
 

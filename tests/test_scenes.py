@@ -188,7 +188,7 @@ def test_what_cannot_be_said() -> None:
     with pytest.raises(MotionError, match="joints cannot be left out of frames"):
         mcz.to_glb(walk.with_values(values))
     unknown = replace(walk, skeleton=replace(walk.skeleton, unit_cm=None))
-    with pytest.raises(OptionError, match="length unit is unknown, so keys cannot be 1 mm off"):
+    with pytest.raises(OptionError, match="length unit is unknown, so a key error of 1 mm"):
         mcz.to_glb(unknown, key_error_mm=1)
     assert mcz.to_glb(unknown, key_error_mm=1, unit="cm").key_error == 1
     with pytest.raises(OptionError, match="a key error of -1 mm"):

@@ -93,7 +93,7 @@ def command(
         raise Failure("--salvage keeps what --force drops; choose one", Exit.USAGE)
     if "-" in sources:
         raise Failure("append reads files, not standard input", Exit.USAGE)
-    with about(target, *sources), Progress() as progress:
+    with about(target), Progress() as progress:
         report = mcz.append(
             sources,
             target,

@@ -32,11 +32,11 @@ def command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_json:
     lines = [_line(text) for text in info]
     if len({name.lower() for name, _ in lines}) < len(lines):
         raise Failure("--info: a name is given twice", Exit.USAGE)
-    with about(folder, *files):
+    with about(folder):
         path = mcz.bag(files, folder, dict(lines), software=f"mcz {mcz.__version__}")
         found = check_bag(path)
     if found.problems:  # as of a disk that does not keep what it is given
-        raise Failure(f"{folder}: {found.problems[0]}", Exit.NOT_VERIFIED, path=folder)
+        raise Failure(found.problems[0], Exit.NOT_VERIFIED, path=folder)
     if as_json:
         print_json({"output": folder, "files": found.files, "bytes": found.n_bytes})
     else:

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING
 import click
 
 from mcz.cli.common import Exit, Failure, about, echo, existing, print_json, say, table
+from mcz.cli.hints import in_options
 from mcz.cli.options import json_option, unit_option
 from mcz.cli.progress import Progress
+from mcz.errors import reason_of
 
 if TYPE_CHECKING:
     from mcz.bench.run import Outcome
@@ -78,7 +80,7 @@ def command(
             existing(path)
     with TemporaryDirectory() as folder, Progress() as progress, ExitStack() as stack:
         clips = clips or (_sample(folder),)
-        stack.enter_context(about(clips[0], *clips))
+        stack.enter_context(about(clips[0]))
         runner = Runner(jobs or os.cpu_count() or 1, Cache(default_folder() if cache else None))
         runner.progress = progress
         outcome = bench(
@@ -102,7 +104,7 @@ def show(outcome: Outcome, out: Path | None, *, as_json: bool) -> None:
     for line in _lines(outcome):
         echo(line)
     for note in outcome.notes:
-        say(note)
+        say(in_options(note))
     for path in document["files"]:
         echo(path)
 
@@ -144,5 +146,5 @@ def _write(outcome: Outcome, folder: Path) -> list[str]:
         document = json.dumps(outcome.document(), indent=1, ensure_ascii=False, allow_nan=False)
         results.write_text(document + "\n", "utf-8")
     except OSError as error:
-        raise Failure(f"{folder}: {error.strerror or error}") from None
+        raise Failure(reason_of(error), path=folder) from None
     return [str(path) for path in (results, report, page, *drawn)]

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli.damage import hinted
+from mcz.cli.hints import OPTION_HINTS
 from mcz.cli.terminal import binary_output as binary_output
 from mcz.cli.terminal import echo as echo
 from mcz.cli.terminal import print_json as print_json
@@ -28,13 +29,17 @@ from mcz.cli.terminal import text_output as text_output
 from mcz.errors import (
     AccessError,
     ContactWarning,
-    ExistsError,
+    Fields,
     MczError,
     OptionError,
     SkeletonWarning,
+    reason_of,
 )
+from mcz.hints import Hint
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     from mcz.reading.file import File
 
 
@@ -61,11 +66,10 @@ Exit codes:
   143  terminated"""
 
 
-class Failure(Exception):
-    """An error as the user sees it: one line and an exit code.
+class Failure(MczError):
+    """An error of a command: a message and an exit code.
 
-    ``path`` is the file that it is about, ``kind`` what ``--json`` calls it: the class of the error
-    behind it where there is one.
+    ``kind`` is what ``--json`` calls it: the class of the error behind it where there is one.
     """
 
     def __init__(
@@ -73,12 +77,16 @@ class Failure(Exception):
         message: str,
         code: Exit = Exit.BAD_INPUT,
         *,
-        path: str | None = None,
         kind: str | None = None,
+        **fields: Unpack[Fields],
     ) -> None:
-        super().__init__(message)
-        self.code, self.path = code, path
+        super().__init__(message, **fields)
+        self.code = code
         self.kind = kind or ("UsageError" if code == Exit.USAGE else "InputError")
+
+
+class JsonRefused(Failure):
+    """A command that has no JSON to print, not even of this error."""
 
 
 WIDEST_CELL = 48  # characters that the columns of a table are aligned to
@@ -109,7 +117,7 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     except BrokenPipeError:  # the reader of our output has seen enough
         _give_up_output()
         return Exit.FINE
-    except (Failure, click.ClickException, MczError, OSError, MemoryError) as error:
+    except (click.ClickException, MczError, OSError, MemoryError) as error:
         return _failed(error, as_json="--json" in given)
     except ImportError as error:
         if not _is_starved(error):
@@ -150,40 +158,45 @@ def _is_starved(error: ImportError) -> bool:
 def _failed(error: Exception, *, as_json: bool) -> Exit:
     """Say what went wrong; return the exit code."""
     failure = _failure_of(error)
-    if as_json and "--json" not in str(failure):  # that it is refused is said in words
+    if as_json and not isinstance(failure, JsonRefused):
         say_json({"error": _facts(failure)})
     else:
-        say(str(failure))
+        say(_text_of(failure))
     _give_up_output()
-    return failure.code
+    return code_of(failure)
 
 
-def _failure_of(error: Exception) -> Failure:
-    if isinstance(error, Failure):
+def _failure_of(error: Exception) -> MczError:
+    if isinstance(error, MczError):
         return error
     if isinstance(error, click.ClickException):
         context = getattr(error, "ctx", None)
-        hint = f"; see {context.command_path} --help" if context else ""
-        return Failure(error.format_message().rstrip(".") + hint, Exit.USAGE)
-    if isinstance(error, MemoryError):
-        return Failure(OUT_OF_MEMORY, kind="MemoryError")
-    failure = Failure(reason(error), code_of(error), kind=type(error).__name__)
-    failure.__cause__ = error
-    return failure
+        note = f"see {context.command_path} --help" if context else None
+        has_json = getattr(error, "option_name", None) != "--json"
+        kind = Failure if has_json else JsonRefused
+        return kind(error.format_message().rstrip("."), Exit.USAGE, note=note)
+    if isinstance(error, OSError):
+        return _failure_of_system(error)
+    return Failure(OUT_OF_MEMORY, kind="MemoryError")
 
 
-def _facts(failure: Failure) -> dict[str, Any]:
+def _failure_of_system(error: OSError) -> Failure:
+    return Failure(reason_of(error), code_of(error), kind=type(error).__name__, path=error.filename)
+
+
+def _text_of(error: MczError) -> str:
+    return " ".join(error.describe(OPTION_HINTS).split())
+
+
+def _facts(error: MczError) -> dict[str, Any]:
     """What ``--json`` says of an error; docs/scripts.md lists the keys."""
-    message = " ".join(str(failure).split())
-    line = re.search(r"\bline ([0-9]{1,15})\b", message)
-    return {
-        "exit_code": int(failure.code),
-        "class": failure.kind,
-        "message": message,
-        "file": failure.path,
-        "line": int(line[1]) if line else None,
-        "offset": getattr(failure.__cause__, "offset", None),
+    facts = {
+        "exit_code": int(code_of(error)),
+        "class": error.kind if isinstance(error, Failure) else type(error).__name__,
+        "message": _text_of(error),
+        "file": error.path,
     }
+    return facts | {name: getattr(error, name) for name in Fields.__annotations__ if name != "path"}
 
 
 class _Terminated(BaseException):
@@ -228,34 +241,30 @@ def _give_up_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def reason(error: Exception) -> str:
-    """What an error says, on one line and in words of the command line."""
-    if isinstance(error, OSError) and error.strerror:
-        named = f"{error.filename}: " if error.filename is not None else ""
-        return f"{named}{error.strerror}"
-    text = " ".join(str(error).split()) or type(error).__name__
-    return text.replace("; use force to", "; use --force to")
-
-
 def code_of(error: Exception) -> Exit:
+    if isinstance(error, Failure):
+        return error.code
     if isinstance(error, AccessError):
         return Exit.BAD_INPUT
     return Exit.USAGE if isinstance(error, OptionError | FileExistsError) else Exit.BAD_INPUT
 
 
 @contextmanager
-def about(path: str, *others: str) -> Iterator[None]:
-    """Put ``path`` in front of what goes wrong inside, unless the message names a file already."""
+def about(path: str) -> Iterator[None]:
+    """Say of what goes wrong inside that it is about the file ``path``, unless it is of another."""
     try:
         yield
-    except BrokenPipeError:
+    except (BrokenPipeError, Failure):
         raise
-    except (MczError, OSError) as error:
-        text = reason(error)
-        named = text if any(name in text for name in (path, *others)) else f"{path}: {text}"
-        raise Failure(named, code_of(error), path=path, kind=type(error).__name__) from error
+    except MczError as error:
+        error.add(path=path)
+        raise
+    except OSError as error:
+        failure = _failure_of_system(error)
+        failure.add(path=path)
+        raise failure from error
     except MemoryError as error:
-        raise Failure(f"{path}: {OUT_OF_MEMORY}", path=path, kind="MemoryError") from error
+        raise Failure(OUT_OF_MEMORY, path=path, kind="MemoryError") from error
 
 
 def existing(path: str, of_folders: str = "") -> None:
@@ -263,7 +272,7 @@ def existing(path: str, of_folders: str = "") -> None:
     if path != "-" and "://" not in path and not Path(path).is_file():
         is_there = f"is a folder{of_folders}" if Path(path).is_dir() else "not a file"
         what = is_there if Path(path).exists() else "no such file"
-        raise Failure(f"{path or repr(path)}: {what}", path=path, kind="AccessError")
+        raise Failure(what, path=path or repr(path), kind="AccessError")
 
 
 def given(path: str) -> str | bytes:
@@ -303,8 +312,7 @@ def damage_of(path: str, damage: Sequence[str]) -> Exit:
 
 def exists(path: Path) -> Failure:
     """That a file is there, and nobody said that it may be replaced."""
-    text = f"{path} exists; use --force to replace it"
-    return Failure(text, Exit.USAGE, path=str(path), kind="ExistsError")
+    return Failure("it exists", Exit.USAGE, path=path, kind="ExistsError", hint=Hint.FORCE)
 
 
 def check_new(path: Path, force: bool) -> None:
@@ -317,13 +325,8 @@ def write_output(path: Path, data: bytes, force: bool) -> None:
     """Write ``data`` under its name in one step, never over an existing file without ``force``."""
     from mcz.writing.atomic import replacing
 
-    try:
-        with about(str(path)), replacing(path, force=force) as stream:
-            stream.write(data)
-    except Failure as failure:
-        if isinstance(failure.__cause__, ExistsError):
-            raise exists(path) from None
-        raise
+    with about(str(path)), replacing(path, force=force) as stream:
+        stream.write(data)
 
 
 def plural(count: int, word: str) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from mcz.brief import counted
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
+from mcz.hints import Hint
 
 
 @contextmanager
@@ -22,9 +23,9 @@ def hinted(target: str | bytes, options: Mapping[str, Any]) -> Iterator[None]:
 
         whole = None if options.get("salvage") else _whole(target)
         if whole is not None:
-            error.args = (f"{error}; {whole}",)
+            error.add(note=whole, hint=Hint.SALVAGE)
         elif isinstance(target, str) and is_source(target):
-            error.args = (f"{error}; mcz encode makes one of a source file",)
+            error.add(hint=Hint.ENCODE)
         raise
 
 
@@ -45,4 +46,4 @@ def _whole(target: str | bytes) -> str | None:
     found = [counted(count, what) for count, what in counts if count]
     if not found:
         return None
-    return f"it holds {', '.join(found)}: --salvage reads them, mcz repair writes a sound file"
+    return f"it holds {', '.join(found)}"

@@ -11,6 +11,7 @@ import click
 from mcz.cli.common import (
     Exit,
     Failure,
+    JsonRefused,
     damage_of,
     plural,
     say,
@@ -159,7 +160,7 @@ def decode(
     """Write what is wanted of an input, and say what became of it."""
     file, salvage = given.file, given.salvage
     if output == "-" and (as_json or wanted.with_skeleton):
-        raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
+        raise JsonRefused("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
     if given.is_source:
         given, wanted = given.with_facts(wanted)
         refuse(output is None and wanted.target is None, f"{file}: {SOURCE_GIVEN}")
@@ -213,8 +214,9 @@ def _check_plain(file: str, wanted: Wanted) -> None:
     """Raise Failure for options of clips, where the file has none."""
     if wanted.target is not None or wanted.frames is not None or wanted.filtered:
         raise Failure(
-            f"{file}: it has no clips, so --to, --frames and --post-filter do not apply",
+            "it has no clips, so --to, --frames and --post-filter do not apply",
             Exit.USAGE,
+            path=file,
         )
 
 

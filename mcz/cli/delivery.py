@@ -61,7 +61,7 @@ def deliver(
     for path in paths:
         refuse_inputs(path, inputs)
         if paths.count(path) > 1:
-            raise Failure(f"{path}: {paths.count(path)} outputs have this name", Exit.USAGE)
+            raise Failure(f"{paths.count(path)} outputs have this name", Exit.USAGE, path=path)
     for path in paths:
         check_new(path, force)
     if output is not None and is_folder(output):

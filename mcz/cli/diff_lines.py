@@ -8,6 +8,7 @@ from typing import Any
 from mcz.brief import first_of
 from mcz.cli.common import plural, table
 from mcz.cli.figures import figure_lines
+from mcz.cli.hints import in_options
 
 FEW = 12  # names of joints that are shown
 SMALL_CM = 1.0  # below it distances are shown in mm
@@ -37,7 +38,7 @@ def lines_of(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
             shown = ", ".join(f"{key} {value:.4g}" for key, value in known.items())
             yield f"  {path}: {shown}"
     yield from (f"  {_difference_line(found)}" for found in beside)
-    yield from (f"  note: {note}" for note in notes)
+    yield from (f"  note: {in_options(note)}" for note in notes)
     for rows in (_table_by_joint(by_joint), _table_of_contacts(contacts)):
         yield from (f"  {line}".rstrip() for line in rows)
 

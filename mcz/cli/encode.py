@@ -13,6 +13,7 @@ import click
 from mcz.cli.common import (
     Exit,
     Failure,
+    JsonRefused,
     about,
     binary_output,
     echo,
@@ -92,7 +93,7 @@ def command(
         raise Failure("--format says what standard input is; SRC has a suffix", Exit.USAGE)
     existing(source, f": mcz pack {shlex.quote(source)} OUT.mcz")
     if source.lower().endswith(".mcz"):
-        raise Failure(f"{source}: is an .mcz already; mcz append adds it to another")
+        raise Failure("is an .mcz already; mcz append adds it to another", path=source)
     return _encode_file(source, output, skeleton, force, as_json, **options)
 
 
@@ -111,7 +112,7 @@ def _encode_piped(
     refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     if options["codec"] is not None and codes_live(options["codec"], options["params"] or {}):
         if as_json:
-            raise Failure("--json: what is coded frame by frame has no document", Exit.USAGE)
+            raise JsonRefused("--json: what is coded frame by frame has no document", Exit.USAGE)
         encode_lines(output, force, format_name, skeleton, **options)
         return Exit.FINE
     if output is None:
@@ -138,10 +139,10 @@ def _encode_file(
     target = file_in(output or str(Path(source).with_suffix(".mcz")), source, ".mcz")
     unread = output == "-" or _is_special(target)
     if unread and as_json:
-        raise Failure(f"-o {target} leaves no room for --json", Exit.USAGE)
+        raise JsonRefused(f"-o {target} leaves no room for --json", Exit.USAGE)
     sink = binary_output() if output == "-" else None
     piped = io.BytesIO()
-    with about(source, target), Progress() as progress:
+    with about(source), Progress() as progress:
         written = mcz.encode(
             source,
             piped if sink is not None else target,

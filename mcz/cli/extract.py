@@ -92,7 +92,7 @@ def command(
         raise Failure("extract reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
     output = file_in(output, file)
-    with about(file, output), hinted(file, {"salvage": salvage}), Progress() as progress:
+    with about(file), hinted(file, {"salvage": salvage}), Progress() as progress:
         found = mcz.extract(
             file,
             output,

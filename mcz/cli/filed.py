@@ -25,7 +25,7 @@ class Filed:
 
         self.path, self.force = Path(path), force
         if self.path.suffix.lower() not in SUFFIXES:
-            raise Failure(f"{path}: a report is a .txt or a .json", Exit.USAGE)
+            raise Failure("a report is a .txt or a .json", Exit.USAGE, path=path)
         with about(path):
             refuse_inputs(path, inputs)
         check_new(self.path, force)

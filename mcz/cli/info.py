@@ -26,6 +26,7 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.figures import figure_lines
+from mcz.cli.hints import OPTION_HINTS, in_options
 from mcz.cli.options import (
     clips_option,
     decoded_option,
@@ -41,7 +42,7 @@ from mcz.cli.repeats import Once
 from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
-from mcz.errors import MczError
+from mcz.errors import FormatError, MczError
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -168,24 +169,26 @@ def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
     try:
         with opened(file, max_decoded=max_decoded) as held:
             size, problems = held.size, report.validate(held)
-    except Failure as failure:
-        if not is_unsound(failure):
+    except FormatError as error:
+        if not is_unsound(error):
             raise
-        text = str(failure).removeprefix(f"{file}: ")
-        offset = getattr(failure.__cause__, "offset", None) or 0
-        problems = [report.Problem(offset, "Strict reading", text)]
+        text = error.describe(OPTION_HINTS, with_path=False)
+        problems = [report.Problem(error.offset or 0, "Strict reading", text)]
     return _say_problems(file, size, problems, as_json)
 
 
 def _say_problems(file: str, size: int, problems: list[Any], as_json: bool) -> Exit:
     if as_json:
-        rows = [{"offset": p.offset, "heading": p.heading, "message": p.message} for p in problems]
+        rows = [
+            {"offset": p.offset, "heading": p.heading, "message": in_options(p.message)}
+            for p in problems
+        ]
         print_json({"valid": not problems, "problems": rows})
     elif not problems:
         echo(f"{file}: valid, {size:,} bytes")
     else:
         for p in problems:
-            say(f'{file}: at {p.offset}: {p.message} (SPEC.md, "{p.heading}")')
+            say(f'{file}: at {p.offset}: {in_options(p.message)} (SPEC.md, "{p.heading}")')
     return Exit.NOT_VERIFIED if problems else Exit.FINE
 
 

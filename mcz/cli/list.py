@@ -12,7 +12,7 @@ import click
 from mcz.brief import spreadsheet_cell
 from mcz.cli.common import (
     Exit,
-    Failure,
+    JsonRefused,
     about,
     damage_of,
     echo,
@@ -59,7 +59,7 @@ def command(
     With --where, --columns and --sort as much more is read as they ask for.
     """
     if as_csv and as_json:
-        raise Failure("--csv or --json, not both", Exit.USAGE)
+        raise JsonRefused("--csv or --json, not both", Exit.USAGE)
     names = None if columns is None else [name.strip() for name in columns.split(",")]
     with opened(file, salvage=salvage) as held, about(file):
         clips = held.chosen(where=where)

@@ -42,7 +42,7 @@ def command(
 
     for source in sources:
         existing(source)
-    with about(output, *sources), Progress() as progress:
+    with about(output), Progress() as progress:
         report = mcz.merge(
             sources,
             output,

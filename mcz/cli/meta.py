@@ -163,7 +163,7 @@ def _changes(
 
     changes: dict[str, dict[str, str | None]] = {}
     unknown: list[str] = []
-    with opened(file) as held, about(file, *([table] if table else [])):
+    with opened(file) as held, about(file):
         if table is not None:
             columns = None if take is None else [name.strip() for name in take.split(",")]
             found, unknown = from_table(

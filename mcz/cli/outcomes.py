@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from mcz.cli.common import Exit, echo, plural, print_json, say
+from mcz.cli.hints import in_options
 from mcz.reading.fidelity import GIVEN_BACK
 
 if TYPE_CHECKING:
@@ -70,19 +71,19 @@ def _say_notes(report: Report) -> None:
         if outcome.message and outcome not in report.failures:
             said[outcome.result, kind, outcome.message] += 1
             if said[outcome.result, kind, outcome.message] <= MANY:
-                say(f"{outcome.path}: {outcome.result}: {outcome.message}")
+                say(f"{outcome.path}: {outcome.result}: {in_options(outcome.message)}")
         for note in outcome.notes:
             noted[kind, note] += 1
             if noted[kind, note] <= MANY:
-                say(f"{outcome.path}: {note}")
+                say(f"{outcome.path}: {in_options(note)}")
     for (result, kind, message), count in said.items():
         if count > MANY:
             files = plural(count - MANY, f"more {kind} file".replace("  ", " "))
-            say(f"{files} {result}: {message} (--json names them)")
+            say(f"{files} {result}: {in_options(message)} (--json names them)")
     for (kind, note), count in noted.items():
         if count > MANY:
             files = plural(count - MANY, f"more {kind} file".replace("  ", " "))
-            say(f"{files}: {note} (--json names them)")
+            say(f"{files}: {in_options(note)} (--json names them)")
 
 
 def conclude(report: Report, target: str, as_json: bool) -> Exit:
@@ -93,8 +94,8 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
                 "path": o.path,
                 "result": o.result,
                 "bytes": o.size,
-                "message": o.message,
-                "notes": list(o.notes),
+                "message": in_options(o.message),
+                "notes": [in_options(note) for note in o.notes],
             }
             for o in report.outcomes
         ]
@@ -108,8 +109,7 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         say(f"left out: {text}")
     _say_notes(report)
     for failure in report.failures:
-        named = failure.path in failure.message
-        say(failure.message if named else f"{failure.path}: {failure.message}")
+        say(in_options(failure.message))
     if any(failure.result == "failed" for failure in report.failures):
         return Exit.BAD_INPUT
     if report.failures:

@@ -71,11 +71,11 @@ def command(
         raise Failure("--mtimes are not kept with --scheduler", Exit.USAGE)
     if "://" not in folder:
         if Path(folder).is_file():
-            raise Failure(f"{folder}: is a file: mcz encode {shlex.quote(folder)}", Exit.USAGE)
+            raise Failure(f"is a file: mcz encode {shlex.quote(folder)}", Exit.USAGE, path=folder)
         target = file_in(target, str(Path(folder).resolve()) + ".mcz")
     if mtimes:
         options["mtimes"] = True
-    with about(folder, target), Progress() as progress:
+    with about(folder), Progress() as progress:
         report = _packing(scheduler)(
             folder,
             target,

@@ -18,10 +18,8 @@ from mcz.cli.common import (
     about,
     binary_output,
     check_new,
-    code_of,
     echo,
     plural,
-    reason,
     say,
 )
 from mcz.errors import MczError
@@ -110,8 +108,7 @@ def encode_lines(
             raise Failure(f"--{name} has no meaning for what is coded frame by frame", Exit.USAGE)
     stream = live_input()
     name = format_name or ("bvh" if skeleton is None else "amc")
-    others = () if target in (None, "-") else (str(target),)
-    with about(NAME, *others), live_output(target, force) as sink:
+    with about(NAME), live_output(target, force) as sink:
         terms = Terms(skeleton=skeleton, **options)
         live = begin_live(iter(stream.readline, b""), sink, name, terms)
         with live.writer, aborting(live.writer):
@@ -128,8 +125,8 @@ def aborting(writer: LiveWriter) -> Iterator[None]:
         yield
     except MczError as error:
         count = plural(writer.n_frames, "frame")
-        text = f"{NAME}: {reason(error)}; the stream is aborted after {count}, and has no end"
-        raise Failure(text, code_of(error), path=NAME, kind=type(error).__name__) from error
+        error.add(path=NAME, note=f"the stream is aborted after {count}, and has no end")
+        raise
 
 
 def report_live(target: str | None, writer: LiveWriter) -> None:

@@ -20,6 +20,7 @@ from mcz.cli.common import (
     say,
     table,
 )
+from mcz.cli.hints import in_options
 from mcz.cli.moving import cut_of, moving_of, moving_options
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
@@ -103,14 +104,14 @@ def command(
         moving = stack.enter_context(moving_of(file, **wanted))
         if other is not None:
             options["other"] = stack.enter_context(moving_of(other, **wanted))
-        stack.enter_context(about(file, target, other or file))
+        stack.enter_context(about(file))
         progress = stack.enter_context(Progress())
         cut = cut_of(frames, moving)
         plotted = mcz.plot(
             moving, target, what, frames=cut, force=force, progress=progress, **options
         )
     for note in plotted.notes:
-        say(note)
+        say(in_options(note))
     if as_json:
         print_json(
             {
@@ -118,7 +119,7 @@ def command(
                 "what": plotted.what,
                 "title": plotted.title,
                 "tables": [list(map(list, rows)) for rows in plotted.tables],
-                "notes": list(plotted.notes),
+                "notes": [in_options(note) for note in plotted.notes],
             }
         )
     else:

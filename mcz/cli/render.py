@@ -20,6 +20,7 @@ from mcz.cli.common import (
     print_json,
     say,
 )
+from mcz.cli.hints import in_options
 from mcz.cli.moving import cut_of, moving_of, moving_options
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
@@ -102,7 +103,7 @@ def command(
     facts = {key: options[key] for key in ("rate", "up", "unit")}
     own = {key: options.pop(key) for key in ("arrays", "model")}
     wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts, **own}
-    with moving_of(file, **wanted) as moving, about(file, target), Progress() as progress:
+    with moving_of(file, **wanted) as moving, about(file), Progress() as progress:
         drawn = mcz.render(
             moving,
             target,
@@ -112,7 +113,7 @@ def command(
             **options,
         )
     for note in drawn.notes:
-        say(f"{file}: {note}")
+        say(f"{file}: {in_options(note)}")
     if as_json:
         document = asdict(drawn)
         document["bytes"] = document.pop("n_bytes")

@@ -37,7 +37,7 @@ def command(file: str, output: str, max_decoded: int | None, force: bool, as_jso
         raise Failure("repair reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
     output = file_in(output, file)
-    with about(file, output), Progress() as progress:
+    with about(file), Progress() as progress:
         found = mcz.repair(file, output, force=force, max_decoded=max_decoded, progress=progress)
     if as_json:
         print_json({"output": output, **asdict(found)})

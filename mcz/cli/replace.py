@@ -87,9 +87,9 @@ def command(
     existing(table)
     output = output and file_in(output, file)
     shown = output or file
-    with about(file, shown, table):
+    with about(file):
         if output is not None and Path(output).exists() and Path(output).samefile(file):
-            raise Failure(f"{output}: it is IN.mcz itself; --in-place changes that", Exit.USAGE)
+            raise Failure("it is IN.mcz itself; --in-place changes that", Exit.USAGE, path=output)
         refuse_inputs(shown, (table,))
         with mcz.open(file) as held:
             values = read_values(table, held.only_clip(name), joint)
@@ -139,14 +139,16 @@ def read_values(path: str, clip: Clip, joint: str) -> Any:
     try:
         names, values = reading(Path(path))
     except (ValueError, KeyError, OSError, EOFError, csv.Error, zipfile.BadZipFile) as error:
-        raise Failure(f"{path}: not a table of numbers: {' '.join(str(error).split())}") from None
+        raise Failure(
+            f"not a table of numbers: {' '.join(str(error).split())}", path=path
+        ) from None
     older = {f"{name}.value": name for name in wanted}  # as tables were called up to 0.9.0
     names = [older.get(name, name) for name in names]
     missing = [name for name in wanted if name not in names]
     if not missing:
         return values[:, [names.index(name) for name in wanted]]
     if any(name in names for name in all_names) or values.shape[1] != len(wanted):
-        raise Failure(f"{path}: no column {missing[0]}, and not {len(wanted)} columns alone")
+        raise Failure(f"no column {missing[0]}, and not {len(wanted)} columns alone", path=path)
     return values
 
 

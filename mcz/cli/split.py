@@ -35,6 +35,6 @@ def command(file: str, folder: str, by: str, rest: str | None, force: bool, as_j
     import mcz
 
     existing(file)
-    with about(file, folder), Progress() as progress:
+    with about(file), Progress() as progress:
         report = mcz.split(file, folder, by=by, rest=rest, force=force, progress=progress)
     return conclude(report, folder, as_json, told=("written",))

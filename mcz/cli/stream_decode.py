@@ -26,6 +26,7 @@ from mcz.cli.common import (
     say,
     text_output,
 )
+from mcz.cli.hints import OPTION_HINTS
 from mcz.cli.options import rate_option, token_option
 from mcz.cli.piped import NAME, live_input
 from mcz.cli.rows import NUMBER, STATE
@@ -115,7 +116,7 @@ def command(
         except TruncatedError as error:
             if not reader.summary.stream_bytes:
                 raise
-            say(f"{where}: {error}")
+            say(f"{where}: {error.describe(OPTION_HINTS, with_path=False)}")
         except BaseException:
             _sum_up(where, reader)
             raise

@@ -116,8 +116,7 @@ def command(
         existing(skeleton)
     if listen is None:
         refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
-    others = tuple(name for name in (output, skeleton) if name not in (None, "-"))
-    with about(NAME, *map(str, others)):
+    with about(NAME):
         if listen is not None:
             beat = HEARTBEAT if heartbeat is None else heartbeat
             with _listening(listen, token) as listener:

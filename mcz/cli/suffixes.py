@@ -87,7 +87,7 @@ def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
         return
     if target_of(suffix) is not None or suffix in OTHERS:
         reason = f"what is kept is {name}, which is not converted to {suffix}"
-        raise Failure(f"{output}: {reason}", Exit.USAGE)
+        raise Failure(reason, Exit.USAGE, path=output)
     raise _unknown(str(output), suffix, f"what is kept is {name}, not", (own,))
 
 
@@ -98,4 +98,4 @@ def _unknown(output: str, suffix: str, text: str, own: tuple[str, ...]) -> Failu
     known = list(dict.fromkeys((*filter(None, own), *(f".{name}" for name in TARGETS))))
     near = nearest(suffix, known).replace("'", "")
     hint = OTHERS.get(suffix) or (f"did you mean {near}?" if near else f"known: {' '.join(known)}")
-    return Failure(f"{output}: {text} {suffix}; {hint}", Exit.USAGE)
+    return Failure(f"{text} {suffix}; {hint}", Exit.USAGE, path=output)

@@ -59,7 +59,7 @@ def connected(
         if not stream.peek(1):
             hint = "is the --token right?" if token else "it may ask for a --token"
             ending = waiting.ending or "the connection was closed before anything came"
-            raise Failure(f"{text}: {ending}; {hint}")
+            raise Failure(f"{ending}; {hint}", path=text)
         yield stream
 
 

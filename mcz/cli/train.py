@@ -107,7 +107,7 @@ def command(
     check_new(output, force)
     for path in clips:
         existing(path)
-    with about(clips[0], *clips), Progress() as progress:
+    with about(clips[0]), Progress() as progress:
         trained = train(_motions(clips, unit, progress), Recipe(**options), progress)
     write_output(output, trained.data, force)
     document = {"output": str(output), **trained.document()}

@@ -21,6 +21,7 @@ from mcz.cli.common import (
     say,
 )
 from mcz.cli.filed import Filed
+from mcz.cli.hints import OPTION_HINTS, in_options
 from mcz.cli.options import (
     decoded_option,
     force_option,
@@ -30,7 +31,7 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.progress import Progress
-from mcz.errors import FormatError, LimitError, UnsupportedError
+from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -124,8 +125,7 @@ def _bag(
     from mcz.bags import check_bag, is_bag
 
     if not is_bag(folder):
-        text = f"{folder}: a folder and no bag: it has no bagit.txt"
-        raise Failure(text, path=folder, kind="AccessError")
+        raise Failure("a folder and no bag: it has no bagit.txt", path=folder, kind="AccessError")
     with about(folder), Progress() as progress:
         found = check_bag(folder, progress)
     fine, documents, files = not found.problems, [], []
@@ -140,8 +140,8 @@ def _bag(
                 rows = _fully(path, None, None, max_decoded, filed)
             if filed is not None:
                 documents.append(filed.document(rows, quick=quick, where=None))
-        except Failure as failure:  # the others are checked all the same
-            rows = [_row("file", "", [str(failure).removeprefix(f"{path}: ")])]
+        except MczError as error:  # the others are checked all the same
+            rows = [_row("file", "", [error.describe(OPTION_HINTS, with_path=False)])]
         failed = [row for row in rows if row["problems"]]
         files.append({"file": name, "verified": not failed, "parts": rows})
         fine = fine and not failed
@@ -173,12 +173,12 @@ def _fully(
                 rows.append(_compare(held, source))
             if filed is not None:
                 filed.take(held)
-    except Failure as failure:
-        if not is_unsound(failure):
+    except MczError as error:
+        if not is_unsound(error):
             raise
         if filed is not None:
             filed.take_bytes(file)
-        rows = [_row("structure", "", [str(failure).removeprefix(f"{file}: ")])]
+        rows = [_row("structure", "", [error.describe(OPTION_HINTS, with_path=False)])]
     return rows
 
 
@@ -193,8 +193,8 @@ def _quickly(file: str, filed: Filed | None) -> tuple[list[dict[str, Any]], str]
         try:
             with opened(file) as held:
                 filed.take(held)
-        except Failure as failure:
-            if not is_unsound(failure):
+        except MczError as error:
+            if not is_unsound(error):
                 raise
             filed.take_bytes(file)
     counts = f"{seen.n_chunks:,} chunks"
@@ -202,13 +202,14 @@ def _quickly(file: str, filed: Filed | None) -> tuple[list[dict[str, Any]], str]
         counts += f", {seen.n_packets:,} packets"
     if not seen.indexed:
         counts += ", no index"
-    return [_row("checksums", "", [f"at {p.offset}: {p.message}" for p in problems])], counts
+    return [
+        _row("checksums", "", [f"at {p.offset}: {in_options(p.message)}" for p in problems])
+    ], counts
 
 
-def is_unsound(failure: Failure) -> bool:
+def is_unsound(error: MczError) -> bool:
     """Whether the file is no sound MCZ file, rather than one that cannot be read, or not here."""
-    cause = failure.__cause__
-    return isinstance(cause, FormatError) and not isinstance(cause, UnsupportedError | LimitError)
+    return isinstance(error, FormatError) and not isinstance(error, UnsupportedError | LimitError)
 
 
 def _parts(held: File, where: str | None, progress: Progress) -> Iterator[dict[str, Any]]:
@@ -217,10 +218,10 @@ def _parts(held: File, where: str | None, progress: Progress) -> Iterator[dict[s
     clips = None if where is None else held.chosen(where=where)
     total = 1 + len(held.clips if clips is None else clips) + len(held.attachments)
     problems = report.structure_problems(held)
-    yield _row("structure", "", [problem.message for problem in problems])
+    yield _row("structure", "", [in_options(problem.message) for problem in problems])
     for done, (kind, name, found) in enumerate(report.part_problems(held, clips)):
         progress(min(done, total), total, name)
-        yield _row(kind, name, [problem.message for problem in found])
+        yield _row(kind, name, [in_options(problem.message) for problem in found])
 
 
 def _row(kind: str, name: str, problems: list[str]) -> dict[str, Any]:
@@ -268,5 +269,5 @@ def _find(held: File, source: str) -> Callable[[], bytes]:
         if PurePosixPath(attachment.name).name == name:
             return attachment.read
     if len(held.clips) != 1:
-        raise Failure(f"{source}: the file holds nothing of this name", Exit.USAGE)
+        raise Failure("the file holds nothing of this name", Exit.USAGE, path=source)
     return held.only_clip().source_bytes

@@ -18,6 +18,7 @@ from mcz.cli.common import (
     print_json,
     say,
 )
+from mcz.cli.hints import OPTION_HINTS
 from mcz.cli.options import (
     EFFORTS,
     arrays_option,
@@ -125,7 +126,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
             say(line)
 
     said = {key: options[key] for key in SAID}
-    shelf = Shelf(said, told, salvage=options["salvage"])
+    shelf = Shelf(said, told, salvage=options["salvage"], hints=OPTION_HINTS)
     try:
         for path in files:
             with about(path):
@@ -142,7 +143,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
 def _check_use(output: str | None, options: dict[str, Any], in_rerun: bool) -> None:
     """Raise Failure for options of a page without -o, and of a server with it."""
     if output not in (None, "-") and not in_rerun and not output.lower().endswith(PAGES):
-        raise Failure(f"{output}: a page is a .html; mcz render draws films", Exit.USAGE)
+        raise Failure("a page is a .html; mcz render draws films", Exit.USAGE, path=output)
     if output == "-":
         raise Failure("a page is written to a file, not to standard output", Exit.USAGE)
     usual = {"no_browser": False, "keep": False, "host": LOOPBACK, "port": 0}
@@ -188,7 +189,7 @@ def _write(shelf: Shelf, output: str, as_json: bool, options: dict[str, Any]) ->
     force, most = options.pop("force"), options.pop("most") or MOST_BYTES
     if "://" not in output:
         check_new(Path(output), force)
-    with about(output, *(file.source for _, file in shelf.given())):
+    with about(output):
         found = write_page(
             page(shelf.say), shelf, output, Wanted(**options), most=most, force=force
         )

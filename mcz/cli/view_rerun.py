@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mcz.cli.common import Exit, Failure, about, check_new, echo, plural, print_json
+from mcz.cli.hints import OPTION_HINTS
 from mcz.extras import import_extra
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def is_rerun(rerun: bool, output: str | None) -> bool:
     """Whether rerun is wanted: by its name, or by the suffix of its files. Raises Failure."""
     is_file = output is not None and output.lower().endswith(SUFFIX)
     if rerun and output is not None and not is_file:
-        raise Failure(f"{output}: with --rerun a file is called OUT{SUFFIX}", Exit.USAGE)
+        raise Failure(f"with --rerun a file is called OUT{SUFFIX}", Exit.USAGE, path=output)
     return rerun or is_file
 
 
@@ -81,7 +82,7 @@ def _write(shelf: Shelf, output: str, options: dict[str, Any]) -> tuple[list[dic
     check_new(Path(output), options["force"])
     inputs = [file.source for _, file in shelf.given()]
     with (
-        about(output, *inputs),
+        about(output),
         tempfile.TemporaryDirectory() as folder,
         replacing(output, force=options["force"], inputs=inputs) as stream,
     ):
@@ -90,7 +91,7 @@ def _write(shelf: Shelf, output: str, options: dict[str, Any]) -> tuple[list[dic
         rows, failed = _log(shelf, recording, options)
         recording.disconnect()
         if not rows:
-            raise Failure(f"{output}: no clip could be logged")
+            raise Failure("no clip could be logged", path=output)
         with path.open("rb") as written:
             shutil.copyfileobj(written, stream)
     return rows, failed
@@ -114,7 +115,7 @@ def _log(shelf: Shelf, recording: Any, options: dict[str, Any]) -> tuple[list[di
             if len(views) < MOST_VIEWS:
                 views.append(view_of(moving, entity))
         except MczError as error:
-            shelf.say(f"{file}: {clip.name}: {error}")
+            shelf.say(f"{file}: {clip.name}: {error.describe(OPTION_HINTS)}")
             failed += 1
             continue
         rows.append({"file": file, "name": clip.name, "entity": entity, "n_frames": clip.n_frames})

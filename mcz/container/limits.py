@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mcz.errors import LimitError
+from mcz.hints import Hint
 
 MIB = 2**20
 LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, in all
@@ -51,15 +52,16 @@ PROFILES = {profile.id: profile for profile in (BASE, ARCHIVE)}
 def check(what: str, value: int, limit: int) -> None:
     """Raise LimitError where ``value`` exceeds ``limit``."""
     if value > limit:  # LIMIT-02
-        raise LimitError(f"{what}: {value} is over the limit of {limit}")
+        raise LimitError(f"{what}: {value} is over the limit of {limit}", value=value)
 
 
 def check_decoded(what: str, value: int, limit: int) -> None:
     """Raise LimitError where ``value`` bytes exceed what the caller lets one file decode to."""
     if value > limit:  # LIMIT-02
         raise LimitError(
-            f"{what}: {value} bytes are over the limit of {limit} decoded bytes; "
-            "max_decoded (--max-decoded) raises it"
+            f"{what}: {value} bytes are over the limit of {limit} decoded bytes",
+            value=value,
+            hint=Hint.MAX_DECODED,
         )
 
 

@@ -15,6 +15,7 @@ from mcz.conversion.solved import Fit, from_positions
 from mcz.conversion.tables import needs_rate, to_storage, to_trc
 from mcz.errors import OptionError
 from mcz.formats import FORMATS
+from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.motion import Motion
 from mcz.reading.source_files import with_facts
@@ -63,8 +64,9 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     same = same or (FORMATS[to].is_table and not needs_rate(motion, to))
     if to != "amc" and not same and motion.frame_rate is None:
         raise OptionError(
-            f"its frame rate is unknown, and {to.upper()} states one; give the rate",
+            f"its frame rate is unknown, and {to.upper()} states one",
             clip=motion.name,
+            hint=Hint.RATE,
         )
     timeline = motion.timeline
     if timeline is not None and FORMATS[to].is_table:  # prints what the source prints

@@ -13,7 +13,7 @@ from mcz.dask.cluster import Cluster, connected
 from mcz.dask.sources import FarAsk, Found, coded_there, listed, skeletons_beside
 from mcz.editing.archive import write_in_turn
 from mcz.editing.coded_parts import Far
-from mcz.editing.folders import motion_files
+from mcz.editing.folders import NO_MOTION, motion_files
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.jobs import Answer
@@ -95,8 +95,7 @@ def _chosen(found: Sequence[Found], keep_all: bool) -> tuple[list[Found], list[O
     """The files that are packed, and what becomes of the others."""
     motions, _ = motion_files([Path(one.name) for one in found])
     known = {path.as_posix() for path in motions}
-    text = "no motion file; --keep-all keeps it"
-    left = [Outcome(o.name, "skipped", o.size, text) for o in found if o.name not in known]
+    left = [Outcome(o.name, "skipped", o.size, NO_MOTION) for o in found if o.name not in known]
     return (list(found), []) if keep_all else ([o for o in found if o.name in known], left)
 
 

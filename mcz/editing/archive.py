@@ -30,7 +30,7 @@ from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.safe_names import notes_on
 from mcz.editing.stored_files import Content, stored_files
 from mcz.editing.superseding import superseding
-from mcz.errors import MczError, OptionError, SourceError
+from mcz.errors import MczError, OptionError, SourceError, remark_of
 from mcz.formats import wants_skeleton
 from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
@@ -263,7 +263,9 @@ def write_in_turn(
             notes = tuple(filter(None, (entry.remark, *entry.notes)))
             report.outcomes.append(Outcome(entry.name, result, size, entry.reason, notes))
         except MczError as error:
-            report.outcomes.append(Outcome(entry.name, "failed", size, str(error)))
+            report.outcomes.append(
+                Outcome(entry.name, "failed", size, remark_of(error, path=entry.name))
+            )
         if progress is not None:
             progress(done + 1, total, entry.name)
 

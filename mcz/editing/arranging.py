@@ -29,6 +29,7 @@ from mcz.editing.rewriting import (
 )
 from mcz.editing.safe_names import PortableNames
 from mcz.errors import ExistsError, OptionError
+from mcz.hints import Hint
 from mcz.queries import Value
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where, getter_of
@@ -328,7 +329,7 @@ def _text(value: Value) -> str:
 def _check_outputs(outputs: Iterable[Path], force: bool) -> None:
     for path in outputs:
         if not force and os.path.lexists(path):
-            raise ExistsError(f"{path} exists; use force to replace it")
+            raise ExistsError("it exists", path=path, hint=Hint.FORCE)
 
 
 def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:

@@ -18,6 +18,7 @@ from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.errors import OptionError, error_context
+from mcz.hints import Hint
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.signal_info import SignalInfo
@@ -150,15 +151,13 @@ def _is_of_groups(clip: Clip, joints: frozenset[int]) -> bool:
     return all(len(group) < 2 for group in groups)
 
 
-def how_anew(codec: Codec) -> str:
-    """What an error says of channels that are coded in one group with others."""
-    hint = "recode (--recode) codes them anew"
-    return hint if codec.lossless else f"{hint}, with another small error"
+def recode_hint(codec: Codec) -> Hint:
+    """The way out for channels that are coded in one group with others."""
+    return Hint.RECODE if codec.lossless else Hint.RECODE_LOSSY
 
 
 def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[int, ...]:
     owners, groups = joint_of_column(clip.skeleton), []
-    how = how_anew(info.codec)
     for number, columns in enumerate(info.layout.groups):
         inside = {owners[column] for column in columns if owners[column] in joints}
         outside = {owners[column] for column in columns} - inside
@@ -166,8 +165,9 @@ def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[
             names = clip.skeleton.addresses()
             raise OptionError(
                 f"joint {names[min(inside)]} cannot be cut out, its channels "
-                f"are coded in one group with those of {names[min(outside)]}; {how}",
+                f"are coded in one group with those of {names[min(outside)]}",
                 clip=clip.name,
+                hint=recode_hint(info.codec),
             )
         if inside:
             groups.append(number)

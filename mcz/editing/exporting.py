@@ -13,7 +13,7 @@ from mcz.conversion.scenes import WRITERS, to_scene
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder, PortableNames
 from mcz.editing.unpacking import safe_path
-from mcz.errors import ExistsError, FormatError, MczError, OptionError
+from mcz.errors import ExistsError, FormatError, MczError, OptionError, remark_of
 from mcz.jobs import limited
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
@@ -72,7 +72,7 @@ def export(
                         report.outcomes.append(Outcome(path, "written", size, notes=notes))
                 except (MczError, OSError) as error:
                     result = "exists" if isinstance(error, ExistsError) else "failed"
-                    report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
+                    report.outcomes.append(Outcome(name, result, 0, remark_of(error, path=name)))
                 if progress is not None:
                     progress(done + 1, len(called), name)
     return report

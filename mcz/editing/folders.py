@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from mcz.editing.outcomes import Outcome
-from mcz.errors import AccessError, OptionError, reason_of
+from mcz.errors import AccessError, OptionError, reason_of, remark_of
 from mcz.formats import FORMATS
+from mcz.hints import Hint, Remark
 from mcz.reading.names import FEW, listed
 
 SNIFFED = 2**16  # bytes that tell what a file is
@@ -30,7 +31,7 @@ def files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
     def unreadable(error: OSError) -> None:
         if Path(error.filename) == root:
             raise AccessError(reason_of(error), path=root) from None
-        say(Path(error.filename), "failed", f"{error.filename}: {error.strerror or error}")
+        say(Path(error.filename), "failed", remark_of(error))
 
     for folder, folders, names in os.walk(root, onerror=unreadable):
         for path in (Path(folder, name) for name in (*folders, *names)):
@@ -74,9 +75,12 @@ def _is_motion(path: Path) -> bool:
     return False
 
 
+NO_MOTION = Remark("no motion file", Hint.KEEP_ALL)
+
+
 def left_out(path: Path, root: Path) -> Outcome:
     name = path.relative_to(root).as_posix()
-    return Outcome(name, "skipped", size_of(path), "no motion file; --keep-all keeps it")
+    return Outcome(name, "skipped", size_of(path), NO_MOTION)
 
 
 def not_kept(root: Path, packed: Sequence[Path], *, with_times: bool) -> Iterator[str]:

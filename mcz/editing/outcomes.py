@@ -17,6 +17,7 @@ class Outcome:
     longer what its source was, "written", "skipped", "exists" (it may not be replaced) or
     "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged"; of
     what is carried over "copied", "renamed", "moved" or "deleted".
+    The ``message`` of one that failed or exists names the file.
     ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it
     got.
     """

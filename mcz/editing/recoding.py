@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Recoding, Request
 from mcz.codecs.parameters import TARGETS
-from mcz.editing.cutting import how_anew, joint_of_column
+from mcz.editing.cutting import joint_of_column, recode_hint
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
@@ -143,9 +143,9 @@ def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...
             other = next(name for name in joints if name != index)
             raise OptionError(
                 f"joint {names[index]} cannot be replaced alone, codec "
-                f"{info.codec.name} codes its channels in one group with those of {names[other]}; "
-                f"{how_anew(info.codec)}",
+                f"{info.codec.name} codes its channels in one group with those of {names[other]}",
                 clip=clip.name,
+                hint=recode_hint(info.codec),
             )
         if index in joints:
             groups.append(number)

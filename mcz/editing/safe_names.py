@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 
 from mcz.errors import AccessError, ExistsError, reason_of
+from mcz.hints import Hint
 
 ODD = re.compile(r'[<>:"|?*\\]')
 # Controls, what turns the direction of text, line ends and other characters that are not seen; but
@@ -142,20 +143,20 @@ class Folder:
             if found is None:
                 place.mkdir(exist_ok=True)
             elif not stat.S_ISDIR(found.st_mode) or _is_junction(place):
-                raise AccessError(f"{place} is {_kind(found)}, where a folder is needed")
+                raise AccessError(f"it is {_kind(found)}, where a folder is needed", path=place)
         place = place / parts[-1]
         found = _found(place)
         if found is None:
             return place
         if not stat.S_ISREG(found.st_mode):
-            raise AccessError(f"{place} is {_kind(found)}, which is not written to")
+            raise AccessError(f"it is {_kind(found)}, which is not written to", path=place)
         if (other := self._written.get((found.st_dev, found.st_ino))) is not None:
             raise ExistsError(
-                f"this disk takes it for the same name as {other!r}, which was just written; "
-                "--names portable keeps both"
+                f"this disk takes it for the same name as {other!r}, which was just written",
+                hint=Hint.PORTABLE_NAMES,
             )
         if not force:
-            raise ExistsError(f"{place} exists; use force to replace it")
+            raise ExistsError("it exists", path=place, hint=Hint.FORCE)
         return place
 
     def note(self, path: str, place: Path) -> None:

@@ -23,6 +23,7 @@ from mcz.editing.recovering import Recovery
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
 from mcz.reading.file import File
+from mcz.reading.quick_check import Problem
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build
 from mcz.writing.clip_writer import Progress
@@ -62,10 +63,10 @@ def stated_frames(clip: Clip) -> int:
     return clip.n_frames
 
 
-def about_clip(name: str, text: str) -> str:
-    """``text``, which may name the clip already."""
-    start = f"clip {name!r}"
-    return text if text.startswith(start) else f"{start}: {text}"
+def about_clip(name: str, problem: Problem) -> str:
+    """The message of a problem, with the name of its clip."""
+    message = problem.message
+    return message if problem.clip is not None else f"clip {name!r}: {message}"
 
 
 class SomeSignals(Clip):
@@ -256,7 +257,7 @@ class Repairer(Copier):
         self, cut: ClipCut, new: payloads.Clip, error: FormatError
     ) -> tuple[bytes, list[bytes]]:
         """The same of a clip whose template is lost, and with it what the file was like."""
-        text = about_clip(cut.clip.name, f"its source file: {error}")
+        text = f"clip {cut.clip.name!r}: its source file: {error}"
         if text not in self.repair.lost:
             self.repair.lost.append(text)
         new.source = None

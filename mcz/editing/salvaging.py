@@ -30,7 +30,7 @@ from mcz.editing.salvage_copier import (
     about_clip,
     stated_frames,
 )
-from mcz.errors import FormatError, MczError
+from mcz.errors import FormatError, MczError, remark_of
 from mcz.reading.clip import Clip
 from mcz.reading.file import File
 from mcz.reading.report import Problem, clip_problems, validate
@@ -130,7 +130,7 @@ def _problems(stream: BinaryIO, size: int, max_decoded: int) -> list[Problem]:
         file = File(Container(source, max_decoded=max_decoded))
         return _faults(validate(file))
     except FormatError as error:
-        return [Problem(error.offset or 0, "structure", str(error))]
+        return [Problem(error.offset or 0, "structure", remark_of(error))]
     finally:
         stream.seek(size)
 
@@ -205,7 +205,7 @@ def _lost(clip: Clip, runs: list[WholeRun], problems: list[Problem]) -> Iterator
         yield f"clip {clip.name!r}: the hashes of its values, which are whole"
         return
     source = _source_error(clip)
-    yield from (about_clip(clip.name, one.message) for one in problems[:1] if one.message != source)
+    yield from (about_clip(clip.name, one) for one in problems[:1] if one.message != source)
 
 
 def _source_error(clip: Clip) -> str:
@@ -216,7 +216,7 @@ def _source_error(clip: Clip) -> str:
         if source is not None:
             clip.container.template(source.template, source.format)
     except MczError as error:
-        return str(error)
+        return remark_of(error)
     return ""
 
 

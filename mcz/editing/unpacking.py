@@ -15,7 +15,7 @@ from mcz.container.strict import check_path
 from mcz.editing.mtimes import set_time
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
-from mcz.errors import ExistsError, FormatError, MczError, OptionError
+from mcz.errors import ExistsError, FormatError, MczError, OptionError, remark_of
 from mcz.jobs import limited
 from mcz.reading.clip import Clip
 from mcz.reading.fidelity import RESTORED, fidelity_of
@@ -191,7 +191,7 @@ class _Writing:
         except (MczError, OSError) as error:
             self.is_damaged |= isinstance(error, FormatError)
             result = "exists" if isinstance(error, ExistsError) else "failed"
-            return Outcome(path, result, 0, f"{path}: {error}")
+            return Outcome(path, result, 0, remark_of(error, path=path))
         return Outcome(path, RESTORED, size, "" if as_path == path else f"as {as_path}")
 
     def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:

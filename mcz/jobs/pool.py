@@ -20,6 +20,7 @@ from threading import Lock
 from typing import Any, BinaryIO, TypeVar, cast
 
 from mcz.errors import WorkerError
+from mcz.hints import Hint
 from mcz.jobs import Answer, engine, threads_each
 from mcz.jobs.worker import receive, send
 
@@ -97,7 +98,8 @@ class Pool:
             self._free.put(None)
         raise WorkerError(
             f"the process that worked on it ended unexpectedly ({worker.code}), {TRIES} times; "
-            "there may be too little memory: --jobs 1 needs less"
+            "there may be too little memory",
+            hint=Hint.JOBS,
         )
 
     def _started(self) -> Worker:

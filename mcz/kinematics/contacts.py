@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.brief import brief, counted
 from mcz.errors import MotionError, OptionError
+from mcz.hints import Hint
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.feet import feet_of
 from mcz.kinematics.points import first_points, positions_of
@@ -140,12 +141,14 @@ class FootTracks:
         if not found:
             raise MotionError(
                 f"skeleton {skeleton.name!r}: none of its {counted(skeleton.n_joints, 'joint')} is "
-                "a foot by its name; say which joints are (joints=, --feet)"
+                "a foot by its name",
+                hint=Hint.FEET,
             )
         if skeleton.unit_cm is None:
             raise OptionError(
                 f"skeleton {skeleton.name!r}: its length unit is unknown, and a foot stands where "
-                "it is slow in cm/s; give the unit (--unit)"
+                "it is slow in cm/s",
+                hint=Hint.UNIT,
             )
         addresses, firsts = skeleton.addresses(), first_points(skeleton)
         self.joints = tuple(addresses[joint] for joint in dict.fromkeys(found))

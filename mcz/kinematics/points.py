@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
+from mcz.hints import Hint
 from mcz.kinematics.chain import Chain, Floats, Pose, chain_of, times
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton
 
@@ -145,7 +146,8 @@ def marker_distance(skeleton: Skeleton) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
             f"skeleton {skeleton.name!r}: its length unit is unknown, and virtual markers lie 3 cm "
-            "off its joints; give the unit (--unit)"
+            "off its joints",
+            hint=Hint.UNIT,
         )
     return MARKER_DISTANCE_CM / skeleton.unit_cm
 
@@ -162,7 +164,8 @@ def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
             f"skeleton {skeleton.name!r}: its length unit is unknown, and the shell lies "
-            f"{radius_cm:g} cm off its joints; give the unit (--unit)"
+            f"{radius_cm:g} cm off its joints",
+            hint=Hint.UNIT,
         )
     return radius_cm / skeleton.unit_cm
 

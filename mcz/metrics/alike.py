@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.errors import MczError, MotionError
+from mcz.hints import Hint, Remark
 from mcz.kinematics import point_names, point_set, positions_of
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.metrics.sums import Number, Values
@@ -21,11 +22,13 @@ def common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, flo
     if a.unit_cm is not None and b.unit_cm is not None:
         return a.unit_cm, b.unit_cm / a.unit_cm
     if a.unit_cm is None and b.unit_cm is None:
-        notes.append("the length unit is unknown: no figures in cm (--unit says it)")
+        notes.append(Remark("the length unit is unknown: no figures in cm", Hint.UNIT))
     else:
         notes.append(
-            "one side does not say its length unit: taken as the other's, no figures in cm "
-            "(--unit says it)"
+            Remark(
+                "one side does not say its length unit: taken as the other's, no figures in cm",
+                Hint.UNIT,
+            )
         )
     return None, 1.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mcz.errors import MotionError
+from mcz.hints import Hint, Remark
 from mcz.kinematics import Places, places_of, point_names, points_of
 from mcz.kinematics.contacts import Contacts, FootTracks
 from mcz.kinematics.feet import feet_of
@@ -63,7 +64,7 @@ class PlaceErrors:
         elif not isinstance(contacts, bool):
             joints = contacts
         if not (feet_of(self._a) if joints is None else joints):
-            notes.append("no joint is a foot by its name: no contacts (--feet names them)")
+            notes.append(Remark("no joint is a foot by its name: no contacts", Hint.FEET))
             return
         n_frames = self._original.n_frames
         ours, theirs = (FootTracks(self._a, joints, n_frames) for _ in "ab")

@@ -12,6 +12,7 @@ import numpy as np
 from mcz.angles import Unwrapper
 from mcz.brief import among, printable
 from mcz.errors import MczError, MotionError, OptionError
+from mcz.hints import Hint, Remark
 from mcz.kinematics.chain import Floats
 from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal
 from mcz.pictures.chart_pages import Sheet
@@ -168,7 +169,7 @@ def _columns(
     """The columns of these names, None: of the first; and what to say of the others."""
     labels = _labels(channels)
     if wanted is None:
-        more = f"{MOST_SERIES} of {len(labels)} channels; choose others by name (--channel)"
+        more = Remark(f"{MOST_SERIES} of {len(labels)} channels", Hint.SERIES)
         return list(range(len(labels)))[:MOST_SERIES], (more,) * (len(labels) > MOST_SERIES)
     for name in wanted:
         if name not in labels:

@@ -13,6 +13,7 @@ import numpy as np
 
 from mcz.clock import Timeline
 from mcz.errors import MotionError, OptionError
+from mcz.hints import Hint, Remark
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.pictures.bodies import Ints
 from mcz.pictures.cameras import Viewport
@@ -115,7 +116,8 @@ def render(
     if suffix in FILMS:
         wanted = _fps(fps, FILMS[suffix])
         if timeline is None:
-            notes.append(f"its frame rate is unknown: {USUAL_RATE} a second assumed (--rate)")
+            text = f"its frame rate is unknown: {USUAL_RATE} a second assumed"
+            notes.append(Remark(text, Hint.RATE))
             shown = drawn_frames(first, stop, USUAL_RATE, wanted, speed)
         else:
             shown = first + _shown_at(timeline.cut(slice(first, stop)), wanted, speed)
@@ -160,7 +162,7 @@ def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: fl
     wanted = (stop - 1 - first) / step + 1e-9 if step else np.inf
     if wanted >= MOST_PICTURES:
         raise OptionError(
-            f"a film of {wanted:.3g} pictures: below {MOST_PICTURES:,} (--speed, --fps, --frames)"
+            f"a film of {wanted:.3g} pictures: below {MOST_PICTURES:,}", hint=Hint.FILM
         )
     count = max(1, int(wanted) + 1)
     found: Ints = (first + np.floor(np.arange(count) * step + 0.5)).astype(np.int64)
@@ -256,7 +258,7 @@ class _Job:
     ) -> Stage:
         track = track_of(self.moving, frames, *self.facts)
         if track.up_assumed:
-            self.notes.append(f"its up axis is unknown: {track.up} up assumed (--up)")
+            self.notes.append(Remark(f"its up axis is unknown: {track.up} up assumed", Hint.UP))
         if port is None:
             port = Viewport(0, 0.06 * height, width, 0.87 * height)
         follow = self.look.follow if follow is None else follow

@@ -27,6 +27,7 @@ from mcz.container.reader import Container
 from mcz.container.value_hash import value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.formats import FORMATS
+from mcz.hints import Hint
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.reading.decimation import decimated, decimated_rows
 from mcz.reading.posing import Posed
@@ -296,11 +297,11 @@ class Clip(StoredClip, Posed):
         """
         info = self.source
         if info is None:
-            raise OptionError(f"clip {self.name!r} has no source file; choose a format with --to")
+            raise OptionError("no source file", clip=self.name, hint=Hint.CONVERT)
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
         motion = self._motion(frames, resolution, decimate)
         if motion.source is None and self.container.salvage:
-            raise FormatError("its source file is lost; --to gives its numbers", clip=self.name)
+            raise FormatError("its source file is lost", clip=self.name, hint=Hint.CONVERT)
         is_file = self.gives_file(frames, resolution)
         if not is_file:
             motion = stating_rate(motion, self.frame_numbers)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
+from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import SEPARATOR
 from mcz.motion import Motion, Signal, Skeleton
@@ -118,7 +119,7 @@ def filtered_source(
     """As ``clip.source_bytes``, of filtered positions: the source's own style, other numbers."""
     motion = _with_places(clip, frames, resolution, decimate, rate)
     if clip.source is None or motion.source is None:
-        raise OptionError(f"clip {clip.name!r} has no source file; choose a format with --to")
+        raise OptionError("no source file", clip=clip.name, hint=Hint.CONVERT)
     data: bytes = FORMATS[clip.source.format].write(stating_rate(motion, clip.frame_numbers))
     return data
 
@@ -166,15 +167,15 @@ def _settings(
     """Rows a second, and the length unit in cm; raises OptionError where either is unknown."""
     if rate is None:  # FILT-03
         raise OptionError(
-            "its frame rate is unknown, and the post filter's cutoffs are in "
-            "Hz; give the rate (--rate)",
+            "its frame rate is unknown, and the post filter's cutoffs are in Hz",
             clip=name,
+            hint=Hint.RATE,
         )
     if skeleton.unit_cm is None:  # FILT-03
         raise OptionError(
-            "its length unit is unknown, and the post filter's thresholds are "
-            "20 and 120 mm; give the unit (mcz encode --unit)",
+            "its length unit is unknown, and the post filter's thresholds are 20 and 120 mm",
             clip=name,
+            hint=Hint.UNIT,
         )
     return rate.numerator / rate.denominator * per_frame, skeleton.unit_cm  # FILT-07
 

@@ -19,11 +19,15 @@ HEADINGS = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One fault: where, under which heading of SPEC.md, and what."""
+    """One fault: where, under which heading of SPEC.md, and what.
+
+    ``clip`` is the clip that the message names.
+    """
 
     offset: int
     heading: str
     message: str
+    clip: str | None = None
 
     __repr__ = brief
 

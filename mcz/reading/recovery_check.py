@@ -8,7 +8,7 @@ from mcz.container.chunks import RECOVERY, Chunk
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
-from mcz.errors import FormatError, MczError
+from mcz.errors import FormatError, MczError, remark_of
 from mcz.reading.quick_check import Problem
 from mcz.recovery.making import made
 from mcz.recovery.packets import read_packet
@@ -29,7 +29,7 @@ def recovery_problems(container: Container) -> Iterator[tuple[str, list[Problem]
         try:
             yield _checked(container.source, chunk), []
         except MczError as error:
-            yield f"at {chunk.offset}", [Problem(chunk.offset, "RECV", str(error))]
+            yield f"at {chunk.offset}", [Problem(chunk.offset, "RECV", remark_of(error))]
 
 
 def _checked(source: ByteSource, chunk: Chunk) -> str:

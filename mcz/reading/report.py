@@ -15,7 +15,14 @@ from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import GROUP_NOTES
-from mcz.errors import ChecksumError, FormatError, MczError, OptionError, UnsupportedError
+from mcz.errors import (
+    ChecksumError,
+    FormatError,
+    MczError,
+    OptionError,
+    UnsupportedError,
+    remark_of,
+)
 from mcz.formats import FORMATS, arrays_of
 from mcz.jobs import limited
 from mcz.kinematics.rest import figure_height
@@ -271,7 +278,7 @@ def structure_problems(file: File) -> list[Problem]:
         scan(file.container.source, whole=True)
     except FormatError as error:
         offset = error.offset or 0
-        return [Problem(offset, heading(file.container.source, offset), str(error))]
+        return [Problem(offset, heading(file.container.source, offset), remark_of(error))]
     return []
 
 
@@ -342,7 +349,7 @@ def _attachment_problems(file: File, name: str) -> list[Problem]:
         file.attachments[name].read()
     except MczError as error:
         offset = file.container.directory.attachments[name].parts[0].offset
-        return [Problem(offset, "ATTA", str(error))]
+        return [Problem(offset, "ATTA", remark_of(error))]
     return []
 
 
@@ -353,7 +360,7 @@ def _guarded(
         ids = None if clips is None else file.skeleton_ids(clips)
         return [(id_, found) for id_, found in file.skeletons if ids is None or id_ in ids]
     except MczError as error:
-        problems.append(Problem(0, "SKEL", str(error)))
+        problems.append(Problem(0, "SKEL", remark_of(error)))
         return []
 
 
@@ -363,14 +370,15 @@ def _check(problems: list[Problem], file: File, id_: bytes) -> None:
             file.skeleton_bytes(id_)
     except MczError as error:
         offset = file.container.directory.shared[b"SKEL", id_].offset
-        problems.append(Problem(offset, "SKEL", str(error)))
+        problems.append(Problem(offset, "SKEL", remark_of(error)))
 
 
 def clip_problems(file: File, clip: Clip) -> list[Problem]:
     """The faults of one clip: its values and its restored source."""
     row: ClipRow = file.container.directory.clips[clip.name]
     found = [
-        Problem(row.clip.offset, _clip_heading(error), str(error)) for error in _clip_errors(clip)
+        Problem(row.clip.offset, _clip_heading(error), remark_of(error), error.clip)
+        for error in _clip_errors(clip)
     ]
     return list(dict.fromkeys(found))
 

@@ -17,13 +17,13 @@ from mcz.errors import SourceError
 from mcz.formats import Format, format_of
 from mcz.formats.bones import Match, matched
 from mcz.formats.find import Candidate, skeletons_around
+from mcz.hints import Hint
 from mcz.motion import Motion, Skeleton
 from mcz.reading.source_files import load, read_skeleton, read_source
 from mcz.units import in_unit
 
 NONE = "none"  # given in place of a skeleton file: do without
 NOTE = "skeleton-note"
-OPTION = "--skeleton (in Python skeleton=) names one, 'none' does without"
 SHOWN = 8  # names in a message
 Given = str | os.PathLike[str] | Skeleton | None
 Counts = Mapping[str, int]
@@ -222,7 +222,7 @@ def _with_misfits(
     label = _text(str(chosen.path or chosen.skeleton.name or "the skeleton"))
     if match.lacking and not asked:
         found = label if chosen.path is None else _text(_seen_from(path.parent, chosen.path))
-        raise SourceError(f"{found} lacks {_listed(match.lacking)}; {OPTION}", path=path)
+        raise SourceError(f"{found} lacks {_listed(match.lacking)}", path=path, hint=Hint.SKELETON)
     remark = chosen.remark
     if match.lacking:
         remark = f"{label} lacks {_listed(match.lacking)}; they are scalars without kinematics"
@@ -239,14 +239,15 @@ class AmbiguousError(SourceError):
 
 
 def _ambiguous(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError:
-    error = AmbiguousError(str(_riddle(path, tried, text)))
+    riddle = _riddle(path, tried, text)
+    error = AmbiguousError(riddle.message, **riddle.fields)
     error.reason = f"{text}: {_listed([_text(one.candidate.path.name) for one in tried])}"
     return error
 
 
 def _riddle(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:
     shown = first_of([_text(one.describe(path.parent)) for one in tried], SHOWN)
-    return SourceError(f"{text}: {shown}; {OPTION}", path=path)
+    return SourceError(f"{text}: {shown}", path=path, hint=Hint.SKELETON)
 
 
 def _seen_from(folder: Path, path: Path) -> str:

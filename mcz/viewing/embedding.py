@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -13,8 +13,8 @@ from typing import Any
 from mcz.brief import brief
 from mcz.codecs import by_name, chosen
 from mcz.errors import LimitError, MczError
+from mcz.hints import Hint
 from mcz.metrics.document import difference
-from mcz.motion import Motion
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
 from mcz.viewing.page import Page
@@ -100,7 +100,7 @@ def write_page(
         }
         if len(files) > 1:
             names = [file.name for file in given]
-            document["diffs"] = list(_differences(files, names, shelf.told))
+            document["diffs"] = list(_differences(files, names, shelf))
         whole = (page.before + element(document) + page.after).encode()
         if len(whole) > most:
             raise _too_large(given[-1].name, most)
@@ -116,10 +116,7 @@ def element(document: Mapping[str, Any]) -> str:
 
 
 def _too_large(name: str, most: int) -> LimitError:
-    return LimitError(
-        f"{name}: the page would have more than {most:,} bytes; --clip takes some clips alone, "
-        "--codec lossy makes them smaller, --max-size allows more"
-    )
+    return LimitError(f"the page would have more than {most:,} bytes", path=name, hint=Hint.PAGE)
 
 
 def _file(data: bytes, max_decoded: int | None) -> File:
@@ -185,12 +182,9 @@ def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
 
 
 def _differences(
-    files: Sequence[File], names: Sequence[str], told: Callable[[Motion], Motion]
+    files: Sequence[File], names: Sequence[str], shelf: Shelf
 ) -> Iterator[dict[str, Any]]:
-    """Of every other file against the first what ``mcz diff --by-joint --json`` says.
-
-    ``told`` gives motions what they do not say themselves.
-    """
+    """Of every other file against the first what ``mcz diff --by-joint --json`` says."""
     first, *others = files
     for other, name in zip(others, names[1:], strict=True):
         pairs = [(one, one) for one in first.clips if one in other.clips.rows]
@@ -199,8 +193,9 @@ def _differences(
         found, notes = [], []
         for a, b in pairs[:MOST_COMPARED]:
             try:
-                original, coded = told(first.clips[a].motion()), told(other.clips[b].motion())
+                original = shelf.told(first.clips[a].motion())
+                coded = shelf.told(other.clips[b].motion())
                 found.append(difference(original, coded, by_joint=True))
             except MczError as error:
-                notes.append(f"{a}: {error}")
+                notes.append(f"{a}: {error.describe(shelf.hints)}")
         yield {"a": names[0], "b": name, "clips": found, "notes": notes}

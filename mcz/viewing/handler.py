@@ -73,7 +73,7 @@ class Handler(BaseHTTPRequestHandler):
         except Refused as refused:
             self._fail(refused.status, "Refused", str(refused))
         except MczError as error:
-            self._fail(422, type(error).__name__, str(error))
+            self._fail(422, type(error).__name__, error.describe(self._site.shelf.hints))
         except MemoryError:
             self._fail(507, "MemoryError", "out of memory")
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from mcz.brief import counted, shown
-from mcz.errors import MczError
+from mcz.errors import MczError, reason_of
 from mcz.viewing.drawn import RATE, Drawn, Figure, Moving, drawn, figure, frames_read
 
 MOST_BYTES = 300_000
@@ -30,7 +30,7 @@ def player(moving: Moving) -> str:
     try:
         return _player(moving)
     except MczError as error:
-        why = " ".join(str(error).split())[:300]
+        why = reason_of(error)[:300]
         return f"<pre>{html.escape(repr(moving))}\n{html.escape(why)}</pre>"
 
 

@@ -25,6 +25,7 @@ from mcz.errors import (
 )
 from mcz.formats import FORMATS, wants_skeleton
 from mcz.formats.find import skeletons_around
+from mcz.hints import PYTHON_HINTS, Words, worded
 from mcz.motion import Motion
 from mcz.reading.file import reached
 from mcz.reading.source_files import told
@@ -150,7 +151,7 @@ class Made:
         except MczError as error:
             error.add(path=self.source)
             self._error = error
-            self._shelf.say(str(error))
+            self._shelf.say(error.describe(self._shelf.hints))
         if before is not None:
             with suppress(OSError):
                 before.path.unlink()
@@ -193,6 +194,7 @@ class Shelf:
 
     ``said`` is what files do not say themselves: arguments of ``mcz.encode`` such as ``unit``.
     ``say`` is told, in a line, of what could not be made. ``salvage``: damaged files are read.
+    ``hints`` words the hints of errors.
     """
 
     def __init__(
@@ -201,7 +203,9 @@ class Shelf:
         say: Say | None = None,
         *,
         salvage: bool = False,
+        hints: Words = PYTHON_HINTS,
     ) -> None:
+        self.hints = hints
         self.said, self.salvage = dict(said or {}), salvage
         self.say: Say = say or (lambda line: None)
         self._folder: Path | None = None
@@ -365,6 +369,6 @@ def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
     report = pack(folder, out, jobs=threads.processors(), copies=False, **said)
     for outcome in report.outcomes:
         if outcome.result == "failed":
-            shelf.say(outcome.message)
+            shelf.say(worded(outcome.message, shelf.hints))
     if not any(outcome.result == "parsed" for outcome in report.outcomes):
         raise OptionError("none of its motion files can be read", path=folder)

@@ -37,8 +37,9 @@ def viewer_page(shelf: Shelf) -> Page:
     except AccessError as error:
         if os.environ.get(OTHER):
             raise
-        shelf.say(f"{error}; the small player is shown instead")
-        return small_page(shelf, str(error))
+        reason = error.describe(shelf.hints)
+        shelf.say(f"{reason}; the small player is shown instead")
+        return small_page(shelf, reason)
 
 
 def small_page(shelf: Shelf, reason: str) -> Page:
@@ -46,7 +47,7 @@ def small_page(shelf: Shelf, reason: str) -> Page:
     notice = f"This is the small player: it only plays. {reason[:1].upper()}{reason[1:]}."
     players: list[str] = []
     for _, file in shelf.given():
-        for shown in _players(file, shelf.salvage):
+        for shown in _players(file, shelf):
             if len(players) == MOST_CLIPS:
                 notice += f" The first {MOST_CLIPS} clips are shown."
                 return _page(notice, players)
@@ -58,10 +59,10 @@ def _page(notice: str, players: list[str]) -> Page:
     return Page(TEMPLATE.format(notice=html.escape(notice), players="\n".join(players)))
 
 
-def _players(file: Shelved, salvage: bool) -> Iterator[str]:
+def _players(file: Shelved, shelf: Shelf) -> Iterator[str]:
     """Yield the player of each clip of a file, or the reason why it has none."""
     try:
-        with mcz_open(file.target(), salvage=salvage) as opened:
+        with mcz_open(file.target(), salvage=shelf.salvage) as opened:
             yield from map(player, opened)
     except MczError as error:
-        yield f"<pre>{html.escape(str(error))}</pre>"
+        yield f"<pre>{html.escape(error.describe(shelf.hints))}</pre>"

@@ -22,6 +22,7 @@ from mcz.errors import (
     OptionError,
     reason_of,
 )
+from mcz.hints import Hint
 from mcz.writing.inputs import refuse_inputs
 
 SUFFIX = ".part"
@@ -54,7 +55,7 @@ def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterat
     if path.is_dir():
         raise OptionError("a folder; name the file in it", path=path)
     if not force and os.path.lexists(path):
-        raise ExistsError(f"{path} exists; use force to replace it")
+        raise ExistsError("it exists", path=path, hint=Hint.FORCE)
     with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:
         yield stream
 
@@ -92,7 +93,7 @@ def rereadable(stream: BinaryIO) -> Iterator[BinaryIO]:
 def _remote(target: str, force: bool) -> Iterator[BinaryIO]:
     fs, path = file_system(target)
     if not force and fs.exists(path):
-        raise ExistsError(f"{target} exists; use force to replace it")
+        raise ExistsError("it exists", path=target, hint=Hint.FORCE)
     with fs.transaction, fs.open(path, "wb") as stream:
         yield stream
 
@@ -176,7 +177,7 @@ def _give_name(name: str, path: Path, force: bool) -> None:
         else:
             os.replace(name, path)
     except FileExistsError:
-        raise ExistsError(f"{path} exists; use force to replace it") from None
+        raise ExistsError("it exists", path=path, hint=Hint.FORCE) from None
     except OSError as error:  # a folder, perhaps
         raise AccessError(reason_of(error), path=path) from None
 

@@ -17,6 +17,7 @@ from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import Dial
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
+from mcz.hints import Hint
 from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.writing.bounding import REFINEMENT, bounded
@@ -60,8 +61,9 @@ def write_tuned(
         targets = codec.promise(options)
         if motion.skeleton.unit_cm is None:
             raise OptionError(
-                f"{codec.name}: a preset promises an error in cm, and the length unit is unknown; "
-                f"--unit says it, or give {codec.dial.parameter}"
+                f"{codec.name}: a preset promises an error in cm, and the length unit is unknown, "
+                f"without which {codec.dial.parameter} is to be given",
+                hint=Hint.UNIT,
             )
         check_bones(motion.skeleton, f"{codec.name}: a preset that promises an error in cm")
     limits = options.get(QUALITY)
@@ -122,7 +124,7 @@ def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
 
 def _check_unit(motion: Motion, name: str) -> None:
     if motion.skeleton.unit_cm is None:
-        raise OptionError(f"{name} has no meaning: the length unit is unknown; --unit says it")
+        raise OptionError(f"{name} has no meaning: the length unit is unknown", hint=Hint.UNIT)
     check_bones(motion.skeleton, name)
 
 

@@ -17,7 +17,7 @@ from mcz.cli.lazy import OTHER_NAMES
 from mcz.cli.main import COMMANDS, cli
 from mcz.cli.progress import Progress
 from mcz.cli.terminal import say
-from mcz.errors import ChecksumError, MczError, OptionError
+from mcz.errors import AccessError, ChecksumError, ExistsError, MczError, OptionError
 from tests.motions import smooth
 
 
@@ -37,10 +37,10 @@ def outcome(capsys: pytest.CaptureFixture[str], error: Exception) -> tuple[int, 
     ("error", "code", "line"),
     [
         (ChecksumError("crc of DATA\n at 93"), 1, "mcz: walk.mcz: crc of DATA at 93\n"),
-        (MczError("walk.mcz: at 7"), 1, "mcz: walk.mcz: at 7\n"),
+        (MczError("at 7", path="other.mcz"), 1, "mcz: other.mcz: at 7\n"),
         (OptionError("no codec 'x'"), 2, "mcz: walk.mcz: no codec 'x'\n"),
-        (FileNotFoundError(2, "No such file", "a.bvh"), 1, "mcz: walk.mcz: a.bvh: No such file\n"),
-        (FileExistsError(17, "File exists", "b.mcz"), 2, "mcz: walk.mcz: b.mcz: File exists\n"),
+        (FileNotFoundError(2, "No such file", "a.bvh"), 1, "mcz: a.bvh: No such file\n"),
+        (FileExistsError(17, "File exists", "b.mcz"), 2, "mcz: b.mcz: File exists\n"),
         (Failure("gone", Exit.NOT_VERIFIED), 3, "mcz: gone\n"),
         (KeyboardInterrupt(), 130, "\nmcz: interrupted\n"),
         (MczError("a \x1b[31mred\x07 name"), 1, "mcz: walk.mcz: a \\x1b[31mred\\x07 name\n"),
@@ -60,12 +60,12 @@ def test_a_bug_keeps_its_traceback(capsys: pytest.CaptureFixture[str]) -> None:
 def test_output_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "out.csv"
     write_output(path, b"one", force=False)
-    with pytest.raises(Failure, match="--force"):
+    with pytest.raises(ExistsError, match="force"):
         write_output(path, b"two", force=False)
     assert path.read_bytes() == b"one"
     write_output(path, b"two", force=True)
     assert path.read_bytes() == b"two"
-    with pytest.raises(Failure, match="No such file"):
+    with pytest.raises(AccessError, match="No such file"):
         write_output(tmp_path / "absent" / "out.csv", b"", force=False)
     assert [p.name for p in tmp_path.iterdir()] == ["out.csv"]
 
@@ -136,8 +136,13 @@ def test_errors_are_json_where_it_is_asked_for(
         "class": "AccessError",
         "message": f"{none}: no such file",
         "file": str(none),
+        "clip": None,
         "line": None,
         "offset": None,
+        "where": None,
+        "value": None,
+        "note": None,
+        "hint": None,
     }
     bad = tmp_path / "bad.bvh"
     bad.write_bytes(b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 x\n")

@@ -329,7 +329,9 @@ def test_without_feet_nothing_is_said_unless_asked(tmp_path: Path, call: Call) -
     _, out, _ = call("diff", *pair)
     assert "contacts of" not in out and "feet:" not in out
     _, out, _ = call("diff", *pair, "--contacts")
-    assert "note: no joint is a foot by its name: no contacts (--feet names them)" in out
+    assert (
+        "note: no joint is a foot by its name: no contacts; name the joints of feet (--feet)" in out
+    )
     clip = document(call("diff", *pair, "--contacts", "--json"))["clips"][0]
     assert (clip["feet"], clip["contacts"], clip["contact_list"]) == (None, None, [])
 

@@ -251,7 +251,7 @@ def test_all_outputs_or_none(folder: Path, call: Call) -> None:
     words = ("decode", folder / "p.mcz", "--to", "amc", "--solve-ik", "--with-skeleton", "-o")
     for target in (folder / "out", folder / "out" / "x.amc"):
         code, _, errors = call(*words, target)
-        assert (code, "walk.asf exists; use --force" in errors) == (2, True)
+        assert (code, "walk.asf: it exists; use --force" in errors) == (2, True)
         assert [path.name for path in (folder / "out").iterdir()] == ["walk.asf"]
     assert (folder / "out" / "walk.asf").read_bytes() == b"mine"
 

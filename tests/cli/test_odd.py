@@ -250,7 +250,7 @@ def small_limit(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_more_decoded_bytes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = folder / "still.mcz"
     mcz.write(still(1000), path)
-    with pytest.raises(mcz.LimitError, match="--max-decoded"):
+    with pytest.raises(mcz.LimitError, match="max_decoded raises it"):
         mcz.read(path)
     assert mcz.read(path, max_decoded=2**21).n_frames == 1000
     assert mcz.verify(path, max_decoded=2**21) == []

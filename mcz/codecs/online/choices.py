@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import Layout
 from mcz.codecs.online.units import MODES
 from mcz.errors import OptionError
+from mcz.hints import Hint
 
 Floats = NDArray[np.float64]
 
@@ -87,7 +88,7 @@ def set_plan(plan: Plan, chosen: Mapping[str, Any], layout: Layout, step: float)
     if mode != "mod":
         if layout.frame_rate is None or not layout.frame_rate:
             raise OptionError(
-                "online: a bitrate needs a frame rate, this motion says none (mcz encode --rate)"
+                "online: a bitrate needs a frame rate, this motion says none", hint=Hint.RATE
             )
         per_frame = float(Fraction(1000) / layout.frame_rate)
         numbers[kernels.BUFFER] = max(1.0, chosen["buffer"] * float(layout.frame_rate))

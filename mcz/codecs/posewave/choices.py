@@ -36,6 +36,7 @@ from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
 from mcz.codecs.steps import code_of
 from mcz.errors import MotionError, OptionError
+from mcz.hints import Hint
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
 from mcz.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
@@ -114,7 +115,8 @@ def _contacts(
     if skeleton.unit_cm is None:
         raise OptionError(
             f"contacts: skeleton {skeleton.name!r}: its length unit is unknown, and a tolerance is "
-            "in cm; give the unit (--unit)"
+            "in cm",
+            hint=Hint.UNIT,
         )
     tolerance = params["contact_tolerance"] * in_cm
     runs = runs_of(source, params["contacts"])

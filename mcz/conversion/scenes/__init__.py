@@ -14,6 +14,7 @@ from mcz.conversion.scenes.keys import keyed
 from mcz.conversion.scenes.nodes import Scene, scene_of
 from mcz.conversion.scenes.usda import usda
 from mcz.errors import MotionError, OptionError
+from mcz.hints import Hint
 from mcz.motion import Motion
 from mcz.reading.source_files import with_facts
 from mcz.version import VERSION
@@ -65,8 +66,9 @@ def to_scene(
     motion = with_facts(motion, rate, unit, up)
     if motion.timeline is None:
         raise OptionError(
-            f"its frame rate is unknown, and {to.upper()} states times; give the rate",
+            f"its frame rate is unknown, and {to.upper()} states times",
             clip=motion.name,
+            hint=Hint.RATE,
         )
     if to == "usda" and key_error_mm:
         raise OptionError("USD has a sample in every frame: a key error is for GLB")
@@ -145,9 +147,9 @@ def _bound(scene: Scene, key_error_mm: float | None) -> float:
         raise OptionError(f"a key error of {key_error_mm} mm: a length of at least 0")
     if key_error_mm and not scene.has_unit:
         raise OptionError(
-            f"its length unit is unknown, so keys cannot be "
-            f"{key_error_mm:g} mm off; give the unit (--unit), or leave out the key error",
+            f"its length unit is unknown, so a key error of {key_error_mm:g} mm has no meaning",
             clip=scene.name,
+            hint=Hint.UNIT,
         )
     return key_error_mm / MM_PER_M
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mcz.conversion.scenes.key_kernels import choose, fill, hang
 from mcz.conversion.scenes.nodes import Node, Scene
 from mcz.errors import OptionError
+from mcz.hints import Hint
 from mcz.kinematics.chain import Floats
 
 Ints = NDArray[np.int64]
@@ -133,8 +134,9 @@ class _Keyer:
             if number > ROUNDS:
                 raise OptionError(
                     f"float32 numbers alone are {errors.max():.2g} m "
-                    f"off, and the keys may be {self.bound:.2g} m off; allow more (--key-error)",
+                    f"off, and the keys may be {self.bound:.2g} m off",
                     clip=self.scene.name,
+                    hint=Hint.KEY_ERROR,
                 )
             self._tighten(wrong, 0.0 if number == ROUNDS else TIGHTER)
             errors = self.errors()

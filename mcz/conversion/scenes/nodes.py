@@ -19,6 +19,7 @@ from mcz.clock import Timeline
 from mcz.conversion.hierarchy import loose_tails, moves, stretches
 from mcz.conversion.losses import first_gap, left_out
 from mcz.errors import MotionError
+from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, times
 from mcz.kinematics.frames import frame_poses_of
@@ -143,8 +144,9 @@ def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
     if (np.diff(seconds) <= 0).any() or not np.isfinite(seconds).all():
         raise MotionError(
             f"{len(seconds)} frames at {float(rate):g} a second have "
-            "times that float32 cannot tell apart; write a part of them (--frames)",
+            "times that float32 cannot tell apart",
             clip=name,
+            hint=Hint.FRAMES,
         )
     return seconds
 

@@ -1,0 +1,78 @@
+"""Ways out of what an error or a remark is about: codes, which callers word."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+
+
+class Hint(StrEnum):
+    """The way out, as a code; ``PYTHON_HINTS`` words it for callers of this package."""
+
+    CONVERT = "convert"
+    ENCODE = "encode"
+    FEET = "feet"
+    FILM = "film"
+    FORCE = "force"
+    FRAMES = "frames"
+    JOBS = "jobs"
+    KEEP_ALL = "keep-all"
+    KEY_ERROR = "key-error"
+    MAX_DECODED = "max-decoded"
+    PAGE = "page"
+    PORTABLE_NAMES = "portable-names"
+    RATE = "rate"
+    RECODE = "recode"
+    RECODE_LOSSY = "recode-lossy"
+    SALVAGE = "salvage"
+    SERIES = "series"
+    SKELETON = "skeleton"
+    UNIT = "unit"
+    UP = "up"
+
+
+Words = Mapping[Hint, str]
+
+PYTHON_HINTS: Words = {
+    Hint.CONVERT: "mcz.convert gives its numbers to another format",
+    Hint.ENCODE: "mcz.encode makes one of a source file",
+    Hint.FEET: "name the joints of feet (joints=)",
+    Hint.FILM: "make it shorter (speed=, fps=, frames=)",
+    Hint.FORCE: "use force to replace it",
+    Hint.FRAMES: "write a part of the frames (frames=)",
+    Hint.JOBS: "jobs=1 needs less memory",
+    Hint.KEEP_ALL: "keep_all=True keeps it",
+    Hint.KEY_ERROR: "allow more (key_error_mm=)",
+    Hint.MAX_DECODED: "max_decoded raises it",
+    Hint.PAGE: "choose clips, name a lossy codec, or allow more bytes",
+    Hint.PORTABLE_NAMES: "names='portable' keeps both",
+    Hint.RATE: "give the rate (rate=)",
+    Hint.RECODE: "recode=True codes them anew",
+    Hint.RECODE_LOSSY: "recode=True codes them anew, with another small error",
+    Hint.SALVAGE: "salvage=True reads it, mcz.repair writes a sound file",
+    Hint.SERIES: "choose others by name (channels=)",
+    Hint.SKELETON: "skeleton= names one, 'none' does without",
+    Hint.UNIT: "give the unit (unit=)",
+    Hint.UP: "give the axis (up=)",
+}
+
+
+class Remark(str):
+    """Words about a file or a clip, with a hint that callers may word in their own way."""
+
+    words: str
+    hint: Hint | None
+
+    def __new__(cls, words: str, hint: Hint | None = None) -> Remark:
+        remark = super().__new__(cls, with_hint(words, hint, PYTHON_HINTS))
+        remark.words, remark.hint = words, hint
+        return remark
+
+
+def with_hint(words: str, hint: Hint | None, hints: Words) -> str:
+    return words if hint is None else f"{words}; {hints[hint]}"
+
+
+def worded(text: str, hints: Words) -> str:
+    """``text`` with the hint that it may have in the words of ``hints``."""
+    return with_hint(text.words, text.hint, hints) if isinstance(text, Remark) else text
