@@ -9,21 +9,25 @@ from enum import StrEnum
 class Hint(StrEnum):
     """The way out, as a code; ``PYTHON_HINTS`` words it for callers of this package."""
 
+    ARCHIVE = "archive"
     CONVERT = "convert"
     ENCODE = "encode"
     FEET = "feet"
     FILM = "film"
     FORCE = "force"
+    FORCE_RATE = "force-rate"
     FRAMES = "frames"
     JOBS = "jobs"
     KEEP_ALL = "keep-all"
     KEY_ERROR = "key-error"
     MAX_DECODED = "max-decoded"
+    NAME_CODEC = "name-codec"
     PAGE = "page"
     PORTABLE_NAMES = "portable-names"
     RATE = "rate"
     RECODE = "recode"
     RECODE_LOSSY = "recode-lossy"
+    REPLACE = "replace"
     SALVAGE = "salvage"
     SERIES = "series"
     SKELETON = "skeleton"
@@ -34,21 +38,25 @@ class Hint(StrEnum):
 Words = Mapping[Hint, str]
 
 PYTHON_HINTS: Words = {
+    Hint.ARCHIVE: "archive=True allows more",
     Hint.CONVERT: "mcz.convert gives its numbers to another format",
     Hint.ENCODE: "mcz.encode makes one of a source file",
     Hint.FEET: "name the joints of feet (joints=)",
     Hint.FILM: "make it shorter (speed=, fps=, frames=)",
     Hint.FORCE: "use force to replace it",
+    Hint.FORCE_RATE: "force_rate=True takes what is asked for",
     Hint.FRAMES: "write a part of the frames (frames=)",
     Hint.JOBS: "jobs=1 needs less memory",
     Hint.KEEP_ALL: "keep_all=True keeps it",
     Hint.KEY_ERROR: "allow more (key_error_mm=)",
     Hint.MAX_DECODED: "max_decoded raises it",
+    Hint.NAME_CODEC: "name a codec to code it anew",
     Hint.PAGE: "choose clips, name a lossy codec, or allow more bytes",
     Hint.PORTABLE_NAMES: "names='portable' keeps both",
     Hint.RATE: "give the rate (rate=)",
     Hint.RECODE: "recode=True codes them anew",
     Hint.RECODE_LOSSY: "recode=True codes them anew, with another small error",
+    Hint.REPLACE: "mcz.append with replace=True puts this one in its place",
     Hint.SALVAGE: "salvage=True reads it, mcz.repair writes a sound file",
     Hint.SERIES: "choose others by name (channels=)",
     Hint.SKELETON: "skeleton= names one, 'none' does without",
@@ -73,6 +81,11 @@ def with_hint(words: str, hint: Hint | None, hints: Words) -> str:
     return words if hint is None else f"{words}; {hints[hint]}"
 
 
+def split_hint(text: str) -> tuple[str, Hint | None]:
+    """The words of ``text`` and the hint that it may have."""
+    return (text.words, text.hint) if isinstance(text, Remark) else (text, None)
+
+
 def worded(text: str, hints: Words) -> str:
     """``text`` with the hint that it may have in the words of ``hints``."""
-    return with_hint(text.words, text.hint, hints) if isinstance(text, Remark) else text
+    return with_hint(*split_hint(text), hints)

@@ -192,9 +192,8 @@ def test_the_library_names_no_option_of_the_command_line() -> None:
     def options(tree: ast.AST) -> Iterator[str]:
         documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         for node in ast.walk(tree):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                if id(node) not in documents and re.search(r"(?<![\w\-`])--[a-z]", node.value):
-                    yield node.value
+            if isinstance(node, ast.Constant) and id(node) not in documents:
+                yield from re.findall(r"(?<![\w\-`])--[a-z][a-z-]+", str(node.value))
 
     library = {path: tree for path, tree in TREES.items() if not path.startswith("cli/")}
     found = {path: texts for path, tree in library.items() if (texts := [*options(tree)])}

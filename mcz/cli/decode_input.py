@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from mcz.cli.common import about, existing, opened, say
+from mcz.cli.hints import in_options
 from mcz.cli.wanted import Wanted, refuse
 
 if TYPE_CHECKING:
@@ -56,6 +57,6 @@ class Input:
         with about(self.file):
             written = mcz.encode(self.file, coded, archive=True, **self.facts)
             for note in written.notes:
-                say(f"{self.file}: {note}")
+                say(f"{self.file}: {in_options(note)}")
             with mcz.open(coded.getvalue(), max_decoded=NO_LIMIT) as file:
                 yield file, written.inputs

@@ -24,6 +24,7 @@ from mcz.cli.common import (
     say,
 )
 from mcz.cli.figures import reached
+from mcz.cli.hints import in_options
 from mcz.cli.options import (
     ITS_RATE_HELP,
     copies_option,
@@ -153,7 +154,7 @@ def _encode_file(
             **options,
         )
     for note in written.notes:
-        say(f"{source}: {note}")
+        say(f"{source}: {in_options(note)}")
     if sink is not None:
         sink.write(piped.getvalue())
     if not unread:

@@ -5,22 +5,26 @@ from __future__ import annotations
 from mcz.hints import Hint, Words, worded
 
 OPTION_HINTS: Words = {
+    Hint.ARCHIVE: "--archive allows more",
     Hint.CONVERT: "choose a format with --to",
     Hint.ENCODE: "mcz encode makes one of a source file",
     Hint.FEET: "name the joints of feet (--feet)",
     Hint.FILM: "make it shorter (--speed, --fps, --frames)",
     Hint.FORCE: "use --force to replace it",
+    Hint.FORCE_RATE: "--force-rate takes what is asked for",
     Hint.FRAMES: "write a part of the frames (--frames)",
     Hint.JOBS: "--jobs 1 needs less memory",
     Hint.KEEP_ALL: "--keep-all keeps it",
     Hint.KEY_ERROR: "allow more (--key-error)",
     Hint.MAX_DECODED: "--max-decoded raises it",
+    Hint.NAME_CODEC: "--codec codes it anew",
     Hint.PAGE: "--clip takes some clips alone, --codec lossy makes them smaller, "
     "--max-size allows more",
     Hint.PORTABLE_NAMES: "--names portable keeps both",
     Hint.RATE: "give the rate (--rate)",
     Hint.RECODE: "--recode codes them anew",
     Hint.RECODE_LOSSY: "--recode codes them anew, with another small error",
+    Hint.REPLACE: "mcz append --replace puts this one in its place",
     Hint.SALVAGE: "--salvage reads them, mcz repair writes a sound file",
     Hint.SERIES: "choose others by name (--channel)",
     Hint.SKELETON: "--skeleton names one, 'none' does without",

@@ -17,6 +17,7 @@ from mcz.editing.folders import files_below, size_of
 from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, MczError, OptionError, SourceError
 from mcz.formats import wants_skeleton
+from mcz.hints import Remark
 from mcz.writing.entry import Terms
 
 
@@ -116,6 +117,8 @@ def coded_there(state: object, ask: FarAsk) -> Part:
 
 def _named(text: str, copy: str, root: str) -> str:
     """``text`` about a copy, said of the file itself."""
+    if isinstance(text, Remark):
+        return Remark(_named(text.words, copy, root), text.hint)
     return text.replace(copy, root.rstrip("/"))
 
 

@@ -32,6 +32,7 @@ from mcz.editing.stored_files import Content, stored_files
 from mcz.editing.superseding import superseding
 from mcz.errors import MczError, OptionError, SourceError, remark_of
 from mcz.formats import wants_skeleton
+from mcz.hints import split_hint
 from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
 from mcz.threads import limited
@@ -211,7 +212,8 @@ def append(
         before = File(container) if held else None  # as it is before anything is added
         report = _write_entries(draft, entries, progress, seen)
         if report.failures:
-            raise SourceError("; ".join(o.message for o in report.failures))
+            words, hints = zip(*(split_hint(o.message) for o in report.failures), strict=True)
+            raise SourceError("; ".join(words), hint=hints[0] if len(set(hints)) == 1 else None)
         refuse_inputs(target, _inputs_of(entries))
         if before is not None:
             added = add_files(held, before, draft, rename, skip_identical, progress)

@@ -13,7 +13,7 @@ from typing import Any
 from mcz.brief import brief
 from mcz.codecs import by_name, chosen
 from mcz.errors import LimitError, MczError
-from mcz.hints import Hint
+from mcz.hints import Hint, with_hint
 from mcz.metrics.document import difference
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
@@ -132,9 +132,10 @@ def _bytes_of(file: Shelved, shelf: Shelf, wanted: Wanted, most: int) -> bytes:
     target = file.target()
     if wanted.is_coded:
         return _coded(target, shelf, wanted)
-    options = ", ".join(f"--{fact}" for fact in FACTS if shelf.said.get(fact) is not None)
-    if options and file.kind == "mcz":
-        shelf.say(f"{file.name}: copied as it is, so that {options} is not in it; see --codec")
+    facts = ", ".join(fact for fact in FACTS if shelf.said.get(fact) is not None)
+    if facts and file.kind == "mcz":
+        text = f"{file.name}: copied as it is, without the {facts} that you give"
+        shelf.say(with_hint(text, Hint.NAME_CODEC, shelf.hints))
     if wanted.is_cut:
         return _cut(target, shelf, wanted)
     contents = file.open()

@@ -13,6 +13,7 @@ from mcz.container.directory import Directory
 from mcz.container.limits import Profile
 from mcz.container.writer import Writer
 from mcz.errors import MczError, SourceError
+from mcz.hints import Hint
 
 Digest = bytes | Callable[[], bytes]
 
@@ -83,8 +84,7 @@ class Draft:
         there = self.paths[path]
         if (there if isinstance(there, bytes) else there()) == digest:
             return True
-        hint = "--replace (in Python replace=) of append puts this one in its place"
-        raise SourceError(f"the file already restores another {path!r}; {hint}")
+        raise SourceError(f"the file already restores another {path!r}", hint=Hint.REPLACE)
 
     def finish(self) -> None:
         self.writer.finish()

@@ -14,9 +14,10 @@ from mcz.clock import SAME_RATE
 from mcz.codecs import DEFAULT, by_name
 from mcz.container.limits import BASE, Profile
 from mcz.container.writer import Writer
-from mcz.errors import LimitError, MotionError, SourceError
+from mcz.errors import LimitError, MotionError, SourceError, remark_of
 from mcz.formats import Format, format_of, wants_skeleton
 from mcz.formats.arrays.kinds import kinds_of
+from mcz.hints import Hint, Remark
 from mcz.kinematics.rest import height_note
 from mcz.motion import Motion, Skeleton
 from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
@@ -107,7 +108,7 @@ class Entry:
         except (SourceError, MotionError, LimitError) as error:
             if not self.terms.verbatim:
                 raise
-            self.reason, self.remark, self.notes = str(error), "", ()
+            self.reason, self.remark, self.notes = remark_of(error), "", ()
             with draft.step():
                 draft.writer.attachment(self.name, data)
             result = "verbatim"
@@ -185,11 +186,14 @@ def rate_notes(stated: Fraction | None, terms: Terms) -> Iterator[str]:
     if terms.force_rate:
         yield f"its {float(stated):g} frames a second are kept as {asked:g}, as was asked for"
     else:
-        yield f"it states {float(stated):g} frames a second; --force-rate makes it {asked:g}"
+        text = f"it states {float(stated):g} frames a second, {asked:g} are asked for"
+        yield Remark(text, Hint.FORCE_RATE)
 
 
 def _refuse_early(source_format: Format, data: bytes, profile: Profile) -> None:
     """Raise LimitError for more joints than the profile has, before any of them is read."""
     if source_format.has_more_joints and source_format.has_more_joints(data, profile.joints):
-        hint = "; --archive allows more" if profile is BASE else ""
-        raise LimitError(f"joints: there are more than the limit of {profile.joints}{hint}")
+        raise LimitError(
+            f"joints: there are more than the limit of {profile.joints}",
+            hint=Hint.ARCHIVE if profile is BASE else None,
+        )

@@ -159,7 +159,7 @@ def _target(
         raise OptionError(f"{name} is asked for and {dial.parameter} is given, only one can be")
     if name == "kbps" and not (motion.frame_rate and motion.n_frames):
         raise OptionError(
-            "kbps has no meaning: the frame rate is unknown (--rate says it) or there are no frames"
+            "kbps has no meaning: the frame rate is unknown or there are no frames", hint=Hint.RATE
         )
     if name.endswith("_cm"):
         _check_unit(motion, name)

@@ -359,7 +359,7 @@ def test_what_a_profile_cannot_hold_is_refused_before_it_is_read(
     joints = b"JOINT j\n{\n}\n" * BASE.joints
     path.write_bytes(b"HIERARCHY\nROOT r\n{\n%s}\nMOTION\nFrames: 0\nFrame Time: 1\n" % joints)
     monkeypatch.setattr(hierarchy, "_Node", None)  # none is looked at
-    with pytest.raises(mcz.LimitError, match="more than the limit of 4096; --archive allows more"):
+    with pytest.raises(mcz.LimitError, match="the limit of 4096; archive=True allows more"):
         mcz.encode(path, tmp_path / "a.mcz")
     monkeypatch.undo()
     assert mcz.encode(path, tmp_path / "a.mcz", archive=True).clips[0].n_channels == 0
