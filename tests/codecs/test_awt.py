@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.angles import unwrap
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.wavelet import awt_choices as choice
 from mcz.codecs.wavelet.awt import CODEC
@@ -84,47 +83,7 @@ def test_without_iterations_channels_keep_as_many() -> None:
     assert sorted(found.counts.tolist()) == [30, 30, 31, 31]
 
 
-def test_weights_move_coefficients() -> None:
-    motion = wandering(300, ["rx", "ry"])
-    light, _ = chosen(motion, 80, weights=np.array([4.0, 1.0]))
-    heavy, _ = chosen(motion, 80, weights=np.array([0.25, 1.0]))
-    assert heavy.counts[0] > light.counts[0]
-    assert heavy.counts.sum() == light.counts.sum() == 160
-
-
-@pytest.mark.parametrize(
-    ("most", "average", "counts"),
-    [
-        ([9, 9], 3, [3, 3]),
-        ([1, 9], 3, [1, 5]),
-        ([0, 9], 3, [0, 6]),
-        ([2, 2], 1e300, [2, 2]),
-        ([9, 9, 9], 1.34, [2, 1, 1]),
-        ([9, 9], 0, [0, 0]),
-        ([], 5, []),
-    ],
-)
-def test_equal_counts(most, average, counts) -> None:
-    assert choice.equal_counts(np.array(most, np.int64), average).tolist() == counts
-
-
 # What is coded
-
-
-@pytest.mark.parametrize(
-    "settings", [{"preset": "khan2014"}, {"distortion": "channels"}, {"N": 2, "Q": 3}]
-)
-def test_more_coefficients_lower_the_error(settings) -> None:
-    motion = wandering(500, ["rx", "ry", "rz", "ry"])
-    meant = unwrap(motion.values, motion.skeleton)
-    errors, sizes = [], []
-    for a_w in (0, 20, 40, 80, 160, 320, 10**9):
-        coded = Direct("awt", motion, a_w=a_w, **settings)
-        errors.append(float(np.mean((coded.read() - meant) ** 2)))
-        sizes.append(coded.n_bytes)
-    if settings.get("distortion") or "preset" in settings:
-        assert errors == sorted(errors, reverse=True)
-    assert sizes == sorted(sizes) and errors[-1] < 1e-3
 
 
 def test_positions_are_better_for_it() -> None:

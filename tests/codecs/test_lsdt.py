@@ -12,19 +12,15 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import basis_models, by_name
-from mcz.codecs.spatial.lsdt_frame import CODEC as FRAME
-from mcz.kinematics import point_names
+from mcz.codecs import basis_models
 from mcz.motion import Signal
 from tests.codecs.lossy import (
     Direct,
     amc,
     bytes_of,
-    clip_of,
     decoded,
     markers,
     saved,
-    wandering,
 )
 
 CODECS = ["lsdt-frame", "lsdt-clip"]
@@ -74,27 +70,6 @@ def test_errors_do_not_add_up(codec) -> None:
     motion = markers(1500, 5)
     error = np.abs(decoded(codec, motion, step=1.0) - motion.values)
     assert error[-100:].mean() < 1.5 * error[:100].mean()
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("coder", ["mixed", "prefix"])
-def test_a_still_clip_is_small(codec, coder) -> None:
-    """600 frames of 12 channels: a few bits a frame."""
-    motion = clip_of(np.tile(np.arange(12.0), (600, 1)), ["tx", "ty", "tz"] * 4)
-    data = saved(codec, motion, step=0.01, coder=coder, domain="channels")
-    found = decoded(codec, motion, step=0.01, coder=coder, domain="channels")
-    assert np.abs(found - motion.values).max() < 1
-    assert bytes_of(data) < (1200 if coder == "mixed" else 3000)
-
-
-@pytest.mark.parametrize("codec", CODECS)
-def test_a_clip_of_channels_becomes_places(codec) -> None:
-    motion = wandering(60, ["tx", "ty", "tz", "rx", "ry", "rz"])
-    with mcz.open(saved(codec, motion, step=0.001)) as file:
-        clip = file.only_clip()
-        found = clip.motion()
-        assert tuple(clip.skeleton.addresses()) == point_names(motion.skeleton)
-    np.testing.assert_allclose(mcz.positions(found), mcz.positions(motion), atol=0.01)
 
 
 # Gaps, odd shapes, values that cannot be coded
@@ -159,25 +134,6 @@ def test_an_archive_has_the_well_known_models_too() -> None:
         assert (data in out.getvalue()) == archive
 
 
-def test_clips_of_a_file_share_a_basis(tmp_path: Path) -> None:
-    path = tmp_path / "b.bases"
-    path.write_bytes(basis_models.build_bases([np.eye(4)] * 3))
-    motions = [replace(markers(50, 4, seed), name=f"c{seed}") for seed in range(3)]
-    from mcz.container.writer import Writer
-    from mcz.writing.tuning import write_tuned
-
-    with open(tmp_path / "all.mcz", "wb") as stream:
-        writer = Writer(stream)
-        for motion in motions:
-            write_tuned(writer, motion, by_name("lsdt-clip"), {"basis": str(path), "step": 0.1})
-        writer.finish()
-    with mcz.open(tmp_path / "all.mcz") as file:
-        kinds = [kind for kind, _ in file.container.directory.shared]
-        assert kinds.count(b"MODL") == 1
-        for motion in motions:
-            assert np.abs(file.clips[motion.name].read() - motion.values).max() < 2
-
-
 @given(st.integers(1, 12), st.integers(1, 12), st.integers(0, 40), st.integers(0, 2**32 - 1))
 def test_bases_survive(n_vectors, more, shift, seed) -> None:
     vectors = np.random.default_rng(seed).normal(size=(n_vectors, n_vectors + more - 1))
@@ -188,20 +144,6 @@ def test_bases_survive(n_vectors, more, shift, seed) -> None:
     np.testing.assert_array_equal(found[0].shifts, first.shifts)
     np.testing.assert_array_equal(found[1].vectors, np.eye(3))
     assert np.abs(found[0].vectors - vectors).max() <= 0.5 * 2.0**-shift
-
-
-def test_no_cut_of_a_model_is_the_model() -> None:
-    """What is left of a range coder's bytes may spell other entries: ids tell models apart."""
-    data = basis_models.build_bases([np.linalg.qr(np.random.default_rng(0).normal(size=(5, 5)))[0]])
-    (meant,) = basis_models.parse_bases(data)
-    for size in range(len(data)):
-        try:
-            (found,) = basis_models.parse_bases(data[:size])
-        except mcz.FormatError:
-            continue
-        assert (found.entries != meant.entries).any()
-    with pytest.raises(mcz.FormatError):
-        basis_models.parse_bases(data + b"\x00")
 
 
 def test_well_known_bases_are_nearly_orthogonal() -> None:
@@ -223,22 +165,6 @@ def test_what_is_smaller_is_chosen() -> None:
     motion = markers(1500, 9)
     motion = replace(motion, signals=(Signal(mixed),))
     assert Direct("lsdt-clip", motion, basis="auto", step=0.1).models[0]
-
-
-# Live
-
-
-def test_turns_of_a_frame_that_is_refused_live_are_forgotten() -> None:
-    motion = clip_of(np.zeros((1, 2)), ["rx", "tx"])
-    layout = Direct("lsdt-frame", motion, domain="channels").layout
-    options = FRAME.options({"step": 0.1, "domain": "channels"})
-    encoder, other = FRAME.live(layout, options), FRAME.live(layout, options)
-    frames = [np.array([10.0, 0.0]), np.array([175.0, 0.0])]
-    pushed = [encoder.push(frames[0]), other.push(frames[0])]
-    with pytest.raises(mcz.MotionError):
-        encoder.push(np.array([350.0, 1e300]))
-    pushed += [encoder.push(frames[1]), other.push(frames[1])]
-    assert pushed[::2] == pushed[1::2]
 
 
 # Real clips
@@ -265,3 +191,17 @@ def test_the_well_known_basis_beats_cosines(data: Path) -> None:
         for basis in ("known", "cosines")
     )
     assert known < 0.85 * plain
+
+
+def test_clips_of_a_file_share_a_basis(tmp_path: Path) -> None:
+    path = tmp_path / "b.bases"
+    path.write_bytes(basis_models.build_bases([np.eye(4)] * 3))
+    for seed in range(3):
+        motion = replace(markers(50, 4, seed), name=f"c{seed}")
+        mcz.write(motion, tmp_path / f"{seed}.mcz", "lsdt-clip", basis=str(path), step=0.1)
+    mcz.merge(sorted(tmp_path.glob("*.mcz")), tmp_path / "all.mcz")
+    assert (tmp_path / "all.mcz").read_bytes().count(b"MODL") == 1
+    with mcz.open(tmp_path / "all.mcz") as file:
+        for seed in range(3):
+            found = file.clips[f"c{seed}"].read()
+            assert np.abs(found - markers(50, 4, seed).values).max() < 2

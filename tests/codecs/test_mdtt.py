@@ -12,16 +12,12 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import basis_models
-from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
-from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.kinematics import point_names
 from mcz.motion import Signal
 from mcz.reading.sizes import clip_sizes
-from mcz.schema import parse
 from tests.codecs.lossy import (
     Direct,
     amc,
-    bytes_of,
     decoded,
     markers,
     saved,
@@ -33,10 +29,6 @@ CODERS = st.sampled_from(["mixed", "prefix"])
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx", "length"]), min_size=1, max_size=5)
 ALL = {"rank": 2048, "frequencies": 2048}  # nothing is cut
 BOUND = 0.8  # of a step: the threshold, and what rounding the bases may add
-
-
-def header_of(coded: Direct) -> object:
-    return parse(WindowsHeader, coded.header, "header")
 
 
 def root_mean_square(values: np.ndarray) -> float:
@@ -106,32 +98,6 @@ def test_ranks_are_those_of_the_motion() -> None:
     assert root_mean_square(coded.read() - values.reshape(600, 60)) < 0.02
 
 
-def test_headers() -> None:
-    fields = header_of(Direct("mdtt", markers(300, 4)))
-    assert (fields.window, fields.space.flags, fields.space.basis) == (240, APART, LEARNED)
-    fields = header_of(Direct("mdtt", wandering(300, ["rx", "tx", "ty"]), domain="channels"))
-    assert fields.space.flags == WEIGHTED and len(fields.space.weights) == 3
-    fields = header_of(Direct("pca-rdo", markers(300, 4)))
-    assert (fields.window, fields.space.flags) == (120, MEAN | COURSES)
-    fields = header_of(Direct("pca-rdo", wandering(300, ["rx"]), domain="channels"))
-    assert fields.space.flags == MEAN | COURSES | WEIGHTED
-    for codec in NAMES:
-        short = header_of(Direct(codec, markers(7, 2)))
-        assert short.window == 7
-        published = header_of(Direct(codec, markers(300, 2), preset="hou2016"))
-        assert published.code.coder == 1
-        few = header_of(Direct(codec, markers(300, 2), rank=1, frequencies=3, window=50))
-        assert (few.window, few.n_frequencies) == (50, 3)
-
-
-@pytest.mark.parametrize("codec", NAMES)
-def test_fits_are_made_once(codec, monkeypatch: pytest.MonkeyPatch) -> None:
-    motion = markers(200, 4, seed=77)
-    saved(codec, motion, step=0.3)
-    monkeypatch.setattr(np.linalg, "eigh", None)
-    saved(codec, motion, step=0.1)
-
-
 # Clips
 
 
@@ -147,26 +113,9 @@ def test_a_clip_of_channels_becomes_places(codec) -> None:
 
 
 @pytest.mark.parametrize("codec", NAMES)
-def test_still_clips_are_small(codec) -> None:
-    zeros = Direct(codec, replace(markers(500, 5), signals=(Signal(np.zeros((500, 15))),)))
-    assert zeros.n_bytes <= 10 and not zeros.read().any()
-    values = np.tile(np.arange(12.0), (600, 1))
-    motion = replace(markers(600, 4), signals=(Signal(values),))
-    data = saved(codec, motion, step=0.01)
-    found = decoded(codec, motion, step=0.01)
-    assert np.abs(found - values).max() < 0.05 and bytes_of(data) < 600
-    if codec == "pca-rdo":  # all is in the mean
-        assert Direct(codec, motion, step=0.01).n_bytes <= 10
-
-
-@pytest.mark.parametrize("codec", NAMES)
-def test_many_channels(codec) -> None:
-    motion = markers(64, 300)
-    found = decoded(codec, motion, step=0.5)
-    assert root_mean_square(found - motion.values) < 0.8
+def test_too_many_channels(codec) -> None:
     with pytest.raises(mcz.MotionError, match="at most 2048"):
         saved(codec, markers(2, 2100))
-    assert decoded(codec, wandering(20, ["ty", "rz"] * 100), domain="channels").shape == (20, 200)
 
 
 # Real clips

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs import by_name
 from mcz.codecs.contract import model_finder
-from mcz.codecs.online.choices import gaussian, laplacian, rates
+from mcz.codecs.online.choices import gaussian, laplacian
 from mcz.codecs.online.units import INTRA, LTR, STR, Unit, build_units, parse_units
 from mcz.errors import LostFrameError
 from mcz.writing.signal_source import MemorySource
@@ -140,14 +140,6 @@ def test_rates_are_those_of_quantized_variables() -> None:
             assert found == pytest.approx(-(p * np.log2(p)).sum(), abs=1e-6)
 
 
-def test_rates_fall_with_the_step() -> None:
-    for table in rates():
-        assert (np.diff(table) <= 0).all()
-        assert np.isfinite(table).all()
-        assert table[0] > 15
-        assert table[-1] < 1e-6
-
-
 @settings(max_examples=30)
 @given(
     st.sampled_from(["rc", "rca", "steady"]),
@@ -174,9 +166,10 @@ def test_a_rate_is_held(control, rate, gof, period, speed) -> None:
 
 
 @pytest.mark.parametrize("preset", ["default", "rc", "rca"])
-@pytest.mark.parametrize("gaps", [False, True])
-@pytest.mark.parametrize(("hz", "rate"), [(30, 8), (30, 16), (120, 32), (120, 64)])
-def test_a_rate_is_held_on_the_wire(preset, gaps, hz, rate) -> None:
+@pytest.mark.parametrize(
+    ("hz", "rate", "gaps"), [(30, 8, True), (30, 16, False), (120, 32, False), (120, 32, True)]
+)
+def test_a_rate_is_held_on_the_wire(preset, hz, rate, gaps) -> None:
     """All that is sent up to the last frame: packets, masks, repeated headers, the beginning."""
     motion = markers(20 * hz, 30)
     values = motion.values.copy()
@@ -301,26 +294,6 @@ def test_what_cannot_change_is_refused(options) -> None:
     encoder, _ = live_pair(markers(10, 2), step=0.5)
     with pytest.raises(mcz.OptionError):
         encoder.change(parsed(options))
-
-
-# Bad bytes
-
-
-@given(
-    st.lists(
-        st.tuples(st.sampled_from([STR, LTR, INTRA]), st.integers(1, 300), st.binary(max_size=5)),
-        min_size=1,
-        max_size=6,
-    ),
-    st.integers(0, 2**40),
-)
-def test_units_survive(rows, distance) -> None:
-    units = [Unit(kind, n, data, distance if kind == LTR else 0) for kind, n, data in rows]
-    stream = build_units(units)
-    n_frames = sum(unit.n_frames for unit in units)
-    assert parse_units("online", stream, n_frames) == units
-    with pytest.raises(mcz.FormatError):
-        parse_units("online", stream, n_frames + 1)
 
 
 # Real clips

@@ -11,7 +11,6 @@ import mcz
 from mcz.angles import unwrap
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.pca import streams
-from mcz.codecs.pca.choices import components_of, principal
 from mcz.codecs.pca.pca import CODEC
 from mcz.codecs.pca.streams import Components
 from tests.codecs.lossy import Direct, clip_of, decoded, wandering
@@ -53,55 +52,6 @@ def test_the_error_is_near_that_of_the_components_left_out(n_frames, kinds, q) -
     assert found <= lost * 1.001 + 1e-8
     coarse = float(np.mean((decoded("pca", motion, q=q) - meant) ** 2))
     assert coarse <= 12 * lost + 1e-4 * (1 + float(np.mean(meant**2)))
-
-
-def test_more_components_lower_the_error() -> None:
-    motion = wandering(300, ["rx", "ry", "tx"] * 6)
-    meant = unwrap(motion.values, motion.skeleton)
-    for settings in ({}, {"preset": "khan2014"}):
-        found = [
-            float(np.mean((decoded("pca", motion, q=q, **settings) - meant) ** 2))
-            for q in (1, 2, 4, 8, 12, 18, 99)
-        ]
-        assert found == sorted(found, reverse=True) and found[-1] < 1e-3
-
-
-def test_principal_components_are_those_of_the_covariance() -> None:
-    rest = np.random.default_rng(0).normal(size=(200, 6)) * np.array([9, 5, 3, 2, 1, 0])
-    rest -= rest.mean(axis=0)
-    vectors, energies = principal(rest)
-    assert vectors.shape == (5, 6)  # one has no energy
-    np.testing.assert_allclose(vectors @ vectors.T, np.eye(5), atol=1e-12)
-    meant = np.linalg.eigvalsh(rest.T @ rest)[::-1]
-    np.testing.assert_allclose(energies, meant[:5], rtol=1e-9)
-    assert (np.take_along_axis(vectors, np.abs(vectors).argmax(1)[:, None], 1) > 0).all()
-    wide, _ = principal(rest.T)
-    assert wide.shape == (5, 200)
-
-
-@pytest.mark.parametrize("shape", [(2, 3), (2, 4), (5, 20), (60, 100)])
-def test_few_frames_have_a_component_less_than_frames(shape) -> None:
-    values = np.random.default_rng(1).normal(size=shape).cumsum(axis=0)
-    vectors, energies = principal(values - values.mean(axis=0))
-    assert len(vectors) == len(energies) == shape[0] - 1
-    np.testing.assert_allclose(vectors @ vectors.T, np.eye(len(vectors)), atol=1e-9)
-
-
-def test_what_is_coded_of_a_line() -> None:
-    """Two channels that move alike are one component."""
-    line = np.outer(np.arange(40.0), [3.0, 4.0]) + np.array([7.0, -2.0])
-    found = components_of(line, 2, 3, by_frame=False)
-    assert found.basis.shape == (1, 2)
-    np.testing.assert_allclose(found.basis[0] * 2.0 ** -found.shifts[0], [0.6, 0.8], atol=1e-4)
-    np.testing.assert_array_equal(found.means, np.rint(line.mean(axis=0) * 1000))
-    assert components_of(line[:1], 2, 3, by_frame=False).basis.shape == (0, 2)
-
-
-def test_a_mean_of_each_frame_is_a_component_of_ones() -> None:
-    line = np.outer(np.arange(40.0), [3.0, 4.0, 8.0]) + np.array([7.0, -2.0, 1.0])
-    found = components_of(line, 1, 2, by_frame=True)
-    assert not found.means.any() and found.basis[0].tolist() == [1, 1, 1]
-    np.testing.assert_allclose(found.coefficients[:, 0], line.mean(axis=1) * 100, atol=1)
 
 
 # Streams

@@ -7,18 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import basis_models
 from mcz.codecs.space import COURSES
-from mcz.codecs.spatial.window_kernels import synthesize_courses
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.motion import Signal
 from mcz.reading.sizes import clip_sizes
 from mcz.schema import parse
-from mcz.transforms.dct import dct_matrix
 from tests.codecs.lossy import Direct, amc, bytes_of, decoded, markers, saved
 
 NAME = "pca-rdo"
@@ -57,21 +53,6 @@ def test_courses_are_as_many_as_shapes_in_time() -> None:
     assert np.sqrt(np.mean((coded.read() - motion.values) ** 2)) < 0.15
     plain = Direct("mdtt", motion, step=0.1, window=60)
     assert coded.n_bytes < 0.7 * plain.n_bytes
-
-
-@given(st.integers(1, 30), st.integers(0, 30), st.integers(0, 2**32 - 1))
-def test_courses_are_sums_of_cosines(n_courses, more, seed) -> None:
-    random = np.random.default_rng(seed)
-    n_cosines, window = n_courses + more // 2, n_courses + more
-    entries = np.rint(random.normal(0, 2, (n_courses, n_cosines)))
-    cosines = dct_matrix(window)
-    found = np.zeros((n_courses, window))
-    synthesize_courses(found, entries, cosines)
-    in_order = np.zeros((n_courses, window))
-    for j in range(n_cosines):
-        in_order = in_order + entries[:, j, None] * cosines[j]
-    assert found.tobytes() == in_order.tobytes()
-    np.testing.assert_allclose(found, entries @ cosines[:n_cosines], atol=1e-11)
 
 
 def test_a_short_window_has_cosines() -> None:

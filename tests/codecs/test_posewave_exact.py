@@ -13,16 +13,10 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.codecs import by_name
-from mcz.codecs.contract import Encoded, Request, Span
-from mcz.codecs.posewave.header import PosewaveHeader
-from mcz.coding.ordinals.streams import build_stream
 from mcz.editing.extraction import extract
-from mcz.motion import Exceptions, Motion, Signal
+from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, parse
-from mcz.writing.signal_source import MemorySource
-from tests.codecs.lossy import Array, amc, bytes_of, gapped, saved
+from tests.codecs.lossy import Array, amc, bytes_of, saved
 from tests.motions import smooth
 
 NAME = "posewave"
@@ -39,40 +33,6 @@ def same_bits(one: Array, other: Array) -> bool:
 def read(data: bytes, **request: Any) -> Array:
     with mcz.open(data) as file:
         return file.only_clip().read(**request)
-
-
-class Coded:
-    """A clip coded by the codec alone, with groups of both sorts."""
-
-    def __init__(self, motion: Motion, **params: object) -> None:
-        self.codec = by_name(NAME)
-        options = self.codec.options(params)
-        source = MemorySource(motion, 0, self.codec, 2**26, options)
-        coded: Encoded = self.codec.encode(source, options)
-        self.header, self.segments = coded.header, list(coded.segments)
-        self.layout = replace(source.layout, n_resolutions=coded.n_resolutions)
-        self.spans = [Span(s.first, s.n_frames) for s in self.segments]
-        self.fetched: list[tuple[int, int, int]] = []
-        self.changed: dict[tuple[int, int, int], bytes] = {}
-
-    def stream(self, segment: int, resolution: int, group: int) -> bytes:
-        place = segment, resolution, group
-        self.fetched.append(place)
-        stored = self.segments[segment].streams
-        return self.changed.get(place, stored[resolution * len(self.layout.groups) + group])
-
-    def read(self, *groups: int, resolution: int = 0, header: bytes | None = None) -> Array:
-        request = Request(0, self.layout.n_frames, groups, resolution)
-        given = self.header if header is None else header
-        return self.codec.decode(given, self.layout, self.spans, request, self.stream)
-
-    def with_header(self, **fields: Any) -> bytes:
-        return build(replace(parse(PosewaveHeader, self.header, "header"), **fields), "header")
-
-
-@pytest.fixture(scope="module")
-def coded() -> Coded:
-    return Coded(smooth(100), step=0.05, levels=2, segment_frames=60, lossless="spine")
 
 
 @pytest.mark.parametrize("words", ["spine", "knee,hips", "hips,spine,knee", ("spine", "knee")])
@@ -129,36 +89,6 @@ def test_grids_exceptions_and_gaps_of_exact_channels() -> None:
     assert np.array_equal(found.mask, mask)
     assert set(found.exceptions.channels.tolist()) == {6, 8}
     assert found.grid_changes == ((40, 7, SIX),)
-
-
-def test_markers_with_gaps() -> None:
-    motion = gapped()
-    values = motion.values.copy()
-    values[50, 4] = 3.0
-    motion = replace(motion, signals=(replace(motion.signals[0], values=values),))
-    mask = motion.signals[0].mask
-    assert mask is not None
-    found = read(saved(NAME, motion, step=0.1, lossless="RASI"))
-    assert same_bits(found[:, 3:][mask[:, 3:]], values[:, 3:][mask[:, 3:]])
-
-
-def test_an_exact_joint_needs_its_stream_alone(coded: Coded) -> None:
-    coded.fetched.clear()
-    assert coded.read(1).dtype == np.int64
-    assert {group for _, _, group in coded.fetched} == {1}
-    assert {place for place in tuple(coded.fetched) if coded.stream(*place)} == {
-        (0, 0, 1),
-        (1, 0, 1),
-    }
-    coded.fetched.clear()
-    knee = coded.read(2)
-    assert {group for _, _, group in coded.fetched} == {0, 2}
-    np.testing.assert_array_equal(knee, coded.read(0, 2)[:, 6:])
-
-
-def test_streams_are_those_of_codec_1(coded: Coded) -> None:
-    ordinals = FOUR.ordinals(np.ascontiguousarray(smooth(100).values[:60, SPINE]))[0]
-    assert coded.stream(0, 0, 1) == build_stream(ordinals, [(FOUR, FOUR)] * 3, 1, None)
 
 
 def test_extract_takes_out_exact_joints_alone() -> None:

@@ -9,19 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import by_name
 from mcz.codecs.contract import Layout
-from mcz.codecs.posewave.chain import Chain
-from mcz.codecs.posewave.choices import PRESETS, live_choice
-from mcz.codecs.posewave.header import parse_header
+from mcz.codecs.posewave.choices import PRESETS
 from mcz.errors import OptionError
 from mcz.motion import Motion
 from mcz.writing.signal_source import MemorySource
-from tests.codecs.lossy import Array, clip_of
+from tests.codecs.lossy import clip_of
 
 CODEC = by_name("posewave")
 
@@ -41,27 +37,6 @@ def pair(motion: Motion, **params: Any) -> tuple[Any, Any]:
     layout = replace(layout_of(motion), n_frames=0)
     encoder = CODEC.live(layout, CODEC.options(params))
     return encoder, CODEC.follow(encoder.header, layout)
-
-
-@given(cuts=st.sets(st.integers(1, 29), max_size=6), exponent=st.integers(0, 2))
-@settings(max_examples=20)
-def test_where_segments_end_does_not_bear_upon_values(cuts: set[int], exponent: int) -> None:
-    """What goes on is what one segment would have: rows, exponents, and what was learned."""
-    motion = turning(30)
-    choice = live_choice(motion.skeleton, 0.2, 1.0)
-    header = parse_header(choice.header, layout_of(motion))
-
-    def coded(edges: list[int]) -> Array:
-        chain, other, found = Chain(header, motion.skeleton), Chain(header, motion.skeleton), []
-        for start, stop in zip(edges, edges[1:], strict=False):
-            rows = motion.values[start:stop]
-            stream, values = chain.encode(rows, 0.1, exponent, fresh=start == 0)
-            again = other.decode(stream, stop - start, "here", fresh=start == 0)
-            np.testing.assert_array_equal(again, values)
-            found.append(values)
-        return np.concatenate(found)
-
-    np.testing.assert_array_equal(coded([0, *sorted(cuts), 30]), coded([0, 30]))
 
 
 @pytest.mark.parametrize("preset", PRESETS)
