@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
+from mcz.types import Values
 
 
 class Rule(NamedTuple):
@@ -140,7 +140,7 @@ def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
     A masked array counts as one only where nothing is masked.
     """
 
-    def form(value: Any) -> NDArray[Any]:
+    def form(value: Any) -> Values:
         if np.ma.is_masked(value):
             raise ValueError
         array = np.asarray(value)
@@ -153,7 +153,7 @@ def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
     return Rule(words, form)
 
 
-def plain(array: NDArray[Any]) -> NDArray[Any]:
+def plain(array: Values) -> Values:
     """``array`` in the byte order of the machine, aligned and in C order; itself if it is."""
     flags = array.flags
     if array.dtype.isnative and flags.c_contiguous and flags.aligned:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from mcz.errors import MotionError
 from mcz.kinematics import origins_of
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion, Skeleton
+from mcz.types import JsonObject
 
 BLOCK = 2**20  # coordinates that are looked at in one go
 
@@ -43,7 +43,7 @@ class JointErrors:
 
     __repr__ = brief
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> JsonObject:
         """All of it by name, distances in centimeters too."""
         found = asdict(self)
         for key in ("mean", "greatest"):

@@ -27,6 +27,7 @@ from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.exceptions import Exceptions
 from mcz.numbers.scaling import Scaling
 from mcz.skeleton import CHANNELS, Channel
+from mcz.types import Values
 
 
 class Sampled(Protocol):
@@ -85,7 +86,7 @@ class Signal:
     grids, grid changes, exceptions and ordinals speak of. Elsewhere ``stored`` are the values.
     """
 
-    values: NDArray[Any]
+    values: Values
     grids: tuple[Grid, ...] = ()
     name: str = "motion"
     samples_per_frame: int = 1
@@ -95,7 +96,7 @@ class Signal:
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
     ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
     scaling: Scaling | None = None
-    stored: NDArray[Any] = None  # type: ignore[assignment]  # set below where it is not given
+    stored: Values = None  # type: ignore[assignment]  # set below where it is not given
 
     __repr__ = brief.signal_text
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from mcz.kinematics import point_names, positions
 from mcz.motion import Motion
 from mcz.transforms.dct import dct_matrix
 from mcz.transforms.lsdt import GROWTH, ITERATIONS, SPARSITY, Learned, learn_bases
+from mcz.types import JsonObject
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -279,7 +279,7 @@ class Trained:
         rms: Floats = np.sqrt(found.objective / size)
         return rms
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> JsonObject:
         """For JSON and people; ``left_out`` is rms, at the start and after each iteration."""
         return {
             "bytes": len(self.data),

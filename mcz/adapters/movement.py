@@ -15,6 +15,7 @@ from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.numbers import Grid, GridKind
 from mcz.poses import point_names, positions
 from mcz.reading.source_files import with_facts
+from mcz.types import JsonObject, Values
 from mcz.units import UNIT_CM
 
 Floats = NDArray[np.float64]
@@ -44,7 +45,7 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
     places = places[..., :2] if is_flat and not places[..., 2].any() else places
     numbers, rate = numbers_or_rows(motion.frame_numbers, motion.n_frames), motion.frame_rate
     timeline = motion.timeline
-    facts: dict[str, Any] = {"ds_type": "poses", "source_software": "mcz"}
+    facts: JsonObject = {"ds_type": "poses", "source_software": "mcz"}
     facts["time_unit"] = "frames" if timeline is None else "seconds"
     facts |= {} if rate is None else {"fps": float(rate)}
     unit_cm = motion.skeleton.unit_cm
@@ -145,7 +146,7 @@ def _ordered(array: Any, dims: tuple[str, ...]) -> Any:
     return array.transpose(*dims)
 
 
-def _signal(values: NDArray[Any], name: str, channels: tuple[Channel, ...] | None) -> Signal:
+def _signal(values: Values, name: str, channels: tuple[Channel, ...] | None) -> Signal:
     """Values on the grid of their type, invalid where they are NaN."""
     kind = GridKind.BINARY32 if values.dtype == np.float32 else GridKind.BINARY64
     known = np.isfinite(values)

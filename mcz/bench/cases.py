@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +14,7 @@ from mcz.codecs import CODECS, by_name
 from mcz.codecs.contract import Codec
 from mcz.errors import MczError, OptionError
 from mcz.motion import Motion
+from mcz.types import JsonObject, Params
 
 PUBLISHED = (
     "khan2014",
@@ -74,7 +75,7 @@ class Variant:
     def published(self) -> bool:
         return dict(self.params).get("preset") in PUBLISHED
 
-    def options(self, more: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    def options(self, more: Params | None = None) -> JsonObject:
         return dict(self.params) | dict(more or {})
 
 

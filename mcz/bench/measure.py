@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import time
 import tracemalloc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,11 +23,12 @@ from mcz.motion import Motion
 from mcz.reading.ratios import clip_ratios
 from mcz.reading.sizes import clip_sizes
 from mcz.reading.source_files import read_source
+from mcz.types import JsonObject, Params
 from mcz.writing.clip_writer import write_clip
 from mcz.writing.positions import as_codec_wants
 from mcz.writing.signal_source import MemorySource
 
-Record = dict[str, Any]
+Record = JsonObject
 
 LEAST_SECONDS = 0.25  # of CPU time that a speed is taken from, the fastest of its runs
 MOST_RUNS = 50
@@ -42,7 +43,7 @@ def what_is_coded(motion: Motion, codec: str) -> Motion:
     return motion if by_name(codec).lossless else replace(motion, signals=motion.signals[:1])
 
 
-def write_file(motion: Motion, codec: str, params: Mapping[str, Any]) -> bytes:
+def write_file(motion: Motion, codec: str, params: Params) -> bytes:
     """An MCZ file of one clip, without its quality record, which is no part of the codec."""
     out = io.BytesIO()
     writer = Writer(out)
@@ -53,12 +54,12 @@ def write_file(motion: Motion, codec: str, params: Mapping[str, Any]) -> bytes:
     return out.getvalue()
 
 
-def as_coded(motion: Motion, codec: Codec, options: Mapping[str, Any]) -> Motion:
+def as_coded(motion: Motion, codec: Codec, options: Params) -> Motion:
     """What a codec is given of ``motion``: itself, or the places of its points."""
     return as_codec_wants(Writer(io.BytesIO()), motion, codec, options)
 
 
-def coded_bytes(case: Case, variant: Variant, params: Mapping[str, Any]) -> int:
+def coded_bytes(case: Case, variant: Variant, params: Params) -> int:
     """Payload and overhead, SPEC.md's "Sizes and ratios", and the models that the file has."""
     motion = what_is_coded(load(case).motion, variant.codec)
     data = write_file(motion, variant.codec, variant.options(params))
@@ -67,9 +68,7 @@ def coded_bytes(case: Case, variant: Variant, params: Mapping[str, Any]) -> int:
     return sizes.payload + sizes.overhead + sizes.models
 
 
-def point(
-    case: Case, variant: Variant, params: Mapping[str, Any], *, markers: bool = True
-) -> Record:
+def point(case: Case, variant: Variant, params: Params, *, markers: bool = True) -> Record:
     """Sizes and errors of a clip at one setting, as the public reader has them."""
     whole = load(case).motion
     motion = what_is_coded(whole, variant.codec)
@@ -127,7 +126,7 @@ def peak_bytes(work: Callable[[], Any]) -> int:
         tracemalloc.stop()
 
 
-def speeds(case: Case, variant: Variant, params: Mapping[str, Any]) -> Record:
+def speeds(case: Case, variant: Variant, params: Params) -> Record:
     """Frames a second, warm, of the codec alone, of writing and reading files, of parsing text.
 
     Peak memory is that of the codec alone, beside the values themselves.
@@ -160,7 +159,7 @@ def speeds(case: Case, variant: Variant, params: Mapping[str, Any]) -> Record:
 
 
 def work_of(
-    motion: Motion, name: str, params: Mapping[str, Any]
+    motion: Motion, name: str, params: Params
 ) -> tuple[Callable[[], Any], Callable[[], Any]]:
     """Encoding and decoding by the codec alone, of values in the domain that it wants."""
     codec = by_name(name)

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from time import process_time
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,9 @@ from numpy.typing import NDArray
 import mcz
 from mcz.angles import unwrap
 from mcz.bench.cases import Loaded
+from mcz.types import JsonObject
 
-Record = dict[str, Any]
+Record = JsonObject
 Matrix = NDArray[np.float32]
 Pack = Callable[[bytes], bytes]
 

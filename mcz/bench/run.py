@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import mcz
 from mcz.bench import peers, plots, sweep
@@ -15,6 +14,7 @@ from mcz.bench.sweep import ClipResult
 from mcz.bench.tables import Table
 from mcz.bench.tasks import Runner
 from mcz.pictures.chart_pages import ChartPage, Sheet, data_uri
+from mcz.types import JsonObject
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Outcome:
     figures: list[plots.Figures] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> JsonObject:
         return {
             "mcz": mcz.__version__,
             "clips": [clip.document() for clip in self.clips],

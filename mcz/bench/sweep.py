@@ -16,6 +16,7 @@ from mcz.bench.tables import Table, setting
 from mcz.bench.tasks import Runner, Task
 from mcz.bjontegaard import bd_rate, bd_sqnr, front
 from mcz.codecs import by_name
+from mcz.types import JsonObject
 
 ZFP = "zfp, tolerance"
 AT_ERRORS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # cm, or length units where these are unknown
@@ -41,7 +42,7 @@ class Curve:
         """(bytes, figure) of the points that have both."""
         return [(p["coded_bytes"], p[key]) for p in self.points if p.get(key)]
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> JsonObject:
         variant = self.variant
         return {
             "label": self.label,
@@ -84,7 +85,7 @@ class ClipResult:
         bounded = tuple(p for p in self.peers if p["peer"] == ZFP)
         return [*self.lossy, *([Curve(ZFP, bounded)] if bounded else [])]
 
-    def deltas(self) -> list[dict[str, Any]]:
+    def deltas(self) -> list[JsonObject]:
         """Bjontegaard deltas of every codec against every other."""
         found = []
         for a in self.lossy:
@@ -95,7 +96,7 @@ class ClipResult:
                     found.append(row | {"bd_sqnr_db": bd_sqnr(*pair)})
         return found
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> JsonObject:
         return {
             "name": self.name,
             "path": self.case.path,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+
+from mcz.types import JsonObject, Settings
 
 Cell = float | int | str | None
 
@@ -21,7 +22,7 @@ class Table:
     columns: tuple[tuple[str, str], ...]
     rows: list[Sequence[Cell]] = field(default_factory=list)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> JsonObject:
         """For JSON: the raw values."""
         heads = [head for head, _ in self.columns]
         return {
@@ -31,12 +32,12 @@ class Table:
             "rows": [list(row) for row in self.rows],
         }
 
-    def kept(self) -> dict[str, Any]:
+    def kept(self) -> JsonObject:
         """Everything, for the cache."""
         return self.document() | {"columns": [list(pair) for pair in self.columns]}
 
     @classmethod
-    def of(cls, kept: dict[str, Any]) -> Table:
+    def of(cls, kept: JsonObject) -> Table:
         """The inverse of ``kept``."""
         columns = tuple((head, spec) for head, spec in kept["columns"])
         return cls(kept["title"], kept["caption"], columns, kept["rows"])
@@ -83,7 +84,7 @@ def shown(value: Cell, spec: str) -> str:
     return format(round(value), spec) if spec.endswith("d") else format(value, spec)
 
 
-def setting(params: dict[str, Any]) -> str:
+def setting(params: Settings) -> str:
     """
     >>> setting({"T_g": 0.25, "Q": 1})
     'T_g=0.25 Q=1'

@@ -21,6 +21,7 @@ from mcz.cli.options import (
 )
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
+from mcz.types import Settings
 
 
 @click.command(short_help="More files into an .mcz.")
@@ -111,6 +112,6 @@ def command(
     return conclude(report, target, as_json)
 
 
-def _known(options: dict[str, Any]) -> dict[str, Any]:
+def _known(options: Settings) -> Settings:
     """Without --archive: the file's own profile stays."""
     return {key: value for key, value in options.items() if key != "archive"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -66,7 +66,7 @@ def _lines(codec: Codec) -> Iterator[str]:
     yield from (f"  {line}" for line in table(rows).split("\n"))
 
 
-def text_of(value: Any) -> str:
+def text_of(value: object) -> str:
     """
     >>> text_of(False), text_of(0.5), text_of("64 KiB")
     ('false', '0.5', '64 KiB')

@@ -36,6 +36,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.hints import Hint
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -188,7 +189,7 @@ def _text_of(error: MczError) -> str:
     return " ".join(error.describe(OPTION_HINTS).split())
 
 
-def _facts(error: MczError) -> dict[str, Any]:
+def _facts(error: MczError) -> JsonObject:
     """What ``--json`` says of an error; docs/scripts.md lists the keys."""
     facts = {
         "exit_code": int(code_of(error)),
@@ -387,9 +388,7 @@ def to_rate(ctx: click.Context, param: click.Parameter, value: str | None) -> Fr
     return rate
 
 
-def to_params(
-    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
-) -> dict[str, Any]:
+def to_params(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> JsonObject:
     """Callback of ``KEY=VALUE``; a value that reads as a number or a truth becomes one."""
     pairs = {}
     for value in values:

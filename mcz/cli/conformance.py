@@ -13,12 +13,13 @@ import json
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import LimitError, MczError, OptionError, UnsupportedError
+from mcz.types import JsonObject, Values
 
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 OPTIONS = ("--clip", "--frames", "--joints", "--resolution", "--post-filter", "--serve")
 MAX_LINE = 2**20
-Part = tuple[dict[str, Any], bytes]  # a row of the listing, and its bytes
+Part = tuple[JsonObject, bytes]  # a row of the listing, and its bytes
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -149,7 +150,7 @@ def _signal_arrays(clip: Clip, signal: SignalInfo, given: argparse.Namespace) ->
 
 def _values(
     clip: Clip, given: argparse.Namespace, resolution: int, signal: int
-) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+) -> tuple[Values, NDArray[np.bool_] | None]:
     if given.post_filter and not signal:  # FILT-01
         from mcz.reading.post_filtering import filtered_part
 
@@ -157,7 +158,7 @@ def _values(
     return clip.read_masked(given.frames, given.joints, resolution, signal=signal)
 
 
-def _part(clip: str, signal: str, array: str, values: NDArray[Any]) -> Part:
+def _part(clip: str, signal: str, array: str, values: Values) -> Part:
     if values.dtype == np.bool_:
         dtype, data = "u1", values.astype("u1").tobytes()
     elif values.dtype == np.int64:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -28,6 +27,7 @@ from mcz.cli.options import (
 )
 from mcz.cli.suffixes import TARGETS, suffix_of
 from mcz.cli.wanted import Wanted, refuse
+from mcz.types import JsonObject, Params, Settings
 
 MCZ = ".mcz"
 OF_SOURCES = ("skeleton", "arrays", "model")
@@ -87,17 +87,15 @@ def command(
     return _encode(file, output, facts | _facts(wanted), force=force, as_json=as_json)
 
 
-def _facts(wanted: Wanted) -> dict[str, Any]:
+def _facts(wanted: Wanted) -> JsonObject:
     return {"rate": wanted.rate, "unit": wanted.unit, "up": wanted.up}
 
 
-def _encode(
-    file: str, output: str, facts: Mapping[str, Any], *, force: bool, as_json: bool
-) -> Exit:
+def _encode(file: str, output: str, facts: Params, *, force: bool, as_json: bool) -> Exit:
     """The same as ``mcz encode`` does by default."""
     from mcz.cli.encode import command as encode
 
-    options: dict[str, Any] = {"source": file, "output": output, "force": force}
+    options: Settings = {"source": file, "output": output, "force": force}
     options |= {"as_json": as_json, "params": None}  # invoke calls no callbacks
     code: Exit = click.get_current_context().invoke(encode, **options, **facts)
     return code

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from mcz.brief import counted
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
 from mcz.hints import Hint
+from mcz.types import Params
 
 
 @contextmanager
-def hinted(target: str | bytes, options: Mapping[str, Any]) -> Iterator[None]:
+def hinted(target: str | bytes, options: Params) -> Iterator[None]:
     """Add to the error about a damaged file what is whole in it, and how to get that."""
     try:
         yield

@@ -36,6 +36,7 @@ from mcz.cli.parts import Filtered, Part, Preview
 from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of, target_of_clip
 from mcz.cli.wanted import EVENTS, Wanted, check_options, check_signal, refuse
 from mcz.reading.fidelity import CONVERTED, RESTORED
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -177,7 +178,7 @@ def decode(
             _check_plain(file, wanted)
             outputs = [_other(held, names)]
             check_kept(output, outputs[0].name, is_skeleton=outputs[0].kind == "skeleton")
-        facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
+        facts: JsonObject = {"damage": held.damage, "unverified_segments": held.unverified}
     deliver(inputs, output, outputs, force, as_json, facts | facts_of(made))
     if facts["unverified_segments"]:
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")

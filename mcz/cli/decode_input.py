@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mcz.cli.common import about, existing, opened, say
 from mcz.cli.hints import in_options
 from mcz.cli.wanted import Wanted, refuse
+from mcz.types import Params
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -27,7 +28,7 @@ class Input:
     salvage: bool = False
     unverified: bool = False
     max_decoded: int | None = None
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    facts: Params = field(default_factory=dict)
 
     @property
     def is_source(self) -> bool:

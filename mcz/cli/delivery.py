@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from mcz.cli.common import (
     Exit,
@@ -19,6 +19,7 @@ from mcz.cli.common import (
     write_output,
 )
 from mcz.cli.suffixes import is_folder
+from mcz.types import JsonObject
 
 
 class Output(NamedTuple):
@@ -42,7 +43,7 @@ def deliver(
     outputs: Sequence[Output],
     force: bool,
     as_json: bool,
-    facts: dict[str, Any],
+    facts: JsonObject,
 ) -> None:
     """Write the outputs of the files that were ``given``, the first above all, and say so.
 

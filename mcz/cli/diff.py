@@ -34,6 +34,7 @@ from mcz.cli.options import (
     up_option,
     where_option,
 )
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -268,7 +269,7 @@ def _pairs(
 
 def _compared(
     left: _Side, right: _Side, a: str | None, b: str | None, wanted: _Wanted
-) -> dict[str, Any]:
+) -> JsonObject:
     """The document of one pair of motions."""
     from mcz.metrics.document import difference
     from mcz.reading.differences import document_of

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from mcz.brief import first_of
 from mcz.cli.common import plural, table
 from mcz.cli.figures import figure_lines
 from mcz.cli.hints import in_options
+from mcz.types import JsonObject, Params
 
 FEW = 12  # names of joints that are shown
 SMALL_CM = 1.0  # below it distances are shown in mm
 
 
-def lines_of(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
+def lines_of(a: str, b: str, document: JsonObject) -> Iterator[str]:
     """The text that people read, without line ends."""
     entries = dict(document)
     names = entries.pop("name_a"), entries.pop("name_b")
@@ -43,7 +43,7 @@ def lines_of(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
         yield from (f"  {line}".rstrip() for line in rows)
 
 
-def _difference_line(found: Mapping[str, Any]) -> str:
+def _difference_line(found: Params) -> str:
     """Something beside the numbers that A and B do not say alike."""
     if found["a"] is None and found["b"] is None:
         return f"{found['what']}: not the same"
@@ -59,7 +59,7 @@ def _said(value: object) -> str:
     return "unknown" if value is None else f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
-def _joint_lines(a: str, b: str, found: dict[str, Any]) -> Iterator[str]:
+def _joint_lines(a: str, b: str, found: JsonObject) -> Iterator[str]:
     n_joints = len(found["joints"])
     if not n_joints:
         yield "no joint has the same name in both"
@@ -76,7 +76,7 @@ def _joint_lines(a: str, b: str, found: dict[str, Any]) -> Iterator[str]:
             yield f"joints of {path} alone: {first_of(names, FEW)}"
 
 
-def _feet_line(feet: Mapping[str, Any]) -> str:
+def _feet_line(feet: Params) -> str:
     """What the contacts were found with."""
     guessed = " (guessed)" if feet["up_guessed"] else ""
     assumed = " (assumed)" if feet["rate_assumed"] else ""
@@ -86,7 +86,7 @@ def _feet_line(feet: Mapping[str, Any]) -> str:
     )
 
 
-def _table_by_joint(found: Sequence[Mapping[str, Any]]) -> list[str]:
+def _table_by_joint(found: Sequence[Params]) -> list[str]:
     """A row a joint: distances of its points and of its shell, in mm where all are small."""
     if not found:
         return []
@@ -110,7 +110,7 @@ def _table_by_joint(found: Sequence[Mapping[str, Any]]) -> list[str]:
     return ["", *table(rows, "lrrrrrr"[: len(rows[0])]).split("\n")]
 
 
-def _table_of_contacts(found: Sequence[Mapping[str, Any]]) -> list[str]:
+def _table_of_contacts(found: Sequence[Params]) -> list[str]:
     """A row a contact: its frames, how far the foot slides in it, and both paths, in mm."""
     if not found:
         return []

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mcz.cli.common import plural, printable, table
+from mcz.types import Params
 
 SETTING = "param."
 SHOWN_ELSEWHERE = (
@@ -20,7 +21,7 @@ UNCUT = "uncut_"  # in front of the figures of a clip before it was cut
 DISTANCES = ("rms_coordinate_error", "mean_position_error", "max_position_error")
 
 
-def figure_lines(entries: Mapping[str, Any]) -> Iterator[str]:
+def figure_lines(entries: Params) -> Iterator[str]:
     """Lines of the figures in ``entries``, metric id -> number or text; None is left out."""
     held = {_shown(k): _shown(v) for k, v in entries.items() if v is not None}
     yield from _what(held)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mcz.cli.common import Exit, Failure, about, check_new, given, write_output
 from mcz.cli.terminal import json_text
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.bags import BagCheck
@@ -30,7 +31,7 @@ class Filed:
             refuse_inputs(path, inputs)
         check_new(self.path, force)
         self.date = _now() if date is None else None if date == NONE else date
-        self._facts: dict[str, Any] = {}  # of the file that was taken last
+        self._facts: JsonObject = {}  # of the file that was taken last
 
     def take(self, held: File) -> None:
         """Keep what the report says of an open file."""
@@ -50,7 +51,7 @@ class Filed:
             finally:
                 source.close()
 
-    def document(self, rows: Sequence[dict[str, Any]], *, quick: bool, where: str | None) -> Any:
+    def document(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> Any:
         """The report, see ``mcz.reading.verification.report``."""
         from mcz import __version__
         from mcz.reading.verification import report
@@ -58,7 +59,7 @@ class Filed:
         tool = f"mcz {__version__}"
         return report(self._facts, rows, tool=tool, date=self.date, quick=quick, chosen=where)
 
-    def write(self, rows: Sequence[dict[str, Any]], *, quick: bool, where: str | None) -> None:
+    def write(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> None:
         """Write the report of ``rows``, what is said of each part."""
         from mcz.reading.verification import text_lines
 
@@ -69,8 +70,8 @@ class Filed:
         self,
         found: BagCheck,
         verified: bool,
-        files: Sequence[dict[str, Any]],
-        documents: Sequence[dict[str, Any]],
+        files: Sequence[JsonObject],
+        documents: Sequence[JsonObject],
     ) -> None:
         """Write the report of a bag: of itself, then the ``documents`` of the archives in it.
 

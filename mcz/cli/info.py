@@ -43,6 +43,7 @@ from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
 from mcz.errors import FormatError, MczError
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -125,9 +126,7 @@ def command(
     return damage_of(file, damage)
 
 
-def _add_previews(
-    held: File, document: dict[str, Any], as_json: bool, preview: bool | None
-) -> None:
+def _add_previews(held: File, document: JsonObject, as_json: bool, preview: bool | None) -> None:
     """Add a preview to each clip that is shown in full, where it is wanted."""
     if preview is False or (preview is None and (as_json or not is_terminal())):
         return
@@ -200,7 +199,7 @@ def _print_layout(parts: list[tuple[int, int, str]], as_json: bool) -> None:
     echo(*table([["offset", "bytes", "meaning"], *rows], "rrl").split("\n"))
 
 
-def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
+def lines(file: str, document: JsonObject) -> Iterator[str]:
     """The text that people read, without line ends."""
     held = [plural(len(document["clips"]), "clip"), plural(len(document["skeletons"]), "skeleton")]
     if document["attachments"]:
@@ -233,12 +232,12 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
         yield from _preview(document["clips"][0])
 
 
-def _preview(clip: dict[str, Any]) -> Iterator[str]:
+def _preview(clip: JsonObject) -> Iterator[str]:
     if "preview" in clip:
         yield from preview_lines(clip["preview"])
 
 
-def _file_parts(document: dict[str, Any]) -> Iterator[str]:
+def _file_parts(document: JsonObject) -> Iterator[str]:
     """Each part of the file, their sum, and what the stored files are against it."""
     yield ""
     size = document["file_bytes"]
@@ -253,7 +252,7 @@ def _part_table(parts: Mapping[str, int], whole: int) -> Iterator[str]:
         yield f"  {line}"
 
 
-def _clip(clip: dict[str, Any], alone: bool) -> Iterator[str]:
+def _clip(clip: JsonObject, alone: bool) -> Iterator[str]:
     """Lines about a clip; where it is ``alone`` the parts of the file stand for its own."""
     yield ""
     yield (
@@ -291,7 +290,7 @@ def _clip(clip: dict[str, Any], alone: bool) -> Iterator[str]:
     yield from (f"  damage: {line}" for line in clip["damage"])
 
 
-def _codec(name: str, signal: dict[str, Any]) -> str:
+def _codec(name: str, signal: JsonObject) -> str:
     header = f", header {signal['header']}" if signal["header"] else ""
     counts = ", ".join(
         plural(signal[key], key.removesuffix("s")) for key in ("segments", "groups", "resolutions")
@@ -299,7 +298,7 @@ def _codec(name: str, signal: dict[str, Any]) -> str:
     return f"  codec      {name} version {signal['version']}{header}, {signal['signal']}: {counts}"
 
 
-def _source(clip: dict[str, Any]) -> Iterator[str]:
+def _source(clip: JsonObject) -> Iterator[str]:
     if clip["source_mode"] == "none":
         yield "  source     none"
         return
@@ -312,7 +311,7 @@ def _source(clip: dict[str, Any]) -> Iterator[str]:
     yield f"  exceptions {clip['n_exceptions']:,} numbers off their grid ({share:.3g} %)"
 
 
-def _clips(clips: list[dict[str, Any]]) -> str:
+def _clips(clips: list[JsonObject]) -> str:
     heading = ["clip", "codec", "frames", "rate", "channels", "source", "payload", "other", "ratio"]
     rows = [
         [
@@ -331,13 +330,13 @@ def _clips(clips: list[dict[str, Any]]) -> str:
     return table([heading, *rows], "llrrrrrrr")
 
 
-def _clip_ratio(clip: dict[str, Any]) -> str:
+def _clip_ratio(clip: JsonObject) -> str:
     """The source against the payload and the other parts that are shown beside it."""
     own = sum(clip[f"{part}_bytes"] for part in PARTS)
     return f"{clip['source_bytes'] / own:.2f}" if clip["source_bytes"] else ""
 
 
-def _notes(clips: list[dict[str, Any]]) -> Iterator[str]:
+def _notes(clips: list[JsonObject]) -> Iterator[str]:
     """What was noticed about the sources of clips and their skeletons, each text once."""
     named: dict[str, list[str]] = {}
     for clip in clips:

@@ -22,6 +22,7 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.options import json_option, salvage_option, where_option
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
@@ -76,7 +77,7 @@ def command(
     if as_csv:
         echo(*_as_csv(rows, names or USUAL).split("\n"))
     elif as_json:
-        document: dict[str, Any] = {"clips": rows, "totals": totals}
+        document: JsonObject = {"clips": rows, "totals": totals}
         document |= {
             "attachments": attachments if where is None else [],
             "aliases": [name for name, *_ in aliases] if where is None else [],
@@ -92,7 +93,7 @@ def command(
     return damage_of(file, damage)
 
 
-def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[dict[str, Any]]:
+def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[JsonObject]:
     """The values of each clip by column; without ``names`` those of the index, and its skeleton."""
     from mcz.reading.fields import getter_of
 
@@ -105,7 +106,7 @@ def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[di
     return [{name: get(clip) for name, get in getters.items()} for clip in clips]
 
 
-def _totals(clips: Sequence[Clip]) -> dict[str, Any]:
+def _totals(clips: Sequence[Clip]) -> JsonObject:
     """How many clips and frames there are, and seconds where the rate is known."""
     known = [clip for clip in clips if clip.frame_rate is not None]
     return {
@@ -116,7 +117,7 @@ def _totals(clips: Sequence[Clip]) -> dict[str, Any]:
     }
 
 
-def _text(name: str, value: Any) -> str:
+def _text(name: str, value: object) -> str:
     """A value as a table has it; of the index ? stands for a rate that is unknown."""
     if value is None:
         return "?" if name in ("frame_rate", "duration") else ""
@@ -129,7 +130,7 @@ def _text(name: str, value: Any) -> str:
     return f"{value:,}" if isinstance(value, int) and name != "n_channels" else str(value)
 
 
-def _print(rows: list[dict[str, Any]], names: Sequence[str], totals: dict[str, Any]) -> None:
+def _print(rows: list[JsonObject], names: Sequence[str], totals: JsonObject) -> None:
     if not rows:
         return
     heads = [HEADS.get(name, name) for name in names]
@@ -140,7 +141,7 @@ def _print(rows: list[dict[str, Any]], names: Sequence[str], totals: dict[str, A
         echo(_summary(totals))
 
 
-def _summary(totals: dict[str, Any]) -> str:
+def _summary(totals: JsonObject) -> str:
     seconds = round(totals["duration"])
     time = f"{seconds // 3600}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
     unknown = totals["without_rate"]
@@ -149,7 +150,7 @@ def _summary(totals: dict[str, Any]) -> str:
 
 
 def _print_others(
-    attachments: Sequence[dict[str, Any]], aliases: Sequence[tuple[str, str, str]]
+    attachments: Sequence[JsonObject], aliases: Sequence[tuple[str, str, str]]
 ) -> None:
     for attachment in attachments:
         echo(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes")
@@ -158,7 +159,7 @@ def _print_others(
         echo(f"{name}  {f'the file of skeleton {target[:8]}' if of == 'skeleton' else same}")
 
 
-def _as_csv(rows: list[dict[str, Any]], names: Sequence[str]) -> str:
+def _as_csv(rows: list[JsonObject], names: Sequence[str]) -> str:
     """RFC 4180 but for its line ends: a head, then the values, none of them a formula."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

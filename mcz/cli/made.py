@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.conversion import Fit
@@ -21,7 +23,7 @@ class Made:
     notes: tuple[str, ...] = ()
 
 
-def facts_of(clips: Mapping[str, Made]) -> dict[str, Any]:
+def facts_of(clips: Mapping[str, Made]) -> JsonObject:
     """What ``--json`` says: of one clip "fit" and "scene", of more "fits" and "scenes" by name.
 
     "left_out" has by the names of clips what their formats have no place for, "notes" what else is
@@ -29,7 +31,7 @@ def facts_of(clips: Mapping[str, Made]) -> dict[str, Any]:
     """
     fits = {name: _fit(made.fit) for name, made in clips.items() if made.fit is not None}
     scenes = {name: _scene(made.scene) for name, made in clips.items() if made.scene is not None}
-    facts: dict[str, Any] = {}
+    facts: JsonObject = {}
     for key, found in (("fit", fits), ("scene", scenes)):
         if len(found) == 1:
             facts[key] = next(iter(found.values()))
@@ -54,7 +56,7 @@ def told(clips: Mapping[str, Made]) -> Iterator[str]:
         yield from made.notes
 
 
-def _scene(scene: SceneFile) -> dict[str, Any]:
+def _scene(scene: SceneFile) -> JsonObject:
     unit = "_mm" if scene.has_unit else ""
     return {
         f"key_error{unit}": scene.key_error,
@@ -77,7 +79,7 @@ def _scene_told(scene: SceneFile) -> Iterator[str]:
     yield from scene.notes
 
 
-def _fit(fit: Fit) -> dict[str, Any]:
+def _fit(fit: Fit) -> JsonObject:
     keys = ("mean_error", "max_error", "marker_mean_error", "marker_max_error")
     distances = {name: getattr(fit, name) for key in keys for name in (key, f"{key}_cm")}
     return {

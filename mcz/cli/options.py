@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from mcz.cli.common import Exit, Failure, echo, to_frames, to_params, to_rate
+from mcz.types import Settings
 
 EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
 RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
@@ -267,7 +268,7 @@ def _to_quality(ctx: click.Context, param: click.Parameter, value: str | None) -
     raise click.BadParameter(text)
 
 
-def check_force_rate(options: dict[str, Any]) -> None:
+def check_force_rate(options: Settings) -> None:
     """Raise Failure for ``--force-rate`` without ``--rate``."""
     if options["force_rate"] and options["rate"] is None:
         raise Failure("--force-rate needs --rate", Exit.USAGE)
@@ -300,7 +301,7 @@ def encoding_options(function: Function) -> Function:
 
     @wraps(function)
     def command(
-        *args: Any, codec: str | None, quality: float | None, params: dict[str, Any], **others: Any
+        *args: Any, codec: str | None, quality: float | None, params: Settings, **others: Any
     ) -> Any:
         if quality is not None:
             if "max_error_cm" in params or "preset" in params:

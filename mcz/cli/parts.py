@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
+from mcz.types import Values
 
 if TYPE_CHECKING:
     from mcz.clock import Timeline
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from mcz.reading.recording import Event
     from mcz.tables.files import Table
 
-Masked = tuple[NDArray[Any], NDArray[np.bool_] | None]
+Masked = tuple[Values, NDArray[np.bool_] | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,7 @@ class Part:
 
     def _table(
         self,
-        values: NDArray[Any],
+        values: Values,
         mask: NDArray[np.bool_] | None,
         signal: int,
         names: list[str],
@@ -166,7 +167,7 @@ class Preview(Part):
         )
 
 
-def _floats(values: NDArray[Any]) -> NDArray[np.float64]:
+def _floats(values: Values) -> NDArray[np.float64]:
     return np.asarray(values, dtype=np.float64)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mcz.cli.common import table
 from mcz.cli.terminal import can_show
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.poses.moving import Moving
@@ -21,7 +22,7 @@ WIDTH = 24  # letters of the longest bar
 MOST_BARS = 8
 
 
-def preview_of(clip: Clip) -> dict[str, Any]:
+def preview_of(clip: Clip) -> JsonObject:
     """The keys of a clip's preview; ``motion`` is None where there is none."""
     from mcz.reading.shares import byte_shares
 
@@ -32,7 +33,7 @@ def preview_of(clip: Clip) -> dict[str, Any]:
     return {"motion": motion_of(clip), "payload": shares}
 
 
-def motion_of(moving: Moving) -> dict[str, Any] | None:
+def motion_of(moving: Moving) -> JsonObject | None:
     """The speeds of equal parts of the time, and what they are in; None where they are unknown."""
     from mcz.pictures.energy import motion_energy
 
@@ -46,7 +47,7 @@ def motion_of(moving: Moving) -> dict[str, Any] | None:
     return {"unit": f"{length}/{time}", "mean_speeds": known}
 
 
-def preview_lines(preview: dict[str, Any]) -> Iterator[str]:
+def preview_lines(preview: JsonObject) -> Iterator[str]:
     """The preview as people read it."""
     motion = preview["motion"]
     if motion is not None and any(speed is not None for speed in motion["mean_speeds"]):
@@ -87,7 +88,7 @@ def bar(share: float, blocks: bool | None = None) -> str:
     return EIGHTHS[7] * (eighths // 8) + (EIGHTHS[eighths % 8 - 1] if eighths % 8 else "")
 
 
-def bars_of(payload: Sequence[dict[str, Any]]) -> tuple[list[Bar], list[Bar]]:
+def bars_of(payload: Sequence[JsonObject]) -> tuple[list[Bar], list[Bar]]:
     """What the bars are of, and the rest: the joints that take most, or of one group its
     resolutions."""
     from mcz.reading.shares import Share, by_group

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from mcz.cli.common import plural, table
+from mcz.types import JsonObject
 
 MOST = 24  # rows of a list; --json has all of them
 
 
-def recording_lines(recording: dict[str, Any] | None) -> Iterator[str]:
+def recording_lines(recording: JsonObject | None) -> Iterator[str]:
     """The lines for a part ``recording`` of the document of ``mcz info``."""
     if recording is None:
         return
@@ -45,7 +45,7 @@ def recording_lines(recording: dict[str, Any] | None) -> Iterator[str]:
     yield from _rows(["output", "unit", "of", "description"], outputs, "llll")
 
 
-def array_lines(arrays: list[dict[str, Any]] | None) -> Iterator[str]:
+def array_lines(arrays: list[JsonObject] | None) -> Iterator[str]:
     """The lines for a part ``arrays`` of the document: each that is read, then what is kept."""
     if arrays is None:
         return
@@ -60,7 +60,7 @@ def array_lines(arrays: list[dict[str, Any]] | None) -> Iterator[str]:
         yield f"  kept       as bytes: {', '.join(kept)}"
 
 
-def _facts(recording: dict[str, Any]) -> Iterator[str]:
+def _facts(recording: JsonObject) -> Iterator[str]:
     yield f"first frame {recording['first_frame']}"
     yield f"points in {recording['unit'] or 'an unknown unit'}"
     axis, screen = recording["up_axis"], recording["y_screen"]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
 import click
+
+from mcz.types import Settings
 
 HELP = ["-h", "--help"]
 
@@ -18,7 +19,7 @@ def refuse_repeats(
     parent: click.Context | None = None,
 ) -> None:
     """Raise UsageError where ``arguments`` give an option twice that does not take a list."""
-    settings: dict[str, Any] = {"help_option_names": HELP, **command.context_settings}
+    settings: Settings = {"help_option_names": HELP, **command.context_settings}
     with click.Context(command, parent, name, **settings) as context:
         if command.no_args_is_help and not arguments:
             return

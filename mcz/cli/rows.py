@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from mcz.brief import cell_text
 from mcz.cli.common import literal
 from mcz.errors import OptionError, SourceError
+from mcz.types import JsonObject
 
 MOST_LINE = 2**24  # bytes of a line
 SET = b"# set "
 NUMBER, TIME, STATE = "frame", "time", "state"  # columns beside the values, as decoders print them
 COORDINATES = ("x", "y", "z", "tx", "ty", "tz")
 
-Row = NDArray[np.float64] | dict[str, Any]
+Row = NDArray[np.float64] | JsonObject
 
 
 class Rows:
@@ -90,7 +91,7 @@ class Rows:
         except ValueError as error:
             raise SourceError(f"line {self._at}: {error}") from None
 
-    def _changes(self, text: bytes) -> dict[str, Any]:
+    def _changes(self, text: bytes) -> JsonObject:
         words = tuple(text.decode("utf-8", "replace").split())
         if not words or not all("=" in word for word in words):
             raise SourceError(f"line {self._at}: not '# set name=value ...'")

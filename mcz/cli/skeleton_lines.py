@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from mcz.cli.common import plural
+from mcz.types import JsonObject
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 
 
-def skeleton_lines(skeleton: dict[str, Any]) -> Iterator[str]:
+def skeleton_lines(skeleton: JsonObject) -> Iterator[str]:
     yield ""
     unit = skeleton["unit_cm"]
     facts = [
@@ -39,7 +39,7 @@ def _height(height: float, unit_cm: float | None) -> str:
     return f"  {text}"
 
 
-def _is_plain(joints: list[dict[str, Any]]) -> bool:
+def _is_plain(joints: list[JsonObject]) -> bool:
     """Return whether the joints are numbers in order, all alike, as those of an array are."""
     alike = -1, joints[0]["channels"]
     return all(
@@ -48,7 +48,7 @@ def _is_plain(joints: list[dict[str, Any]]) -> bool:
     )
 
 
-def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
+def _tree(joints: list[JsonObject]) -> Iterator[str]:
     """The joints as a tree; a stack instead of recursion, since files choose the depth."""
     if len(joints) > 2 and _is_plain(joints):
         yield f"  0 to {len(joints) - 1}  {' '.join(joints[0]['channels'])}".rstrip()
@@ -69,7 +69,7 @@ def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
             )
 
 
-def rate_text(clip: dict[str, Any]) -> str:
+def rate_text(clip: JsonObject) -> str:
     rate = clip["frame_rate"]
     if rate is None:
         return "at an unknown rate"
@@ -80,7 +80,7 @@ def rate_text(clip: dict[str, Any]) -> str:
     return f"at {about}{rate:g} Hz ({seconds:.2f} s)"
 
 
-def time_lines(times: dict[str, Any] | None) -> Iterator[str]:
+def time_lines(times: JsonObject | None) -> Iterator[str]:
     """The times of the frames, unless they run from 0 s on without a gap."""
     if times is None:
         return

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from mcz.cli.common import plural
 from mcz.cli.previews import preview_lines
 from mcz.cli.recording import array_lines, recording_lines
 from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
+from mcz.types import JsonObject
 
 
-def source_lines(file: str, document: dict[str, Any]) -> Iterator[str]:
+def source_lines(file: str, document: JsonObject) -> Iterator[str]:
     """The text of a source file's document, without line ends; the rest as of an MCZ file."""
     kind = document["format"].upper()
     yield f"{file}: {kind}, {document['file_bytes']:,} bytes; not yet an .mcz (mcz encode)"

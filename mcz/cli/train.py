@@ -22,6 +22,7 @@ from mcz.cli.common import (
 )
 from mcz.cli.options import force_option, json_option, unit_option
 from mcz.cli.progress import Progress
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -129,7 +130,7 @@ def _motions(paths: tuple[str, ...], unit: str | None, progress: Progress) -> It
         yield replace(motion, name=path)  # errors name the file
 
 
-def _lines(document: dict[str, Any]) -> Iterator[str]:
+def _lines(document: JsonObject) -> Iterator[str]:
     yield (
         f"{document['output']}: {plural(document['n_points'], 'point')}, "
         f"{document['bytes']:,} bytes, from {plural(document['n_vectors'], 'vector')} of "

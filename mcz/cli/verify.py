@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -32,6 +32,7 @@ from mcz.cli.options import (
 )
 from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
+from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -105,14 +106,14 @@ def command(
     return Exit.NOT_VERIFIED if failed else Exit.FINE
 
 
-def _praise(file: str, rows: list[dict[str, Any]], counts: str) -> str:
+def _praise(file: str, rows: list[JsonObject], counts: str) -> str:
     """One line about a sound file; ``counts``: of a quick check."""
     if counts:
         return f"{file}: checksums right, {counts}; values and sources were not checked"
     return f"{file}: verified, {', '.join(_counts(rows))}"
 
 
-def _say_problems(file: str, failed: list[dict[str, Any]]) -> None:
+def _say_problems(file: str, failed: list[JsonObject]) -> None:
     for row in failed:
         for problem in row["problems"]:
             say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
@@ -164,7 +165,7 @@ def _bag(
 
 def _fully(
     file: str, source: str | None, where: str | None, max_decoded: int | None, filed: Filed | None
-) -> list[dict[str, Any]]:
+) -> list[JsonObject]:
     """What is said of each part of the file."""
     try:
         with opened(file, max_decoded=max_decoded) as held, Progress() as progress:
@@ -182,7 +183,7 @@ def _fully(
     return rows
 
 
-def _quickly(file: str, filed: Filed | None) -> tuple[list[dict[str, Any]], str]:
+def _quickly(file: str, filed: Filed | None) -> tuple[list[JsonObject], str]:
     """One row, that of the checksums; and what was seen."""
     from mcz.reading.quick_check import quick_check
 
@@ -212,7 +213,7 @@ def is_unsound(error: MczError) -> bool:
     return isinstance(error, FormatError) and not isinstance(error, UnsupportedError | LimitError)
 
 
-def _parts(held: File, where: str | None, progress: Progress) -> Iterator[dict[str, Any]]:
+def _parts(held: File, where: str | None, progress: Progress) -> Iterator[JsonObject]:
     from mcz.reading import report
 
     clips = None if where is None else held.chosen(where=where)
@@ -224,11 +225,11 @@ def _parts(held: File, where: str | None, progress: Progress) -> Iterator[dict[s
         yield _row(kind, name, [in_options(problem.message) for problem in found])
 
 
-def _row(kind: str, name: str, problems: list[str]) -> dict[str, Any]:
+def _row(kind: str, name: str, problems: list[str]) -> JsonObject:
     return {"kind": kind, "name": name, "problems": problems}
 
 
-def _counts(rows: list[dict[str, Any]]) -> Iterator[str]:
+def _counts(rows: list[JsonObject]) -> Iterator[str]:
     kinds = [row["kind"] for row in rows]
     for kind in dict.fromkeys(kinds):
         count = kinds.count(kind)
@@ -240,7 +241,7 @@ def _counts(rows: list[dict[str, Any]]) -> Iterator[str]:
             yield f"{count:,} {kind}{'s' if count > 1 else ''}"
 
 
-def _compare(held: File, source: str) -> dict[str, Any]:
+def _compare(held: File, source: str) -> JsonObject:
     """Compare SRC with what is restored under its name, or with the only clip."""
     restore = _find(held, source)
     with about(source):

@@ -40,6 +40,7 @@ from mcz.cli.options import (
 from mcz.cli.suffixes import file_in
 from mcz.cli.terminal import say_json
 from mcz.cli.view_rerun import is_rerun, show_in_rerun
+from mcz.types import Settings
 
 if TYPE_CHECKING:
     from mcz.viewing.embedding import PageWritten
@@ -140,7 +141,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
         shelf.close()
 
 
-def _check_use(output: str | None, options: dict[str, Any], in_rerun: bool) -> None:
+def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
     """Raise Failure for options of a page without -o, and of a server with it."""
     if output not in (None, "-") and not in_rerun and not output.lower().endswith(PAGES):
         raise Failure("a page is a .html; mcz render draws films", Exit.USAGE, path=output)
@@ -180,7 +181,7 @@ def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str,
     return Exit.FINE
 
 
-def _write(shelf: Shelf, output: str, as_json: bool, options: dict[str, Any]) -> Exit:
+def _write(shelf: Shelf, output: str, as_json: bool, options: Settings) -> Exit:
     from pathlib import Path
 
     from mcz.viewing.embedding import MOST_BYTES, Wanted, write_page

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from mcz.cli.common import Exit, Failure, about, check_new, echo, plural, print_json
 from mcz.cli.hints import OPTION_HINTS
 from mcz.extras import import_extra
+from mcz.types import JsonObject, Settings
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -33,7 +34,7 @@ def is_rerun(rerun: bool, output: str | None) -> bool:
     return rerun or is_file
 
 
-def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: dict[str, Any]) -> Exit:
+def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: Settings) -> Exit:
     """Log every clip that is wanted, to ``output`` or to a viewer that is started."""
     if output is None:
         recording = _recording()
@@ -75,7 +76,7 @@ def _check_screen() -> None:
         )
 
 
-def _write(shelf: Shelf, output: str, options: dict[str, Any]) -> tuple[list[dict[str, Any]], int]:
+def _write(shelf: Shelf, output: str, options: Settings) -> tuple[list[JsonObject], int]:
     """Log to a file, which appears when it is whole."""
     from mcz.writing.atomic import replacing
 
@@ -97,12 +98,12 @@ def _write(shelf: Shelf, output: str, options: dict[str, Any]) -> tuple[list[dic
     return rows, failed
 
 
-def _log(shelf: Shelf, recording: Any, options: dict[str, Any]) -> tuple[list[dict[str, Any]], int]:
+def _log(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[JsonObject], int]:
     """What was logged, and how many clips could not be."""
     from mcz.adapters.rerun import to_rerun, view_of
     from mcz.errors import MczError
 
-    rows: list[dict[str, Any]] = []
+    rows: list[JsonObject] = []
     views: list[Any] = []
     failed = unknown = 0
     several = len(shelf.given()) > 1
@@ -128,7 +129,7 @@ def _log(shelf: Shelf, recording: Any, options: dict[str, Any]) -> tuple[list[di
     return rows, failed
 
 
-def _clips(shelf: Shelf, options: dict[str, Any]) -> Iterator[tuple[str, Clip]]:
+def _clips(shelf: Shelf, options: Settings) -> Iterator[tuple[str, Clip]]:
     from mcz.reading.file import open
 
     for _, given in shelf.given():
@@ -142,7 +143,7 @@ def _clips(shelf: Shelf, options: dict[str, Any]) -> Iterator[tuple[str, Clip]]:
                 yield given.name, clip
 
 
-def _told(clip: Clip, options: dict[str, Any]) -> Clip | Motion:
+def _told(clip: Clip, options: Settings) -> Clip | Motion:
     """The clip; decoded as a whole where options say what its file does not."""
     skeleton = clip.skeleton
     unknown = (clip.frame_rate is None, skeleton.unit_cm is None, not skeleton.up_axis)

@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from mcz.errors import FormatError, OptionError
 from mcz.motion import Skeleton
 from mcz.numbers import Grid
 from mcz.schema import varint
+from mcz.types import Params, Settings, Values
 
 Domain = Literal["ordinals", "values"]
 Grouping = Literal["all", "joint", "channel"]
@@ -161,8 +162,8 @@ class Encoded:
     version: int | None = None
 
 
-Encode = Callable[[SignalSource, Mapping[str, Any]], Encoded]
-Decode = Callable[[bytes, Layout, Sequence[Span], Request, Fetch], NDArray[Any]]
+Encode = Callable[[SignalSource, Params], Encoded]
+Decode = Callable[[bytes, Layout, Sequence[Span], Request, Fetch], Values]
 
 # (header, layout, first, stop, groups) -> header of a signal that is left with frames
 # first <= f < stop, both of them ends of segments, and with these groups, ascending.
@@ -185,7 +186,7 @@ class Recoding:
     source: SignalSource
     groups: tuple[int, ...]
     spans: Sequence[Span]
-    options: Mapping[str, Any]
+    options: Params
     fetch: Fetch
 
 
@@ -211,7 +212,7 @@ class LiveEncoder(Protocol):
         """The stream of the next frame, (n_channels,), and whether its segment starts fresh."""
         ...
 
-    def change(self, options: Mapping[str, Any]) -> None:
+    def change(self, options: Params) -> None:
         """Let some parameters have new values, of ``Codec.options``, as soon as the stream allows.
 
         Raises OptionError for one that cannot change.
@@ -241,7 +242,7 @@ class LiveDecoder(Protocol):
         ...
 
 
-Live = Callable[[Layout, Mapping[str, Any]], LiveEncoder]  # a layout of 0 frames, options
+Live = Callable[[Layout, Params], LiveEncoder]  # a layout of 0 frames, options
 Follow = Callable[[bytes, Layout], LiveDecoder]  # a header
 
 # (header) -> the ids of the models that it names; raises FormatError for bad bytes.
@@ -249,9 +250,7 @@ Uses = Callable[[bytes], tuple[bytes, ...]]
 
 # (skeleton, options) -> the groups of an encoder, and the numbers of those of ordinals; None: as
 # ``grouping`` says, none of ordinals. Raises OptionError.
-Partition = Callable[
-    [Skeleton, Mapping[str, Any]], tuple[tuple[tuple[int, ...], ...], tuple[int, ...]] | None
-]
+Partition = Callable[[Skeleton, Params], tuple[tuple[tuple[int, ...], ...], tuple[int, ...]] | None]
 
 # (header, layout) -> the groups of ordinals, ascending; raises FormatError for bad bytes.
 Exact = Callable[[bytes, Layout], tuple[int, ...]]
@@ -305,7 +304,7 @@ class Codec:
     grouping: Grouping = "joint"
     parameters: tuple[Parameter, ...] = field(default=())
     dial: Dial | None = None
-    promise: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
+    promise: Callable[[Params], Settings] | None = None
     cut: Cut | None = None
     regroup: Regroup | None = None
     recode: Recode | None = None
@@ -316,20 +315,20 @@ class Codec:
     uses: Uses | None = None
     live: Live | None = None
     follow: Follow | None = None
-    live_options: Mapping[str, Any] = field(default_factory=dict)
+    live_options: Params = field(default_factory=dict)
     earlier: Mapping[int, Decode] = field(default_factory=dict)
 
     def has(self, name: str) -> bool:
         """Whether it has a parameter of that name."""
         return any(parameter.name == name for parameter in self.parameters)
 
-    def settings(self, options: Mapping[str, Any]) -> dict[str, Any]:
+    def settings(self, options: Params) -> Settings:
         """``options`` as a quality record has them, without inner ones."""
         known = {parameter.name: parameter for parameter in (*self.parameters, *TARGETS)}
         shown = {name: known[name].shown(value) for name, value in options.items()}
         return {name: value for name, value in shown.items() if not known[name].inner}
 
-    def options(self, given: Mapping[str, Any], *, inner: bool = False) -> dict[str, Any]:
+    def options(self, given: Params, *, inner: bool = False) -> Settings:
         """All parameters, those given checked; raises OptionError for an unknown or bad one.
 
         Parameters that only a search finds may be given where ``inner`` is true.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import SignalSource
 from mcz.motion import Joint, Skeleton
 from mcz.numbers import Grid
+from mcz.types import Values
 
 
 class Part:
@@ -52,10 +53,10 @@ class Part:
             return None
         return self._held(self._source.valid, start, stop)
 
-    def _held(self, read: Callable[[int, int], Any], start: int, stop: int) -> NDArray[Any]:
+    def _held(self, read: Callable[[int, int], Any], start: int, stop: int) -> Values:
         """What ``read`` gives of these columns, the last frame again and again behind the end."""
         end = self._n_read
-        found: NDArray[Any] = read(min(start, end), min(stop, end))[:, self._columns]
+        found: Values = read(min(start, end), min(stop, end))[:, self._columns]
         missing = stop - max(start, end)
         if missing <= 0:
             return found

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import TARGETS, Parameter
+from mcz.types import Settings
 
 DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the clip decides
 
 
-def document(codec: Codec) -> dict[str, Any]:
+def document(codec: Codec) -> Settings:
     """What ``mcz codecs --json`` says of a codec; its keys are stable."""
     return {
         "name": codec.name,
@@ -30,7 +30,7 @@ def parameters_of(codec: Codec) -> tuple[Parameter, ...]:
     return (*(p for p in codec.parameters if not p.inner), *(TARGETS if codec.dial else ()))
 
 
-def facts_of(parameter: Parameter) -> dict[str, Any]:
+def facts_of(parameter: Parameter) -> Settings:
     """Name, default, range and meaning of a parameter."""
     found = DEFAULT_IN_HELP.fullmatch(parameter.help)
     decided, meaning = (found[2], found[1]) if found else (None, parameter.help)

@@ -10,11 +10,12 @@ from mcz.arguments import choice as choice
 from mcz.arguments import in_range as in_range
 from mcz.arguments import integer as integer
 from mcz.arguments import number as number
+from mcz.types import Params, Settings
 
 MAX_DECIMALS = 15
 SCALED = 255  # in place of decimals: there are steps
 
-Presets = Mapping[str, Mapping[str, Any]]
+Presets = Mapping[str, Params]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ class Parameter:
     inner: bool = False
     show: Callable[[Any], str] | None = None
 
-    def shown(self, value: Any) -> Any:
+    def shown(self, value: object) -> Any:
         """A value as a record is given it."""
         return value if self.show is None or value is None else self.show(value)
 
@@ -100,7 +101,7 @@ def decimals_parameter(help_: str) -> Parameter:
     return Parameter("Q", None, help_, integer("Q", 0, MAX_DECIMALS))
 
 
-def chosen_of(presets: Presets, params: Mapping[str, Any]) -> dict[str, Any]:
+def chosen_of(presets: Presets, params: Params) -> Settings:
     """What a preset has a say in, each value that was given in place of the preset's."""
     values = presets[params["preset"]].items()
     return {name: value if params[name] is None else params[name] for name, value in values}

@@ -8,8 +8,7 @@ for each of its channels the least ordinal, the width, and one offset a row.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ from mcz.codecs.contract import (
 from mcz.codecs.parameters import Parameter, integer
 from mcz.codecs.segments import Sizing, gather, guessing
 from mcz.errors import FormatError
+from mcz.types import Params
 
 MAX_ROWS = 2**20
 SIZING = Sizing(target=58_000, most=62_000, value_bytes=4, most_rows=MAX_ROWS)
@@ -35,7 +35,7 @@ SIZING = Sizing(target=58_000, most=62_000, value_bytes=4, most_rows=MAX_ROWS)
 HEAD_SIZE = 9
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
 
     def prepare(first: int, stop: int) -> Callable[[], tuple[bytes, ...]]:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.annexes import annex_bytes
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
+from mcz.types import Params
 
 
 @cache
@@ -21,7 +20,7 @@ def start_states(name: str) -> tuple[NDArray[np.int64], ...]:
     return tuple(start_state(table) for table in document.get("sets", [document]))
 
 
-def start_state(table: Mapping[str, Any]) -> NDArray[np.int64]:
+def start_state(table: Params) -> NDArray[np.int64]:
     """``state`` of ``coding.mixing`` with the ``weights``, ``probabilities`` and ``counts`` given.
 
     The last two are lines of hexadecimal digits, one byte a context.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ Loop = Callable[[Ints, NDArray[np.uint8]], bool]
 
 
 @cache
-def _coder() -> Any:
+def _coder() -> ModuleType:
     from mcz.coding import mixing
 
     return mixing

@@ -26,6 +26,7 @@ from mcz.container.packets import FRAME, NUMBERED, SEGMENT, SHORT
 from mcz.container.segments import FRESH, SegmentHeader
 from mcz.errors import FormatError
 from mcz.schema import build, deflate, inflate, parse, varint
+from mcz.types import Settings
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
 PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
@@ -149,7 +150,7 @@ def parse_content(content: bytes) -> Directory:
     return directory
 
 
-def _add(table: dict[str, Any], name: str, row: Any) -> None:
+def _add(table: Settings, name: str, row: Any) -> None:
     if name in table:
         raise FormatError(f"INDX: two entries are named {name!r}")
     table[name] = row

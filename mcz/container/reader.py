@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 from weakref import finalize
 
 from mcz.container import payloads
@@ -55,7 +54,6 @@ from mcz.container.runs import Runs
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,
-    SegmentHeader,
     StreamCounts,
     StreamTable,
     frame_table,
@@ -68,6 +66,7 @@ from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.motion import Skeleton
 from mcz.schema import MAX_COUNT, parse, parse_until
+from mcz.types import Settings
 
 KEPT_SKELETONS = 8  # parsed ones, of a file
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
@@ -104,9 +103,9 @@ class Container:
         self.directory = self._salvage() if salvage else self._open()
         self.profile: Profile = parse_head(self.directory.head)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         names = "salvage", "max_decoded", "reads_parts", "threads"
-        return _reopened, (self.source, {name: getattr(self, name) for name in names})
+        return _reopened, (self.source, {n: getattr(self, n) for n in names})
 
     def strictly(self) -> Container:
         """The same file, of which what is read is checked as in a sound one."""
@@ -220,8 +219,7 @@ class Container:
         chunk = self.directory.shared.get((kind, id_))
         if chunk is None:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
-        payload = self.payload(chunk)
-        if payload_id(payload) != id_:
+        if payload_id(payload := self.payload(chunk)) != id_:
             raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
         return payload, chunk.label
 
@@ -235,14 +233,14 @@ class Container:
 
     def _skeleton(self, id_: bytes) -> tuple[payloads.Skel, Skeleton]:
         """Both; the last ones are kept, since the clips of a file share them."""
-        if id_ not in self._skeletons:
+        found = self._skeletons.get(id_)
+        if found is None:
             fields = parse_skel(*self._shared_payload(b"SKEL", id_), self.profile)
             found = fields, parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
             while len(self._skeletons) >= KEPT_SKELETONS:
                 self._skeletons.pop(next(iter(self._skeletons)), None)
             self._skeletons[id_] = found
-            return found
-        return self._skeletons[id_]
+        return found
 
     def template(self, id_: bytes, format_id: int) -> bytes:
         """The template in the SRCE with this id."""
@@ -386,7 +384,7 @@ class Container:
         check(f"DATA at {row.offset}: bytes", row.size, limit)
 
 
-def _reopened(source: ByteSource, options: dict[str, Any]) -> Container:
+def _reopened(source: ByteSource, options: Settings) -> Container:
     """What a pickled Container becomes: the same file, opened anew, closed when it is let go."""
     try:
         container = Container(source, **options)
@@ -398,9 +396,10 @@ def _reopened(source: ByteSource, options: dict[str, Any]) -> Container:
 
 
 def _check_table(table: StreamTable, row: SegmentRow) -> None:
-    header: SegmentHeader = table.header
-    if header != row.header:
-        raise FormatError(f"segment at {row.offset} is {header}, but the index says {row.header}")
+    if table.header != row.header:
+        raise FormatError(
+            f"segment at {row.offset} is {table.header}, but the index says {row.header}"
+        )
     if table.payload_size != row.size:  # DATA-01
         raise FormatError(
             f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes"

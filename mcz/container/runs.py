@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Hashable
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mcz.types import Values
 
 MOST_BYTES = 8 * 2**20  # of a file
 MOST_OF_ONE = MOST_BYTES // 2
@@ -18,7 +20,7 @@ class Run(NamedTuple):
     """All shown frames, from ``start`` on, of segments that hang together."""
 
     start: int
-    values: NDArray[Any]
+    values: Values
     mask: NDArray[np.bool_] | None  # None: all valid
 
     @property

@@ -149,7 +149,7 @@ class ByteSource:
         """The first ``size`` bytes, as a source of their own of the same stream."""
         return ByteSource(self._stream, name=self.name, size=size, target=self.target)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         if self.target is None:
             raise OptionError(
                 f"{self.name} was opened as a stream and cannot be pickled; open a path"

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mcz.types import Values
 
 ROWS = 4096  # at a time, so that hashing needs little memory
 PIECE = 2**20  # bytes of a mask that are made at a time
 
 
-def canonical(values: NDArray[Any]) -> bytes:
+def canonical(values: Values) -> bytes:
     """The bytes that hashes and conformance compare: little-endian, row after row, one NaN."""
     return _canonical(values).tobytes()
 
 
-def _canonical(values: NDArray[Any]) -> NDArray[Any]:
+def _canonical(values: Values) -> Values:
     """The same as an array, ``values`` itself where it has these bytes."""
     if values.dtype == np.int64:
         return np.ascontiguousarray(values, "<i8")  # CEND-03
@@ -27,7 +28,7 @@ def _canonical(values: NDArray[Any]) -> NDArray[Any]:
     return np.ascontiguousarray(values, "<f8")  # CEND-03
 
 
-def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:
+def value_hash(values: Values, mask: NDArray[np.bool_] | None) -> bytes:
     """SHA-256 of the canonical array and, where any value is invalid, of the mask."""
     digest = ValueDigest()
     for start in range(0, len(values), ROWS):
@@ -46,7 +47,7 @@ class ValueDigest:
         self._hash = hashlib.sha256()
         self._masks: list[bytes | int] = []
 
-    def update(self, values: NDArray[Any], mask: NDArray[np.bool_] | None) -> None:
+    def update(self, values: Values, mask: NDArray[np.bool_] | None) -> None:
         """Add rows; ``mask`` None: all are valid."""
         self._hash.update(_canonical(values).data)
         if mask is not None and not mask.all():

@@ -7,7 +7,7 @@ SPEC.md, "Grammar", is normative.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 from mcz.container import payloads
@@ -48,6 +48,7 @@ from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.errors import FormatError, MotionError
 from mcz.motion import Skeleton
 from mcz.schema import build
+from mcz.types import Params
 
 ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
 
@@ -331,6 +332,6 @@ class Writer:
             raise FormatError(f"{what} outside a clip")
         return self._clip
 
-    def _new_name(self, name: str, table: Mapping[str, Any]) -> None:
+    def _new_name(self, name: str, table: Params) -> None:
         if name in table:
             raise MotionError(f"the file already has {name!r}")

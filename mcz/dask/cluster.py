@@ -63,7 +63,7 @@ class Cluster:
 class Task:
     """One call, in work on the cluster from now on."""
 
-    def __init__(self, client: Any, key: str, packed: bytes, item: Any) -> None:
+    def __init__(self, client: Any, key: str, packed: bytes, item: object) -> None:
         self._client, self._key, self._call = client, key, (done, packed, item)
         self.future = self._submitted(0)
 
@@ -104,7 +104,7 @@ def _answer(task: Task | None) -> Answer[Any] | None:
     return None if task is None else task.answer
 
 
-def done(packed: bytes, item: Any) -> tuple[bool, Any]:
+def done(packed: bytes, item: object) -> tuple[bool, Any]:
     """On a worker: whether the call went well, and its result or its MczError."""
     function, state = _unpacked(packed)
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from mcz.editing.folders import NO_MOTION, motion_files
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.jobs import Answer
+from mcz.types import Params
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -31,7 +32,7 @@ def pack(
     *,
     codec: str | None = None,
     effort: str | None = None,
-    params: Mapping[str, Any] | None = None,
+    params: Params | None = None,
     rate: float | None = None,
     force_rate: bool = False,
     unit: str | None = None,

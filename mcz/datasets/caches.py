@@ -11,14 +11,13 @@ from contextlib import suppress
 from decimal import Decimal
 from pathlib import Path
 from threading import Lock
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import AccessError, OptionError, reason_of
+from mcz.types import Values
 
-Arrays = Mapping[str, NDArray[Any]]
+Arrays = Mapping[str, Values]
 UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 UNITS |= {f"{letter}IB": 2 ** (10 * (n + 1)) for n, letter in enumerate("KMGT")}
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from mcz.clock import Timeline
 from mcz.datasets.caches import to_size
@@ -25,6 +26,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, is_source, open
 from mcz.skeleton import Joints
+from mcz.types import JsonObject
 
 Target = str | os.PathLike[str] | File
 
@@ -39,7 +41,7 @@ def dataset(
     where: Where | None = None,
     joints: Joints = None,
     unit: str | None = None,
-    dtype: Any = "float32",
+    dtype: DTypeLike = "float32",
     source_rate: Fraction | float | None = None,
     cache: int | str = "64 MB",
     folder: str | os.PathLike[str] | None = None,
@@ -99,7 +101,7 @@ def _recipe(
     rate: Fraction | float | None,
     joints: Joints,
     unit: str | None,
-    dtype: Any,
+    dtype: DTypeLike,
 ) -> Recipe:
     kind = np.dtype(dtype)
     if kind not in (np.float16, np.float32, np.float64):
@@ -182,7 +184,7 @@ class _Agreement:
 
     def __init__(self, recipe: Recipe) -> None:
         self._recipe = recipe
-        self._first: tuple[Member, dict[str, Any]] | None = None
+        self._first: tuple[Member, JsonObject] | None = None
         self._known: set[tuple[object, ...]] = set()
 
     def check(self, clip: Clip, member: Member) -> None:
@@ -203,7 +205,7 @@ class _Agreement:
                     f"{_short(facts[what])}: {what} differ; {advice}"
                 )
 
-    def _facts(self, clip: Clip, member: Member) -> dict[str, Any]:
+    def _facts(self, clip: Clip, member: Member) -> JsonObject:
         recipe = self._recipe
         try:
             subject = recipe.subject(clip, member)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from mcz.brief import nearest
 from mcz.errors import MotionError, OptionError
@@ -72,7 +73,7 @@ class Field:
     lengths: bool = False
     signed: bool = False
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return field_called, (self.name,)
 
 
@@ -206,7 +207,11 @@ def names_of(field: Field, subject: Subject) -> tuple[str, ...]:
 
 
 def features_of(
-    fields: Iterable[Field], subject: Subject, rows: Rows, margins: tuple[int, int], dtype: Any
+    fields: Iterable[Field],
+    subject: Subject,
+    rows: Rows,
+    margins: tuple[int, int],
+    dtype: DTypeLike,
 ) -> dict[str, np.ndarray[Any, Any]]:
     """The arrays of frames, of whose ``rows`` there are ``margins`` more before and after."""
     values, steps = rows

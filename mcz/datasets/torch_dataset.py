@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import torch
-from numpy.typing import NDArray
 from torch.utils import data
 
 from mcz.datasets.samplers import WindowBatchSampler, WindowSampler
+from mcz.types import JsonObject, Values
 
 
 class Windows(Protocol):
@@ -17,7 +17,7 @@ class Windows(Protocol):
     @property
     def whole_clips(self) -> bool: ...
     def __len__(self) -> int: ...
-    def __getitem__(self, index: Any) -> dict[str, NDArray[Any]]: ...
+    def __getitem__(self, index: Any) -> dict[str, Values]: ...
     def sampler(self, seed: int) -> WindowSampler: ...
     def batch_sampler(self, size: int, seed: int, workers: int = 1) -> WindowBatchSampler: ...
 
@@ -42,7 +42,7 @@ class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
         """A DataLoader's batch, made at once."""
         if self.dataset.whole_clips:
             return [self[index] for index in indices]
-        batch: dict[str, Any] = {n: torch.from_numpy(a) for n, a in self.dataset[indices].items()}
+        batch: JsonObject = {n: torch.from_numpy(a) for n, a in self.dataset[indices].items()}
         return [{name: array[row] for name, array in batch.items()} for row in range(len(indices))]
 
     def sampler(self, seed: int) -> WindowSampler:

@@ -6,9 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +18,7 @@ from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
 from mcz.reading.source_rates import stating_rate
+from mcz.types import Params, Settings
 from mcz.writing.clip_writer import Amend, Progress
 from mcz.writing.tuning import write_tuned
 
@@ -39,7 +38,7 @@ def check_anew(clip: Clip, *, whole: bool = False) -> None:
         )
 
 
-def settings_of(clip: Clip) -> dict[str, Any]:
+def settings_of(clip: Clip) -> Settings:
     """The settings that a clip was coded with and that are not what they are by default."""
     codec = clip.signals[0].codec
     usual = codec.options({})
@@ -121,7 +120,7 @@ def joints_alone(cut: ClipCut) -> Motion:
     return made.at_times(motion.timeline)
 
 
-def settings_of_joints(clip: Clip) -> dict[str, Any]:
+def settings_of_joints(clip: Clip) -> Settings:
     """The settings of a clip that suit some of its joints alone."""
     codec = clip.signals[0].codec
     found = {k: v for k, v in settings_of(clip).items() if k not in OF_JOINTS}
@@ -133,7 +132,7 @@ def write_anew(
     writer: Writer,
     motion: Motion,
     clip: Clip,
-    settings: Mapping[str, Any],
+    settings: Params,
     amend: Amend,
     progress: Progress | None,
 ) -> dict[str, str]:

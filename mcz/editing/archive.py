@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
@@ -36,6 +36,7 @@ from mcz.hints import split_hint
 from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
 from mcz.threads import limited
+from mcz.types import Params, Settings
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -51,7 +52,7 @@ def pack(
     *,
     codec: str | None = None,
     effort: str | None = None,
-    params: Mapping[str, Any] | None = None,
+    params: Params | None = None,
     rate: float | None = None,
     force_rate: bool = False,
     unit: str | None = None,
@@ -143,7 +144,7 @@ def append(
     *,
     codec: str | None = None,
     effort: str | None = None,
-    params: Mapping[str, Any] | None = None,
+    params: Params | None = None,
     skeleton: str | os.PathLike[str] | None = None,
     rate: float | None = None,
     force_rate: bool = False,
@@ -186,7 +187,7 @@ def append(
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     coded = chosen(codec, effort)
-    said: dict[str, Any] = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
+    said: Settings = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
     terms = Terms(coded, params, skeleton, force_rate=force_rate, verbatim=verbatim, **said)
     held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in held]

@@ -53,6 +53,7 @@ from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
+from mcz.types import Params
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Amend, Progress
 
@@ -264,9 +265,7 @@ class Copier:
             self.found.left_out.append(f"clip {clip.name}: its source file, as joints were cut")
         self._note(cut)
 
-    def recode(
-        self, clip: Clip, motion: Motion, settings: Mapping[str, Any], amend: Amend
-    ) -> dict[str, str]:
+    def recode(self, clip: Clip, motion: Motion, settings: Params, amend: Amend) -> dict[str, str]:
         """Write ``motion``, coded anew, in the place of ``clip``; return its quality record."""
         row = self.container.directory.clips[clip.name]
         self.skeleton(clip.skeleton_id)

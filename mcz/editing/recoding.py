@@ -17,6 +17,7 @@ from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
 from mcz.reading.signal_info import SignalInfo
 from mcz.reading.signal_reader import SignalReader
+from mcz.types import Settings
 from mcz.writing.quality import with_values
 from mcz.writing.signal_source import MAX_INTEGER, MemorySource, settle
 
@@ -330,7 +331,7 @@ def _streams(
     }
 
 
-def recorded_options(codec: Codec, quality: Mapping[str, str]) -> dict[str, Any]:
+def recorded_options(codec: Codec, quality: Mapping[str, str]) -> Settings:
     """The parameters of a codec as a quality record has them; what makes no sense is left out."""
     aims = {target.name for target in TARGETS}
     options = codec.options({})

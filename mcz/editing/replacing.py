@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.brief import brief
 from mcz.container import payloads
@@ -39,6 +38,7 @@ from mcz.errors import (
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.schema import build, parse
+from mcz.types import Values
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Progress
 from mcz.writing.quality import CHUNK, figures, texts_of
@@ -321,7 +321,7 @@ class _AnewEditor(Copier):
             return
         self.recode(cut.clip, self.edited.motion, settings_of(cut.clip), self._record)
 
-    def _record(self, now: dict[str, str], decoded: Sequence[NDArray[Any]]) -> dict[str, str]:
+    def _record(self, now: dict[str, str], decoded: Sequence[Values]) -> dict[str, str]:
         wanted = self.edited.motion.signals[0].masked()
         with np.errstate(invalid="ignore"):  # infinities
             difference = np.abs(decoded[0] - wanted)

@@ -24,6 +24,7 @@ from mcz.reading.file import File, open
 from mcz.reading.names import listed
 from mcz.reading.rate_notes import text_notes
 from mcz.reading.sharing import shared_out
+from mcz.types import Settings
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 
@@ -64,7 +65,7 @@ def unpack(
     if names not in NAMES:
         raise OptionError(f"names is {names!r}, not one of {', '.join(NAMES)}")
     folder, report = Folder(Path(directory)), Report()
-    options: dict[str, Any] = {"max_decoded": max_decoded, "threads": threads}
+    options: Settings = {"max_decoded": max_decoded, "threads": threads}
     with limited(jobs), open(target, salvage=salvage, **options) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage

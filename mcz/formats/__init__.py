@@ -19,6 +19,7 @@ from mcz.formats.notes import join_notes
 from mcz.formats.table_notes import join_table_notes
 from mcz.motion import FrameNotes, Source
 from mcz.source import SourceClock
+from mcz.types import JsonObject
 
 __all__ = [
     "FORMATS",
@@ -71,7 +72,7 @@ class Format:
     recording: Callable[[str, bytes, bytes], Any] | None = None
     has_more_joints: Callable[..., bool] | None = None
     bones: Callable[..., dict[str, int]] | None = None
-    arrays: Callable[..., list[dict[str, Any]]] | None = None
+    arrays: Callable[..., list[JsonObject]] | None = None
     restate: Callable[[bytes, Fraction], Any] | None = None
     is_motion: Callable[[bytes], bool] | None = None
     clock: Callable[[bytes], SourceClock | None] | None = None
@@ -254,7 +255,7 @@ def recording_of(source: Source | None) -> Any:
     return read(source.format, source.template, source.detail)
 
 
-def arrays_of(source: Source | None, signals: Sequence[str]) -> list[dict[str, Any]] | None:
+def arrays_of(source: Source | None, signals: Sequence[str]) -> list[JsonObject] | None:
     """What became of the arrays of a source, see ``arrays.listing``; None where it has none.
 
     ``signals`` are the names of the clip's signals. Raises FormatError on bad bytes.

@@ -23,6 +23,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.formats.body_trees import has_tree, tree
+from mcz.types import Values
 
 Floats = NDArray[np.float64]
 
@@ -174,7 +175,7 @@ class _Model:
     def has(self, name: str) -> bool:
         return f"{name}.npy" in self.names
 
-    def array(self, name: str) -> NDArray[Any]:
+    def array(self, name: str) -> Values:
         """The numbers of a member; raises SourceError for one that is not there or is no such."""
         where = f"{self.file}: {name}"
         if not self.has(name):

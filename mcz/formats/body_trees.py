@@ -9,10 +9,8 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.annexes import annex_bytes
 from mcz.errors import OptionError
@@ -26,6 +24,7 @@ from mcz.motion import (
     Joint,
     Skeleton,
 )
+from mcz.types import Values
 
 ANNEX = "body_trees.json"
 METER_CM = 100.0
@@ -81,7 +80,7 @@ def _trees() -> dict[str, BodyTree]:
 
 def body_skeleton(
     body: BodyTree | str | int,
-    offsets: NDArray[Any] | None = None,
+    offsets: Values | None = None,
     *,
     turns: str = "rotvec",
     moves: bool = True,

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +34,7 @@ from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton,
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.numbers.scaling import Scaling
+from mcz.types import Values
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54}
 POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
@@ -124,7 +124,7 @@ def _scale(data: bytes, parameters: Parameters) -> tuple[float, str]:
     return 1.0, "no scale that can be used: coordinates are the integers of the file"
 
 
-def _words(data: bytes, parameters: Parameters, shape: Shape) -> NDArray[Any]:
+def _words(data: bytes, parameters: Parameters, shape: Shape) -> Values:
     """The data section, a row a frame."""
     kind = "i2" if shape.word == 2 else "u4"
     n_words = shape.n_frames * shape.frame_words
@@ -191,7 +191,7 @@ def _other_signals(
 
 def _signal(
     name: str,
-    words: NDArray[Any],
+    words: Values,
     grid: Grid,
     channels: tuple[Channel, ...] | None = None,
     per_frame: int = 1,
@@ -207,7 +207,7 @@ def _signal(
     )
 
 
-def _masked(points: Signal, residuals: NDArray[Any]) -> Signal:
+def _masked(points: Signal, residuals: Values) -> Signal:
     """The points with their mask: valid where the residual is not negative and nothing is NaN."""
     valid = residuals >= 0
     if points.values.dtype == np.float64:

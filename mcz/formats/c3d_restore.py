@@ -8,7 +8,6 @@ frames than the file had.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from mcz.formats.c3d_parameters import BLOCK, Order
 from mcz.formats.c3d_shape import COUNTED, ROTATION_WORDS
 from mcz.motion import Motion, Signal, Source
 from mcz.numbers import Grid, GridKind
+from mcz.types import Values
 
 INTEGERS = (GridKind.SCALED, GridKind.INTEGER)
 
@@ -103,7 +103,7 @@ def _section(motion: Motion, layout: Layout) -> bytes:
     return words.tobytes()
 
 
-def _fill_points(words: NDArray[Any], motion: Motion, layout: Layout) -> None:
+def _fill_points(words: Values, motion: Motion, layout: Layout) -> None:
     """The words of all points, which are the first of each row."""
     parts = _parts(motion, layout)
     if not layout.n_points:
@@ -166,7 +166,7 @@ def _residuals(motion: Motion, layout: Layout, parts: list[Signal]) -> Signal:
     return Signal(residuals.astype(np.float64), (layout.order.grid,) * layout.n_points)
 
 
-def _with_gaps(points: Signal, residuals: NDArray[Any]) -> Signal:
+def _with_gaps(points: Signal, residuals: Values) -> Signal:
     """The points, NaN where they are invalid and neither they nor their residuals say so.
 
     A lossy codec fills such gaps, which the file would then no longer have.
@@ -191,7 +191,7 @@ def valid_points(signal: Signal) -> NDArray[np.bool_] | None:
     return valid
 
 
-def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> NDArray[Any]:
+def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> Values:
     """The words of a signal, (rows, channels), in the byte order of the file."""
     grids = (*signal.grids, *(grid for _, _, grid in signal.grid_changes))
     kinds = {grid.kind for grid in grids}

@@ -23,6 +23,7 @@ from mcz.errors import WorkerError
 from mcz.hints import Hint
 from mcz.jobs import Answer, engine, threads_each
 from mcz.jobs.worker import receive, send
+from mcz.types import Settings
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -165,7 +166,7 @@ class Worker:
 
 
 # An interrupt at the terminal goes to the group in front: the pool ends its processes itself.
-_APART: dict[str, Any] = (
+_APART: Settings = (
     {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
     if os.name == "nt"
     else {"process_group": 0}

@@ -7,16 +7,17 @@ from operator import index
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Moved = list[tuple[NDArray[Any], NDArray[Any]]]  # what was given, what was taken for it
+from mcz.types import Values
+
+Moved = list[tuple[Values, Values]]  # what was given, what was taken for it
 SOUND = 0x1 | 0x100  # flags of an array: contiguous, aligned
 WRITEABLE = 0x400
 
 
 def fit(
     given: Any, dtype: np.dtype[Any], rank: int, dense: bool, is_written: bool, moved: Moved
-) -> NDArray[Any]:
+) -> Values:
     """``given`` with this dtype and number of axes, aligned, contiguous where ``dense``.
 
     It is copied where it is not so. A copy of an array that the kernel writes is noted in

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import brief
 from mcz.errors import LostFrameError
+from mcz.types import Values
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,7 +34,7 @@ class LiveFrame:
     """
 
     number: int
-    values: NDArray[Any]
+    values: Values
     valid: Mask
     state: State = "decoded"
 

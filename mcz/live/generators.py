@@ -20,13 +20,14 @@ from mcz.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.live.strict_reader import StrictFrames
 from mcz.live.writer import LiveWriter
 from mcz.motion import POSITION_KINDS, Channel, Joint, Skeleton
+from mcz.types import Params
 from mcz.units import facing, in_unit
 
 if TYPE_CHECKING:
     from mcz.transforms.post_filter import PostFilter
 
 AXES = "xyz"
-Row = ArrayLike | Mapping[str, Any]
+Row = ArrayLike | Params
 
 
 def stream_encode(
@@ -34,7 +35,7 @@ def stream_encode(
     skeleton: Skeleton | Sequence[str],
     *,
     codec: str = "online",
-    params: Mapping[str, Any] = MappingProxyType({}),
+    params: Params = MappingProxyType({}),
     frame_rate: Fraction | None = None,
     unit: str | None = None,
     up: str | None = None,

@@ -24,8 +24,9 @@ from mcz.errors import FormatError, OptionError
 from mcz.live.clip_state import ClipState, LiveClip, Shared, begin, opening
 from mcz.reading.clip import Clip
 from mcz.schema import parse
+from mcz.types import Values
 
-Frame = tuple[int, NDArray[Any], NDArray[np.bool_]]
+Frame = tuple[int, Values, NDArray[np.bool_]]
 SHARED = (b"SKEL", b"MODL", b"SRCE")  # what clips refer to
 
 

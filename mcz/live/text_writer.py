@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from typing import Any
 
 from mcz.codecs import by_name
 from mcz.container.writer import Sink
@@ -16,6 +15,7 @@ from mcz.motion import Skeleton
 from mcz.reading.skeletons import NONE, how_given
 from mcz.reading.skeletons import NOTE as SKELETON_NOTE
 from mcz.reading.source_files import read_skeleton
+from mcz.types import Params
 from mcz.units import facing, in_unit
 from mcz.writing.entry import Terms, rate_notes
 
@@ -120,7 +120,7 @@ def _remark(arriving: Arriving, terms: Terms) -> tuple[str, ...]:
     return (f"{terms.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}", *notes)
 
 
-def codes_live(codec: str, params: Mapping[str, Any]) -> bool:
+def codes_live(codec: str, params: Params) -> bool:
     """Whether the codec of that name, with these parameters, codes frame by frame.
 
     Raises OptionError for a codec or a parameter that there is not.

@@ -30,6 +30,7 @@ from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.kinematics.single import FramePositions
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.schema import build
+from mcz.types import Params, Settings
 from mcz.writing.clip_writer import asked, open_clip, write_skeleton
 from mcz.writing.names import check_metadata, name_skeleton
 from mcz.writing.positions import wants_positions
@@ -95,7 +96,7 @@ class LiveWriter:
         sink: Sink,
         skeleton: Skeleton,
         codec: str,
-        params: Mapping[str, Any] = MappingProxyType({}),
+        params: Params = MappingProxyType({}),
         *,
         frame_rate: Fraction | None = None,
         frame_rate_exact: bool = True,
@@ -308,7 +309,7 @@ class LiveWriter:
 
 
 def _coders(
-    codec: Codec, motion: Motion, options: Mapping[str, Any], writer: Writer
+    codec: Codec, motion: Motion, options: Params, writer: Writer
 ) -> tuple[LiveEncoder, LiveDecoder]:
     if codec.live is None or codec.follow is None:
         raise OptionError(f"codec {codec.name} does not code frame by frame")
@@ -378,10 +379,10 @@ class _Figures:
                     self._most, self._where = float(distances[point]), (self._frames, point)
         self._frames += 1
 
-    def entries(self) -> dict[str, Any]:
+    def entries(self) -> Settings:
         """The figures by their metric ids, None where there is none."""
         unit = self.skeleton.unit_cm
-        found: dict[str, Any] = {"frames": self._frames, "channels": self.skeleton.n_channels}
+        found: Settings = {"frames": self._frames, "channels": self.skeleton.n_channels}
         found["mse_raw"] = self._squares / self._values if self._values else None
         if self._positions and self._where is not None:
             mean, (frame, point) = self._sum / self._points, self._where
@@ -408,5 +409,5 @@ def _added(total: float, count: int, more: Floats) -> tuple[float, int]:
     return total + float(more[valid].sum()), count + int(np.count_nonzero(valid))
 
 
-def _is_absurd(value: Any) -> bool:
+def _is_absurd(value: object) -> bool:
     return isinstance(value, float) and not np.isfinite(value)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
 
 from mcz.errors import MczError
 from mcz.joint_errors import joint_errors
@@ -13,6 +12,7 @@ from mcz.kinematics.feet import feet_of
 from mcz.metrics.comparing import compare
 from mcz.metrics.comparison import Comparison
 from mcz.motion import Motion
+from mcz.types import JsonObject, Params
 
 
 def difference(
@@ -24,7 +24,7 @@ def difference(
     contacts: Sequence[int | str] | bool | None = None,
     by_joint: bool = False,
     contact_list: bool = False,
-) -> dict[str, Any]:
+) -> JsonObject:
     """The figures of ``b`` against ``a``, the original; docs/scripts.md has the keys.
 
     ``start`` is the first frame of both in their clips, from which frames are counted. ``contacts``
@@ -35,7 +35,7 @@ def difference(
         contacts = bool(feet_of(a.skeleton))
     found = compare(a, b, shell_cm=shell_cm, contacts=contacts if a.skeleton.joints else False)
     entries = _in_clip(found.entries(), start)
-    document: dict[str, Any] = {"name_a": a.name, "name_b": b.name, **entries}
+    document: JsonObject = {"name_a": a.name, "name_b": b.name, **entries}
     document["feet"] = _feet(found)
     if by_joint:
         document["by_joint"] = [_in_clip(each.entries(), start) for each in found.by_joint]
@@ -49,7 +49,7 @@ def difference(
     return document | {"notes": list(found.notes)}
 
 
-def _in_clip(entries: Mapping[str, Any], start: int) -> dict[str, Any]:
+def _in_clip(entries: Params, start: int) -> JsonObject:
     """Figures with their frames counted from the first of the clip, not of what was cut."""
     return {
         key: value + start if key.endswith("_frame") and value is not None else value
@@ -57,7 +57,7 @@ def _in_clip(entries: Mapping[str, Any], start: int) -> dict[str, Any]:
     }
 
 
-def _feet(found: Comparison) -> dict[str, Any] | None:
+def _feet(found: Comparison) -> JsonObject | None:
     """What contacts were looked for with; None where none were."""
     if found.sliding is None:
         return None
@@ -93,7 +93,7 @@ def _equal_joints(a: Motion, b: Motion) -> list[str]:
     return found
 
 
-def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> dict[str, Any] | None:
+def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> JsonObject | None:
     """The distances of joints of the same names, of skeletons whose points are not alike."""
     if found.points is not None and point_set(a.skeleton) == point_set(b.skeleton):
         return None

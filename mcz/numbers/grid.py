@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from construct import If, Int8ul, this
-from numpy.typing import NDArray
 
 from mcz.errors import FormatError, OptionError
 from mcz.numbers import printed, rules, textgrids
@@ -26,6 +24,7 @@ from mcz.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
 from mcz.numbers.tokens import NAN, TENS, Bools, Floats, Ints, Texts, Tokens, nearest
 from mcz.schema import FINITE, Adapted, Record
 from mcz.schema import field as record_field
+from mcz.types import Values
 
 MAX = np.finfo(np.float64).max
 _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
@@ -154,7 +153,7 @@ class Grid:
             case _:
                 return scaled_magnitudes(values, self.scale, True, self.limit)
 
-    def bits(self, ordinals: Ints) -> NDArray[Any]:
+    def bits(self, ordinals: Ints) -> Values:
         """The words of a BINARY32, BINARY64 or VAX_F grid as a file stores them, "<u4" or "<u8"."""
         wide = self._word_type() == "<u8"
         sign = np.int64(-(2**63)) if wide else np.int64(2**31)
@@ -163,7 +162,7 @@ class Grid:
             words = vax_swap(words)
         return words.view("<u8") if wide else words.astype("<u4")
 
-    def ordinals_of_bits(self, words: NDArray[Any]) -> Ints:
+    def ordinals_of_bits(self, words: Values) -> Ints:
         """The inverse of ``bits``: words as stored, read as little-endian u4 or u8."""
         kind = self._word_type()
         words = np.ascontiguousarray(words, kind)

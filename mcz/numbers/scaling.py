@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.checks import Rule, array_of, check_fields
 from mcz.errors import MotionError
+from mcz.types import Values
 
 Floats = NDArray[np.float64]
 MAX_INTEGER = 2.0**53  # what a binary64 holds exactly
@@ -49,14 +49,14 @@ class Scaling:
         )
         return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
-    def values(self, stored: NDArray[Any], channels: slice | list[int] = slice(None)) -> Floats:
+    def values(self, stored: Values, channels: slice | list[int] = slice(None)) -> Floats:
         """Stored numbers, (n_rows, n_channels), in units; ``channels`` says which these are."""
         with np.errstate(over="ignore", invalid="ignore"):  # files say what they like
             moved = stored.astype(np.float64) - self.offsets[channels]
             scaled: Floats = moved * self.scales[channels] * self.general
         return scaled
 
-    def stored(self, values: Floats, numbers: NDArray[Any]) -> NDArray[Any]:
+    def stored(self, values: Floats, numbers: Values) -> Values:
         """The stored numbers that mean ``values``: ``numbers``, but where a value is another.
 
         What is new is the number that means it or, among integers, the nearest one; NaN or 0 where

@@ -5,10 +5,7 @@ Matrices are (..., 3, 3), active, for column vectors. What is NaN stays NaN.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import OptionError
 from mcz.kinematics.chain import IDENTITY, Floats, turned
@@ -18,6 +15,7 @@ from mcz.kinematics.rotation_vectors import (
     quaternions_of_matrices,
     vectors_of_quaternions,
 )
+from mcz.types import Values
 
 # What each representation adds to the shape of an array of rotations.
 FORMS = {"matrix": (3, 3), "quat": (4,), "rotvec": (3,), "6d": (6,), "euler": (3,)}
@@ -103,7 +101,7 @@ def _euler_angles(quaternions: Floats, order: str) -> Floats:
     return np.stack([ends[first], second, ends[third]], axis=1)
 
 
-def to_matrices(values: NDArray[Any], form: str, order: str = "XYZ") -> Floats:
+def to_matrices(values: Values, form: str, order: str = "XYZ") -> Floats:
     """The inverse of ``from_matrices``: (..., *FORMS[form]) to (..., 3, 3).
 
     Quaternions may have any length but 0; of 6D vectors the second is made orthogonal to the first.

@@ -7,13 +7,14 @@ from fractions import Fraction
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from mcz.clock import Timeline, known_timeline
 from mcz.errors import OptionError
 from mcz.kinematics.chain import Floats
 from mcz.motion import Motion, Skeleton, check_poses
 from mcz.skeleton import Joints, joint_columns, joint_list
+from mcz.types import Values
 from mcz.units import unit_cm_of
 
 Frames = tuple[int, int] | slice | None
@@ -35,7 +36,7 @@ class Decoded(Protocol):
     def timeline(self) -> Timeline | None: ...
     def read(
         self, frames: tuple[int, int] | None = None, joints: Joints = None, resolution: int = 0
-    ) -> NDArray[Any]: ...
+    ) -> Values: ...
 
 
 Moving = Motion | Decoded
@@ -125,7 +126,7 @@ def signal_of(moving: Moving, signal: int | str) -> Any:
     return moving.signals[signal]
 
 
-def as_type(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
+def as_type(values: Values, dtype: DTypeLike) -> Values:
     """``values`` as float64 or float32; raises OptionError for another type."""
     wanted = np.dtype(dtype)
     if wanted not in (np.float64, np.float32):

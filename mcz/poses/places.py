@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike
 
 from mcz.brief import among, brief
 from mcz.clock import known_timeline
@@ -28,6 +27,7 @@ from mcz.poses.moving import (
     values_of,
 )
 from mcz.skeleton import Joints, joint_list
+from mcz.types import Values
 
 
 def point_names(moving: Moving | Skeleton, joints: Joints = None) -> tuple[str, ...]:
@@ -67,8 +67,8 @@ def positions(
     frames: Frames = None,
     *,
     unit: str | None = None,
-    dtype: Any = np.float64,
-) -> NDArray[Any]:
+    dtype: DTypeLike = np.float64,
+) -> Values:
     """Where the points of a Motion or Clip are in the world, (n_frames, n_points, 3).
 
     ``joints`` by index or name, or points by the names of ``point_names``; None: all points, those
@@ -95,8 +95,8 @@ def velocities(
     frames: Frames = None,
     *,
     unit: str | None = None,
-    dtype: Any = np.float64,
-) -> NDArray[Any]:
+    dtype: DTypeLike = np.float64,
+) -> Values:
     """How fast the points move, (n_frames, n_points, 3), in length units (or ``unit``) a second.
 
     Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate where these are
@@ -115,8 +115,8 @@ def accelerations(
     frames: Frames = None,
     *,
     unit: str | None = None,
-    dtype: Any = np.float64,
-) -> NDArray[Any]:
+    dtype: DTypeLike = np.float64,
+) -> Values:
     """How the velocity of the points changes, in length units (or ``unit``) a second squared.
 
     (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or beside a gap that of
@@ -164,14 +164,14 @@ class Root:
     """
 
     joint: str
-    positions: NDArray[Any]
-    rotations: NDArray[Any]
+    positions: Values
+    rotations: Values
     up_axis: str
 
     __repr__ = brief
 
     @property
-    def headings(self) -> NDArray[Any]:
+    def headings(self) -> Values:
         """How far the root is turned about the axis that points up, (n_frames,), in radians.
 
         0 in the rest pose, continuous over turns: the twist of the rotation. Raises OptionError
@@ -192,7 +192,7 @@ def root(
     *,
     joint: int | str | None = None,
     unit: str | None = None,
-    dtype: Any = np.float64,
+    dtype: DTypeLike = np.float64,
 ) -> Root:
     """Where the root joint itself is and how it is turned in the world: a ``Root``.
 

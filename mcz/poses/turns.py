@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike
 
 from mcz.errors import OptionError
 from mcz.kinematics.frames import frame_poses_of
 from mcz.poses.conversions import check_form, check_order, from_matrices
 from mcz.poses.moving import Frames, Moving, as_type, frame_range, joint_numbers, values_of
 from mcz.skeleton import Joints
+from mcz.types import Values
 
 SPACES = ("local", "world")
 
@@ -25,8 +24,8 @@ def rotations(
     frames: Frames = None,
     order: str = "XYZ",
     degrees: bool = False,
-    dtype: Any = np.float64,
-) -> NDArray[Any]:
+    dtype: DTypeLike = np.float64,
+) -> Values:
     """How the joints of a Motion or Clip are turned, (n_frames, n_joints, ...).
 
     ``form``: "quat" (..., 4), w first, unit length, signs continuous; "matrix" (..., 3, 3);

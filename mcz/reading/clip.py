@@ -6,7 +6,6 @@ import hashlib
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,12 +38,13 @@ from mcz.reading.source_rates import stating_rate
 from mcz.reading.stored_clip import StoredClip
 from mcz.reading.views import ClipValues, FrameValues, Masked
 from mcz.skeleton import Joints, joint_list
+from mcz.types import Values
 
 
 class Clip(StoredClip, Posed):
     """One clip; nothing is decoded before it is asked for."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return _reopened, (self.container, self.name)
 
     def __repr__(self) -> str:
@@ -63,7 +63,7 @@ class Clip(StoredClip, Posed):
         *,
         decimate: bool = False,
         signal: int | str = 0,
-    ) -> NDArray[Any]:
+    ) -> Values:
         """The values of frames a <= f < b of some joints, NaN where invalid.
 
         Shape (rows, channels of the joints in the order given), binary64 in source units.
@@ -108,7 +108,7 @@ class Clip(StoredClip, Posed):
         return Masked(values, mask)
 
     def _check_whole(
-        self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
+        self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None
     ) -> None:
         if not self.container.salvage:
             self.check_hash(info, values, mask)
@@ -136,9 +136,7 @@ class Clip(StoredClip, Posed):
             raise OptionError(f"signal {info.name!r} has channels of its own, no joints")
         return joint_columns(self.skeleton, joint_list(joints))
 
-    def check_hash(
-        self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
-    ) -> None:
+    def check_hash(self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None) -> None:
         """Raise ChecksumError where these are not the values and the mask of a whole signal."""
         stored, found = self.value_hashes[info.index], value_hash(values, mask)
         if found != stored:  # CEND-05

@@ -7,15 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.clock import numbers_or_rows
 from mcz.motion import Exceptions, FrameNotes, Motion, Signal
+from mcz.types import Values
 
 JoinNotes = Callable[[Sequence[tuple[int, int, bytes]]], FrameNotes]
 
 
-def decimated_rows(values: NDArray[Any], samples_per_frame: int, step: int) -> NDArray[Any]:
+def decimated_rows(values: Values, samples_per_frame: int, step: int) -> Values:
     """The rows of frames 0, step, 2 * step, ...; ``values`` has samples_per_frame rows a frame."""
     if samples_per_frame == 1:
         return values[::step]
@@ -51,7 +51,7 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
         if frame < n_frames:
             changes[frame * per_frame, channel] = grid
 
-    def thin(values: NDArray[Any] | None) -> Any:
+    def thin(values: Values | None) -> Any:
         return None if values is None else decimated_rows(values, per_frame, step)
 
     return replace(

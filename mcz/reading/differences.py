@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from mcz.formats.c3d_parameters import TEXT, Parameter, Parameters
 from mcz.formats.c3d_recording import parameters_of
 from mcz.motion import Motion
 from mcz.reading.recording import ForcePlatform, recording
+from mcz.types import JsonObject, Params
 
 # Parameters that say where data lie and which frames there are, which is compared by itself.
 OF_DATA = {"DATA_START", "FRAMES", "LONG_FRAMES", "ACTUAL_START_FIELD", "ACTUAL_END_FIELD"}
@@ -37,7 +38,7 @@ class Difference:
     changed: tuple[str, ...] = ()
 
 
-def document_of(a: Motion, b: Motion) -> list[dict[str, Any]]:
+def document_of(a: Motion, b: Motion) -> list[JsonObject]:
     """The differences as JSON has them."""
     return [asdict(each) for each in differences(a, b)]
 
@@ -83,7 +84,7 @@ def _of_times(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Differenc
         yield Difference("times", None, None)
 
 
-def _compared(what: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Difference | None:
+def _compared(what: str, a: Params, b: Params) -> Difference | None:
     only_a, only_b = (tuple(name for name in x if name not in y) for x, y in ((a, b), (b, a)))
     changed = tuple(name for name in a if name in b and repr(a[name]) != repr(b[name]))
     if not (only_a or only_b or changed):

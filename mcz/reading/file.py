@@ -39,6 +39,7 @@ from mcz.reading.names import listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 from mcz.threads import checked
+from mcz.types import JsonObject, Params
 
 
 def is_mcz(path: str | os.PathLike[str]) -> bool:
@@ -105,7 +106,7 @@ class File:
             name: Attachment(container, row) for name, row in rows.attachments.items()
         }
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return file_of, (self.container,)
 
     def __repr__(self) -> str:
@@ -182,7 +183,7 @@ class File:
         return self.container.unverified
 
     @cached_property
-    def header(self) -> dict[str, Any]:
+    def header(self) -> JsonObject:
         """Format version, version needed and profile, from HEAD."""
         head = parse(payloads.Head, self.container.directory.head, "HEAD")
         return {
@@ -325,7 +326,7 @@ def file_of(container: Container) -> File:
     return File(container)
 
 
-def _opened(source: ByteSource, options: Mapping[str, Any]) -> File:
+def _opened(source: ByteSource, options: Params) -> File:
     """The file; while another process appends to it, the file up to its last end."""
     while True:
         try:

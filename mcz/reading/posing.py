@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike
 
 from mcz.displays import html_of
 from mcz.skeleton import Joints, joint_list
+from mcz.types import Values
 
 if TYPE_CHECKING:
     from mcz.kinematics.contacts import ContactRule, Contacts
@@ -48,8 +49,8 @@ class Posed:
         frames: Frames = None,
         *,
         unit: str | None = None,
-        dtype: Any = np.float64,
-    ) -> NDArray[Any]:
+        dtype: DTypeLike = np.float64,
+    ) -> Values:
         """Where the points are, (n_frames, n_points, 3): see ``mcz.positions``."""
         from mcz.poses import places
 
@@ -64,8 +65,8 @@ class Posed:
         frames: Frames = None,
         order: str = "XYZ",
         degrees: bool = False,
-        dtype: Any = np.float64,
-    ) -> NDArray[Any]:
+        dtype: DTypeLike = np.float64,
+    ) -> Values:
         """How the joints are turned, (n_frames, n_joints, ...): see ``mcz.rotations``."""
         from mcz.poses import turns
 
@@ -86,7 +87,7 @@ class Posed:
         *,
         joint: int | str | None = None,
         unit: str | None = None,
-        dtype: Any = np.float64,
+        dtype: DTypeLike = np.float64,
     ) -> Root:
         """Where the root is and how it is turned: see ``mcz.root``."""
         from mcz.poses import places
@@ -99,8 +100,8 @@ class Posed:
         frames: Frames = None,
         *,
         unit: str | None = None,
-        dtype: Any = np.float64,
-    ) -> NDArray[Any]:
+        dtype: DTypeLike = np.float64,
+    ) -> Values:
         """How fast the points move, (n_frames, n_points, 3): see ``mcz.velocities``."""
         from mcz.poses import places
 
@@ -112,15 +113,15 @@ class Posed:
         frames: Frames = None,
         *,
         unit: str | None = None,
-        dtype: Any = np.float64,
-    ) -> NDArray[Any]:
+        dtype: DTypeLike = np.float64,
+    ) -> Values:
         """How velocities change, (n_frames, n_points, 3): see ``mcz.accelerations``."""
         from mcz.poses import places
 
         return places.accelerations(self._clip, joints, frames, unit=unit, dtype=dtype)
 
     def to_xarray(
-        self, *, form: str = "quat", unit: str | None = None, dtype: Any = np.float64
+        self, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
     ) -> Any:
         """The whole clip as an ``xarray.Dataset``: see ``mcz.to_xarray``."""
         from mcz.tables.labelled import to_xarray

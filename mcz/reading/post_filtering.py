@@ -25,6 +25,7 @@ from mcz.reading.decimation import decimated_rows
 from mcz.reading.source_files import with_facts
 from mcz.reading.source_rates import stating_rate
 from mcz.transforms.post_filter import PostFilter, filter_rows
+from mcz.types import Values
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -75,7 +76,7 @@ def filtered_part(
     resolution: int = 0,
     *,
     rate: Fraction | None = None,
-) -> tuple[NDArray[Any], Mask | None]:
+) -> tuple[Values, Mask | None]:
     """As ``clip.read_masked`` of the motion signal, cut out of the whole clip, filtered."""
     info, skeleton = clip.signals[0], clip.skeleton
     start, stop = clip.checked_range(frames)
@@ -180,7 +181,7 @@ def _settings(
     return rate.numerator / rate.denominator * per_frame, skeleton.unit_cm  # FILT-07
 
 
-def _filtered(values: NDArray[Any], mask: Mask | None, rate: float, unit_cm: float) -> Floats:
+def _filtered(values: Values, mask: Mask | None, rate: float, unit_cm: float) -> Floats:
     rows = np.asarray(values, np.float64)
     if mask is None:
         return filter_rows(rows, rate, unit_cm)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from mcz.errors import OptionError
 from mcz.reading.signal_info import SignalInfo
 from mcz.reading.signal_reader import SignalReader
+from mcz.types import Values
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Preview:
     """
 
     frames: NDArray[np.int64]
-    values: NDArray[Any]
+    values: Values
     mask: NDArray[np.bool_] | None
     step: int
 
@@ -32,7 +32,7 @@ class Preview:
         """Whether every frame is ``step`` behind the one before."""
         return bool((np.diff(self.frames) == self.step).all())
 
-    def masked(self) -> NDArray[Any]:
+    def masked(self) -> Values:
         """The values, NaN where invalid."""
         return self.values if self.mask is None else np.where(self.mask, self.values, np.nan)
 

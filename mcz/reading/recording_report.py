@@ -7,17 +7,18 @@ from dataclasses import asdict
 from typing import Any
 
 from mcz.reading.recording import Recording
+from mcz.types import JsonObject
 
 
-def document_of(recording: Recording | None) -> dict[str, Any] | None:
+def document_of(recording: Recording | None) -> JsonObject | None:
     """The recording as JSON has it: what is unknown or no number is None; texts may be empty."""
     if recording is None:
         return None
-    found: dict[str, Any] = _plain(asdict(recording))
+    found: JsonObject = _plain(asdict(recording))
     return found | {"up_axis": recording.up_axis}
 
 
-def _plain(thing: Any) -> Any:
+def _plain(thing: object) -> Any:
     if isinstance(thing, dict):
         return {key: _plain(value) for key, value in thing.items()}
     if isinstance(thing, (list, tuple)):

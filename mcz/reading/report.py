@@ -40,13 +40,12 @@ from mcz.reading.sharing import shared_out
 from mcz.reading.signal_info import SignalInfo, read_segments
 from mcz.reading.sizes import Sizes, clip_sizes, file_parts, models_used
 from mcz.schema import parse
+from mcz.types import JsonObject
 
 Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a file
 
 
-def info(
-    file: File, names: Sequence[str] | None = None, where: Where | None = None
-) -> dict[str, Any]:
+def info(file: File, names: Sequence[str] | None = None, where: Where | None = None) -> JsonObject:
     """The document that ``mcz info --json`` prints; its keys are stable.
 
     ``names``, ``where``: of these clips alone, and of their skeletons, see ``File.chosen``.
@@ -78,7 +77,7 @@ def info(
     }
 
 
-def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict[str, Any]:
+def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> JsonObject:
     chunk = container.directory.shared[b"SKEL", id_]
     return {
         "id": id_.hex(),
@@ -89,7 +88,7 @@ def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict
     }
 
 
-def joint_facts(skeleton: Skeleton) -> dict[str, Any]:
+def joint_facts(skeleton: Skeleton) -> JsonObject:
     """What ``mcz info`` says of the joints of a skeleton, wherever it comes from."""
     return {
         "n_joints": skeleton.n_joints,
@@ -109,13 +108,13 @@ def joint_facts(skeleton: Skeleton) -> dict[str, Any]:
     }
 
 
-def _model_info(container: Container, id_: bytes) -> dict[str, Any]:
+def _model_info(container: Container, id_: bytes) -> JsonObject:
     fields = container.model(id_)
     size = container.directory.shared[b"MODL", id_].size
     return {"id": id_.hex(), "kind": fields.kind, "chunk_bytes": size}
 
 
-def _clip_info(file: File, clip: Clip, sizes: Sizes) -> dict[str, Any]:
+def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
     rate = clip.frame_rate
     unread: list[str] = []
     document = {
@@ -180,7 +179,7 @@ def _exact_joints(clip: Clip, signal: SignalInfo) -> list[str]:
     return [name for joint, name in pairs if not columns.isdisjoint(skeleton.columns(joint))]
 
 
-def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
+def _recording(clip: Clip, unread: list[str]) -> JsonObject | None:
     """The recording; where the template is at fault, ``unread`` says so and the rest is shown."""
     try:
         return document_of(clip.recording)
@@ -189,7 +188,7 @@ def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
         return None
 
 
-def _times(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
+def _times(clip: Clip, unread: list[str]) -> JsonObject | None:
     """The times of its frames; ``unread`` as above."""
     try:
         return time_facts(clip.timeline)
@@ -200,7 +199,7 @@ def _times(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
         return None
 
 
-def _arrays(clip: Clip, unread: list[str]) -> list[dict[str, Any]] | None:
+def _arrays(clip: Clip, unread: list[str]) -> list[JsonObject] | None:
     """What became of the arrays of the source, None where it has none; ``unread`` as above."""
     if clip.source is None or FORMATS[clip.source.format].arrays is None:
         return None
@@ -212,7 +211,7 @@ def _arrays(clip: Clip, unread: list[str]) -> list[dict[str, Any]] | None:
         return None
 
 
-def _source_info(clip: Clip) -> dict[str, Any]:
+def _source_info(clip: Clip) -> JsonObject:
     source = clip.source
     if source is None:
         return {
@@ -231,7 +230,7 @@ def _source_info(clip: Clip) -> dict[str, Any]:
     }
 
 
-def exceptions_info(container: Container, clip: Clip) -> dict[str, Any]:
+def exceptions_info(container: Container, clip: Clip) -> JsonObject:
     """How many tokens are coded as exceptions, and their share."""
     n_exceptions = n_tokens = 0
     for signal in clip.signals:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from threading import Lock
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values
 from mcz.reading.salvage import salvage
 from mcz.reading.signal_info import SignalInfo
 from mcz.threads import in_force, in_order
+from mcz.types import Values
 
 BLOCK_ROWS = 512  # decoded at a time, at least
 NEIGHBORS = 4  # segments whose streams are kept for a thread
@@ -35,8 +35,8 @@ class Block:
 
     start: int
     stop: int
-    coded: NDArray[Any]
-    values: NDArray[Any]
+    coded: Values
+    values: Values
     mask: NDArray[np.bool_] | None
 
 
@@ -62,7 +62,7 @@ class SignalReader:
         self._threads = container.threads or in_force()
         self._n_columns = sum(len(info.layout.groups[group]) for group in groups)
 
-    def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+    def read(self, start: int, stop: int) -> tuple[Values, NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
         return self._read(start, stop, None)
 
@@ -88,7 +88,7 @@ class SignalReader:
 
     def _read(
         self, start: int, stop: int, ordinals: NDArray[np.int64] | None
-    ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+    ) -> tuple[Values, NDArray[np.bool_] | None]:
         """Values and mask; what a codec of ordinals decoded goes to ``ordinals``."""
         if self.container.salvage:
             return self._salvage(self._prepare(start, stop), start, stop)
@@ -113,7 +113,7 @@ class SignalReader:
     def _shape(self, start: int, stop: int) -> tuple[int, int]:
         return (stop - start) * self.info.layout.samples_per_frame, self._n_columns
 
-    def blocks(self, start: int, stop: int, out: NDArray[Any] | None = None) -> Iterator[Block]:
+    def blocks(self, start: int, stop: int, out: Values | None = None) -> Iterator[Block]:
         """The same block by block; values may lie in ``out``, of all rows, already."""
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
@@ -130,7 +130,7 @@ class SignalReader:
 
         yield from in_order(block, list(self._ranges(start, stop)), self._threads)
 
-    def _near(self, start: int, stop: int, out: NDArray[Any]) -> Iterator[Block]:
+    def _near(self, start: int, stop: int, out: Values) -> Iterator[Block]:
         """The same; a run of which the range has a part is decoded whole, and kept."""
         per_frame = self.info.layout.samples_per_frame
         at = start
@@ -206,7 +206,7 @@ class SignalReader:
         if start < stop:
             yield start, stop
 
-    def _decode(self, spans: Sequence[Span], start: int, stop: int) -> NDArray[Any]:
+    def _decode(self, spans: Sequence[Span], start: int, stop: int) -> Values:
         """What the codec decodes; of groups of ordinals beside values their values."""
         of_ordinals = self.info.exact
         exact = tuple(group for group in self.groups if group in of_ordinals)
@@ -230,7 +230,7 @@ class SignalReader:
 
     def _decode_groups(
         self, groups: tuple[int, ...], spans: Sequence[Span], start: int, stop: int
-    ) -> NDArray[Any]:
+    ) -> Values:
         return self.info.codec.decode(
             self.info.header,
             self.info.layout,
@@ -259,7 +259,7 @@ class SignalReader:
 
     def _salvage(
         self, spans: Sequence[Span], start: int, stop: int
-    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    ) -> tuple[Values, NDArray[np.bool_]]:
         """What can be decoded; the rest is invalid."""
         per_frame, shape = self.info.layout.samples_per_frame, self._shape(start, stop)
         values = np.zeros(shape, np.int64) if self.info.is_integer else np.full(shape, np.nan)
@@ -328,8 +328,8 @@ class SignalReader:
         return wanted
 
     def _finish(
-        self, coded: NDArray[Any], start: int, stop: int, out: NDArray[Any] | None = None
-    ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+        self, coded: Values, start: int, stop: int, out: Values | None = None
+    ) -> tuple[Values, NDArray[np.bool_] | None]:
         """Ordinals to values, in ``out`` where that is given, exceptions and masks put in."""
         layout = self.info.layout
         for index in self.info.covering(start, stop):

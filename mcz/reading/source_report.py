@@ -6,7 +6,6 @@ import hashlib
 import os
 import warnings
 from pathlib import Path
-from typing import Any
 
 from mcz.clock import time_facts
 from mcz.errors import SkeletonWarning
@@ -17,11 +16,12 @@ from mcz.reading.recording_report import document_of
 from mcz.reading.report import joint_facts
 from mcz.reading.skeletons import take
 from mcz.reading.source_files import load, read_skeleton
+from mcz.types import JsonObject
 
 
 def source_info(
     path: str | os.PathLike[str], skeleton: str | os.PathLike[str] | None = None
-) -> dict[str, Any]:
+) -> JsonObject:
     """The document that ``mcz info --json`` prints of a source file.
 
     Its keys are those of ``report.info`` that have a meaning without MCZ; ``format`` is that of the
@@ -29,7 +29,7 @@ def source_info(
     """
     path = Path(path)
     source_format, data = load(path)
-    document: dict[str, Any] = {"format": source_format.name, "file_bytes": len(data)}
+    document: JsonObject = {"format": source_format.name, "file_bytes": len(data)}
     if source_format.is_skeleton:
         return document | {"skeletons": [_skeleton_facts(read_skeleton(path))], "clips": []}
     taken = take(path, skeleton, data=data)
@@ -48,11 +48,11 @@ def _file_of(skeleton: Skeleton | None) -> str | None:
     return skeleton.source.path if skeleton is not None and skeleton.source else None
 
 
-def _skeleton_facts(skeleton: Skeleton) -> dict[str, Any]:
+def _skeleton_facts(skeleton: Skeleton) -> JsonObject:
     return {"name": skeleton.name, **joint_facts(skeleton)}
 
 
-def _clip_facts(motion: Motion, source_format: Format, name: str, data: bytes) -> dict[str, Any]:
+def _clip_facts(motion: Motion, source_format: Format, name: str, data: bytes) -> JsonObject:
     rate, signal = motion.frame_rate, motion.signals[0]
     n_invalid = 0 if signal.mask is None else int(signal.mask.size - signal.mask.sum())
     n_exceptions = sum(len(s.exceptions) for s in motion.signals)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from mcz.brief import counted, printable
@@ -13,6 +13,7 @@ from mcz.errors import MczError
 from mcz.reading.clip import Clip
 from mcz.reading.file import Attachment, File
 from mcz.schema import parse
+from mcz.types import JsonObject, Params
 
 BLOCK = 1024 * 1024  # bytes that are hashed at a time
 CHECKED = {
@@ -31,10 +32,10 @@ NOT_CHECKED = {
     "unopened": ("all else, for the file cannot be opened",),
 }
 
-Part = Mapping[str, Any]  # kind, name and problems of a part, as ``mcz verify --json`` has them
+Part = Params  # kind, name and problems of a part, as ``mcz verify --json`` has them
 
 
-def bytes_facts(source: ByteSource) -> dict[str, Any]:
+def bytes_facts(source: ByteSource) -> JsonObject:
     """Name, size and SHA-256 of a file, whatever it is."""
     digest = hashlib.sha256()
     for at in range(0, source.size, BLOCK):
@@ -42,7 +43,7 @@ def bytes_facts(source: ByteSource) -> dict[str, Any]:
     return {"file": source.name, "file_bytes": source.size, "sha256": digest.hexdigest()}
 
 
-def contents(file: File) -> dict[str, Any]:
+def contents(file: File) -> JsonObject:
     """What a file says that it holds; nothing is decoded."""
     clips = [_clip(clip) for clip in file]
     skeletons = [_skeleton(file, id_) for id_, _ in file.skeletons]
@@ -71,10 +72,10 @@ def contents(file: File) -> dict[str, Any]:
 
 
 def _files(
-    clips: list[dict[str, Any]],
-    skeletons: list[dict[str, Any]],
-    attachments: list[dict[str, Any]],
-    aliases: list[dict[str, Any]],
+    clips: list[JsonObject],
+    skeletons: list[JsonObject],
+    attachments: list[JsonObject],
+    aliases: list[JsonObject],
 ) -> dict[str, int]:
     """The files that ``unpack`` writes, and their sizes."""
     sizes = {("clip", row["name"]): row["source_bytes"] or 0 for row in clips}
@@ -85,7 +86,7 @@ def _files(
     return files | {row["name"]: sizes.get((row["of"], row["target"]), 0) for row in aliases}
 
 
-def _clip(clip: Clip) -> dict[str, Any]:
+def _clip(clip: Clip) -> JsonObject:
     try:
         source = clip.source
     except MczError:  # which is among the problems
@@ -93,7 +94,7 @@ def _clip(clip: Clip) -> dict[str, Any]:
     return {"name": clip.name, "n_frames": clip.n_frames, **_source(source)}
 
 
-def _skeleton(file: File, id_: bytes) -> dict[str, Any]:
+def _skeleton(file: File, id_: bytes) -> JsonObject:
     try:
         skeleton = file.skeleton(id_, with_source=True)
     except MczError:
@@ -101,7 +102,7 @@ def _skeleton(file: File, id_: bytes) -> dict[str, Any]:
     return {"name": skeleton.name or id_.hex(), "id": id_.hex(), **_source(skeleton.source)}
 
 
-def _source(source: Any) -> dict[str, Any]:
+def _source(source: Any) -> JsonObject:
     return {
         "source_path": source.path if source else None,
         "source_bytes": source.size if source else None,
@@ -109,7 +110,7 @@ def _source(source: Any) -> dict[str, Any]:
     }
 
 
-def _attachment(file: File, held: Attachment) -> dict[str, Any]:
+def _attachment(file: File, held: Attachment) -> JsonObject:
     part = file.container.directory.attachments[held.name].parts[0]
     try:
         sha256 = parse(payloads.Atta, file.container.payload(part), part.label).sha256.hex()
@@ -119,14 +120,14 @@ def _attachment(file: File, held: Attachment) -> dict[str, Any]:
 
 
 def report(
-    facts: Mapping[str, Any],
+    facts: Params,
     parts: Iterable[Part],
     *,
     tool: str,
     date: str | None = None,
     quick: bool = False,
     chosen: str | None = None,
-) -> dict[str, Any]:
+) -> JsonObject:
     """The report as a document, ready for JSON; docs/scripts.md lists its keys.
 
     ``facts``: those of ``bytes_facts``, and of ``contents`` where the file could be opened.
@@ -169,7 +170,7 @@ def _result(problems: list[str] | None, quick: bool) -> str:
     return "not decoded" if quick or problems is None else "verified"
 
 
-def text_lines(document: Mapping[str, Any]) -> list[str]:
+def text_lines(document: Params) -> list[str]:
     """The report as text, each name on one line and without what would steer a terminal."""
     verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
     lines = [
@@ -203,7 +204,7 @@ def text_lines(document: Mapping[str, Any]) -> list[str]:
     return [printable(line) for line in lines]
 
 
-def bag_lines(document: Mapping[str, Any]) -> list[str]:
+def bag_lines(document: Params) -> list[str]:
     """The report of a bag as text, without those of the archives in it."""
     verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
     lines = [f"Verification of the bag {document['bag']}: {verdict}", ""]
@@ -225,7 +226,7 @@ def _fact(name: str, text: str) -> str:
     return f"{name:<12} {text}"
 
 
-def _rows(kind: str, rows: list[dict[str, Any]]) -> list[str]:
+def _rows(kind: str, rows: list[JsonObject]) -> list[str]:
     if not rows:
         return []
     if kind == "attachments":
@@ -245,7 +246,7 @@ def _rows(kind: str, rows: list[dict[str, Any]]) -> list[str]:
     return ["", heading, *lines]
 
 
-def _size(row: Mapping[str, Any]) -> str:
+def _size(row: Params) -> str:
     frames = [f"{row['n_frames']:,} frames"] if "n_frames" in row else []
     sizes = [] if row["source_bytes"] is None else [f"{row['source_bytes']:,} bytes"]
     return ", ".join(frames + sizes) or "-"

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from mcz.indexing import Rows, row_numbers
+from mcz.types import Values
 
 
 class Masked(NamedTuple):
     """Numbers as they are stored, and which of them are valid (bool, same shape; None: all)."""
 
-    values: NDArray[Any]
+    values: Values
     mask: NDArray[np.bool_] | None
 
 
@@ -21,7 +22,7 @@ class FrameValues(NamedTuple):
     """Some frames, ascending and counted from 0, (n,), and a row of values for each."""
 
     frames: NDArray[np.int64]
-    values: NDArray[Any]
+    values: Values
 
 
 class Readable(Protocol):
@@ -32,7 +33,7 @@ class Readable(Protocol):
     @property
     def n_channels(self) -> int: ...
 
-    def read(self, frames: tuple[int, int] | None = None) -> NDArray[Any]: ...
+    def read(self, frames: tuple[int, int] | None = None) -> Values: ...
 
 
 class ClipValues:
@@ -54,24 +55,24 @@ class ClipValues:
         n_frames, n_channels = self.shape
         return f"<ClipValues: {n_frames} frames, {n_channels} channels, not yet decoded>"
 
-    def __getitem__(self, key: Any) -> NDArray[Any]:
+    def __getitem__(self, key: Any) -> Values:
         """Frames, and some of their channels: ``[100]``, ``[10:20, 3:6]``, as of an array.
 
         Only the frames that are asked for are decoded, from the first to the last of them.
         """
         rows, *rest = (key if isinstance(key, tuple) else (key,)) or (Ellipsis,)
         if not _is_one_axis(rows):
-            whole: NDArray[Any] = np.asarray(self)[key]
+            whole: Values = np.asarray(self)[key]
             return whole
         chosen = row_numbers(rows, self._clip.n_frames, "frame")
         first, stop = _span(chosen)
         found = self._clip.read(frames=(first, stop))
         if isinstance(chosen, range):
             return found[(slice(None, None, chosen.step), *rest)]
-        part: NDArray[Any] = found[(chosen - first, *rest)]
+        part: Values = found[(chosen - first, *rest)]
         return part
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Values:
         return np.asarray(self._clip.read(), dtype=dtype)
 
 

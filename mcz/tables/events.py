@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from mcz.brief import printable, spreadsheet_cell
+from mcz.types import Settings
 
 TEXTS = ("label", "context", "subject", "description")
 
@@ -41,7 +42,7 @@ def to_csv(events: Events) -> bytes:
 def to_npz(events: Events) -> bytes:
     """A NumPy archive of times (float64, seconds), label, context, subject, description."""
     buffer = io.BytesIO()
-    columns: dict[str, Any] = {
+    columns: Settings = {
         name: np.array([getattr(event, name) for event in events], np.str_) for name in TEXTS
     }
     np.savez_compressed(

@@ -17,6 +17,7 @@ from mcz.clock import numbers_or_rows
 from mcz.errors import MotionError
 from mcz.motion import Channel, Joint, Motion, Skeleton
 from mcz.tables.arrays import pose_arrays
+from mcz.types import Settings
 
 DECIMALS = 12  # of times in a CSV
 
@@ -122,7 +123,7 @@ def to_npz(table: Table) -> bytes:
     rate = table.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) >= 2**63:
         raise MotionError(f"a frame rate of {float(rate):g}: an NPZ has terms below 2^63")
-    more: dict[str, Any] = {"units": np.array(table.units, np.str_)} if table.units else {}
+    more: Settings = {"units": np.array(table.units, np.str_)} if table.units else {}
     more |= {} if table.times is None else {"times": table.times}
     if table.motion is not None:
         more |= pose_arrays(table.motion)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from mcz.clock import is_time, numbers_or_rows
 from mcz.errors import MotionError, OptionError
@@ -13,6 +13,7 @@ from mcz.extras import import_extra
 from mcz.motion import Motion, Signal
 from mcz.poses import point_names, positions, rotations
 from mcz.tables.files import channel_names, channel_units
+from mcz.types import Settings
 
 COMPONENTS = {
     "quat": ("rotation", ["w", "x", "y", "z"]),
@@ -23,7 +24,7 @@ COMPONENTS = {
 
 
 def to_xarray(
-    motion: Motion, *, form: str = "quat", unit: str | None = None, dtype: Any = np.float64
+    motion: Motion, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
 ) -> Any:
     """A motion as an ``xarray.Dataset``; needs xarray (``mcz[xarray]``).
 
@@ -39,10 +40,10 @@ def to_xarray(
     xarray = import_extra("xarray", "xarray")
     skeleton, main = motion.skeleton, motion.signals[0]
     numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
-    variables: dict[str, Any] = {
+    variables: Settings = {
         "channels": (("time", "channel"), np.asarray(main.masked(), dtype), {}),
     }
-    coordinates: dict[str, Any] = {
+    coordinates: Settings = {
         "time": ("time", *_times(motion, main)),
         "frame": ("time", np.repeat(numbers, main.samples_per_frame)),
         "channel": channel_names(skeleton, main.channels),
@@ -66,9 +67,7 @@ def to_xarray(
     return xarray.Dataset(variables, coordinates, _facts(motion))
 
 
-def _add_signal(
-    motion: Motion, signal: Signal, variables: dict[str, Any], coordinates: dict[str, Any]
-) -> None:
+def _add_signal(motion: Motion, signal: Signal, variables: Settings, coordinates: Settings) -> None:
     name = signal.name
     while {name, f"time_{name}", f"channel_{name}"} & {*variables, *coordinates}:
         name = f"signal_{name}"  # of another, or one of ours
@@ -87,9 +86,9 @@ def row_times(motion: Motion, signal: Signal) -> tuple[NDArray[np.float64], str]
     return timeline.samples(signal.samples_per_frame), "s"
 
 
-def _times(motion: Motion, signal: Signal) -> tuple[Any, dict[str, Any]]:
+def _times(motion: Motion, signal: Signal) -> tuple[Any, Settings]:
     times, units = row_times(motion, signal)
-    facts: dict[str, Any] = {"units": units}
+    facts: Settings = {"units": units}
     if units == "s" and motion.frame_rate is not None:
         facts["sample_rate"] = float(motion.frame_rate * signal.samples_per_frame)
     return times, facts
@@ -99,10 +98,10 @@ def _unit(unit_cm: float | None) -> str:
     return "unknown" if unit_cm is None else f"{unit_cm:.17g} cm"
 
 
-def _facts(motion: Motion) -> dict[str, Any]:
+def _facts(motion: Motion) -> Settings:
     """Texts and numbers alone, which every store of xarray keeps."""
     skeleton, rate = motion.skeleton, motion.frame_rate
-    facts: dict[str, Any] = {"name": motion.name, "up_axis": skeleton.up_axis or "unknown"}
+    facts: Settings = {"name": motion.name, "up_axis": skeleton.up_axis or "unknown"}
     if rate is not None:
         facts |= {"frame_rate": float(rate), "frame_rate_exact": str(rate)}
     if skeleton.unit_cm is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +17,7 @@ from mcz.hints import Hint, with_hint
 from mcz.metrics.document import difference
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
+from mcz.types import JsonObject, Params
 from mcz.viewing.page import Page
 from mcz.viewing.shelf import FACTS, Shelf, Shelved
 from mcz.viewing.tables import deflated, tables_for
@@ -34,7 +35,7 @@ class Wanted:
     where: str | None = None
     codec: str | None = None
     effort: str | None = None
-    params: Mapping[str, Any] | None = None
+    params: Params | None = None
     max_decoded: int | None = None
 
     @property
@@ -91,7 +92,7 @@ def write_page(
             left -= len(data) * 4 // 3
             held[number] = data, stack.enter_context(_file(data, wanted.max_decoded))
         files = [file for _, file in held.values()]
-        document: dict[str, Any] = {
+        document: JsonObject = {
             "files": [
                 {"name": given[number].name, "base64": base64.b64encode(data).decode()}
                 for number, (data, _) in held.items()
@@ -109,7 +110,7 @@ def write_page(
         return PageWritten(len(whole), len(page.text.encode()), tuple(found))
 
 
-def element(document: Mapping[str, Any]) -> str:
+def element(document: Params) -> str:
     """The element that holds a document; no text in it is markup, and nothing in it runs."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="embedded">{text}</script>'
@@ -182,9 +183,7 @@ def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
     return out.getvalue()
 
 
-def _differences(
-    files: Sequence[File], names: Sequence[str], shelf: Shelf
-) -> Iterator[dict[str, Any]]:
+def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> Iterator[JsonObject]:
     """Of every other file against the first what ``mcz diff --by-joint --json`` says."""
     first, *others = files
     for other, name in zip(others, names[1:], strict=True):

@@ -17,6 +17,7 @@ from typing import Any, cast
 
 from mcz.annexes import annex_bytes, annex_names
 from mcz.errors import MczError
+from mcz.types import JsonObject
 from mcz.viewing.requests import (
     LONGEST_JSON,
     Refused,
@@ -176,7 +177,7 @@ class Handler(BaseHTTPRequestHandler):
             self._unread = False
             self._send_json(found)
             return
-        tasks: Mapping[str, Callable[[dict[str, Any]], Any]] = {
+        tasks: Mapping[str, Callable[[JsonObject], Any]] = {
             "encode": work.encode,
             "diff": work.diff,
             "glb": work.glb,

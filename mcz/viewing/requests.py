@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
 from email.message import Message
-from typing import Any
+
+from mcz.types import JsonObject, Params
 
 LONGEST_JSON = 2**16  # bytes that a request may post as JSON
 MOST_PARAMS = 64
@@ -98,7 +98,7 @@ def length_of(headers: Headers, most: int) -> int:
     return int(said[0])
 
 
-def json_of(data: bytes) -> dict[str, Any]:
+def json_of(data: bytes) -> JsonObject:
     """An object of JSON; raises Refused for anything else."""
     try:
         document = json.loads(data)
@@ -109,7 +109,7 @@ def json_of(data: bytes) -> dict[str, Any]:
     return document
 
 
-def text_of(document: Mapping[str, Any], key: str) -> str:
+def text_of(document: Params, key: str) -> str:
     """A text of an object; raises Refused where it is none."""
     value = document.get(key)
     if not isinstance(value, str) or not value:
@@ -117,7 +117,7 @@ def text_of(document: Mapping[str, Any], key: str) -> str:
     return value
 
 
-def object_of(document: Mapping[str, Any], key: str) -> dict[str, Any]:
+def object_of(document: Params, key: str) -> JsonObject:
     """An object in an object; raises Refused where it is none."""
     value = document.get(key)
     if not isinstance(value, dict):
@@ -125,7 +125,7 @@ def object_of(document: Mapping[str, Any], key: str) -> dict[str, Any]:
     return value
 
 
-def params_of(document: Mapping[str, Any]) -> dict[str, Any]:
+def params_of(document: Params) -> JsonObject:
     """The parameters of a codec by name: texts, numbers and truths, no null; raises Refused."""
     given = document.get("params") or {}
     if not isinstance(given, dict) or len(given) > MOST_PARAMS:

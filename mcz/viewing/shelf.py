@@ -9,7 +9,7 @@ import stat
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from threading import Lock, RLock
@@ -29,6 +29,7 @@ from mcz.hints import PYTHON_HINTS, Words, worded
 from mcz.motion import Motion
 from mcz.reading.file import reached
 from mcz.reading.source_files import told
+from mcz.types import Params
 from mcz.viewing.contents import Contents, FarAway, OnDisk
 
 Say = Callable[[str], None]
@@ -199,7 +200,7 @@ class Shelf:
 
     def __init__(
         self,
-        said: Mapping[str, Any] | None = None,
+        said: Params | None = None,
         say: Say | None = None,
         *,
         salvage: bool = False,
@@ -337,7 +338,7 @@ def kind_of(path: Path) -> str:
     return known[suffix]
 
 
-def encode(source: Path, out: BinaryIO, said: Mapping[str, Any]) -> None:
+def encode(source: Path, out: BinaryIO, said: Params) -> None:
     """Write ``source`` as an ``.mcz``, fast."""
     from mcz.writing.file import encode
 

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 from mcz.errors import OptionError
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
+from mcz.types import JsonObject
 from mcz.viewing.browser import show
 from mcz.viewing.player import player
 from mcz.viewing.server import Server
@@ -106,7 +107,7 @@ def _tell(line: str) -> None:
     sys.stderr.write(f"mcz: {line}\n")
 
 
-def _player_of(thing: Any, said: dict[str, Any], salvage: bool) -> str:
+def _player_of(thing: Any, said: JsonObject, salvage: bool) -> str:
     """A player of a Motion or Clip, or of a file; of an ``.mcz`` that is one of its first clip."""
     from mcz.reading.file import open
     from mcz.reading.read import read

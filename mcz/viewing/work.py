@@ -7,7 +7,7 @@ import re
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import cache, partial
 from importlib import import_module
@@ -24,6 +24,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
 from mcz.reading.source_files import with_facts
+from mcz.types import JsonObject, Params
 from mcz.viewing.multipart import Readable, boundary_of, save_files
 from mcz.viewing.requests import Refused, object_of, params_of, text_of
 from mcz.viewing.shelf import Shelf, Shelved, encode, kind_of, pack
@@ -58,7 +59,7 @@ class Work:
         finally:
             self._waiting.release()
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> JsonObject:
         """What the page is told first: ``api.json``."""
         return {
             "version": import_module("mcz").__version__,
@@ -72,14 +73,14 @@ class Work:
             "suffixes": sorted({suffix for f in FORMATS.values() for suffix in f.suffixes}),
         }
 
-    def files(self) -> list[dict[str, Any]]:
+    def files(self) -> list[JsonObject]:
         """The files that were given; the size of one that is not made yet is None."""
         return [
             {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
             for number, file in self._shelf.given()
         ]
 
-    def convert(self, stream: Readable, size: int, content_type: str) -> dict[str, Any]:
+    def convert(self, stream: Readable, size: int, content_type: str) -> JsonObject:
         """Make an ``.mcz`` of the files of a form; of several motions one archive."""
         boundary = boundary_of(content_type)
         folder = self._shelf.spare_folder()
@@ -96,7 +97,7 @@ class Work:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
-    def _converted(self, folder: Path, paths: list[Path]) -> dict[str, Any]:
+    def _converted(self, folder: Path, paths: list[Path]) -> JsonObject:
         motions = [path for path in paths if path.suffix.lower() != ".asf"]
         if not motions:
             raise Refused(400, "there is no motion file among what was given")
@@ -112,7 +113,7 @@ class Work:
         number, stored = self._shelf.upload(name, kind, make)
         return {"url": url_of(number), "name": name, "size": stored.size}
 
-    def encode(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def encode(self, asked: Params) -> JsonObject:
         """Code a clip anew with a codec and its parameters; say what that makes of it."""
         from mcz.codecs import by_name
         from mcz.reading.sizes import clip_sizes
@@ -143,7 +144,7 @@ class Work:
             "seconds": round(seconds, 3),
         }
 
-    def diff(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+    def diff(self, asked: Params) -> JsonObject:
         """How far one clip is from another, as ``mcz diff --by-joint --json`` says it."""
         from mcz.metrics.document import difference
         from mcz.reading.differences import document_of
@@ -162,7 +163,7 @@ class Work:
         names = [self._file(side).name for side in sides]
         return {"a": names[0], "b": names[1], "clips": [document]}
 
-    def glb(self, asked: Mapping[str, Any]) -> bytes:
+    def glb(self, asked: Params) -> bytes:
         """A clip as the bytes of a GLB."""
         writer = glb_writer()
         if writer is None:
@@ -171,7 +172,7 @@ class Work:
         found: bytes = writer(self._motion(asked), rate=rate).data
         return found
 
-    def _file(self, asked: Mapping[str, Any]) -> Shelved:
+    def _file(self, asked: Params) -> Shelved:
         match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
         try:
             return self._shelf[int(match[1]) if match else -1]
@@ -179,7 +180,7 @@ class Work:
             raise Refused(404, "there is no such file, or no longer") from None
 
     @contextmanager
-    def _opened(self, asked: Mapping[str, Any]) -> Iterator[tuple[File, Clip]]:
+    def _opened(self, asked: Params) -> Iterator[tuple[File, Clip]]:
         """The file and the clip, by name or by its place in the file, that are asked for."""
         wanted = asked.get("clip")
         with mcz_open(self._file(asked).target(), salvage=self._shelf.salvage) as file:
@@ -192,7 +193,7 @@ class Work:
             else:
                 raise Refused(400, "clip is neither a name nor a number")
 
-    def _motion(self, asked: Mapping[str, Any]) -> Motion:
+    def _motion(self, asked: Params) -> Motion:
         """The motion of a clip; those that were decoded last are at hand."""
         file = self._file(asked)
         with closing(file.open()) as contents:
@@ -214,7 +215,7 @@ def url_of(number: int) -> str:
 
 
 @cache
-def lossy_codecs() -> list[dict[str, Any]]:
+def lossy_codecs() -> list[JsonObject]:
     """What a slider needs to know: the lossy codecs, their parameters, and the range of the dial.
 
     The keys are those of ``mcz codecs --json``, and ``dial``. The one that is called "lossy" is the
@@ -230,7 +231,7 @@ def lossy_codecs() -> list[dict[str, Any]]:
     return [document(codec) | {"dial": dial_of(codec.dial)} for codec in lossy]
 
 
-def dial_of(dial: Dial | None) -> dict[str, Any] | None:
+def dial_of(dial: Dial | None) -> JsonObject | None:
     """The one parameter that trades quality for size, and between what it may lie."""
     if dial is None:
         return None
@@ -243,7 +244,7 @@ def dial_of(dial: Dial | None) -> dict[str, Any] | None:
     }
 
 
-def refuse_files(params: Mapping[str, Any]) -> None:
+def refuse_files(params: Params) -> None:
     """Raise OptionError for a parameter that names a file of this machine, not one of ours."""
     name = params.get(OWN_BASES)
     if isinstance(name, str) and not re.fullmatch(r"[a-z0-9_]{1,40}", name):

@@ -12,6 +12,7 @@ import numpy as np
 
 from mcz.codecs.parameters import Dial
 from mcz.errors import MotionError, OptionError
+from mcz.types import JsonObject
 from mcz.writing.trials import Floats, Target, Trials
 
 REFINEMENT = "refinement"
@@ -22,7 +23,7 @@ FINER = 0.85  # from one step to the next
 MARGIN = 0.3  # octaves that are added to what a frame misses
 
 
-def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[dict[str, Any], dict[str, str]]:
+def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
     """A step and the refinement of frames that meet the bound, and what the record says of it.
 
     Raises OptionError where none that was tried does.
@@ -43,7 +44,7 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[dict[str, Any], 
     raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
 
 
-def _errors(trial: Trials, found: dict[str, Any], target: Target) -> Floats:
+def _errors(trial: Trials, found: JsonObject, target: Target) -> Floats:
     try:
         return trial.frame_errors(found)
     except MotionError as error:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +25,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
+from mcz.types import JsonObject, Params, Values
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, as_stored
 from mcz.writing.sources import with_source_hash
@@ -33,7 +33,7 @@ from mcz.writing.sources import with_source_hash
 BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
 Progress = Callable[[int, int, str], None]
 # (entries of a quality record, decoded values of each signal) -> its entries
-Amend = Callable[[dict[str, str], Sequence[NDArray[Any]]], dict[str, str]]
+Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
 
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
@@ -75,7 +75,7 @@ def write_clip(
     writer: Writer,
     motion: Motion,
     codec: Codec,
-    params: Mapping[str, Any],
+    params: Params,
     progress: Progress | None = None,
     *,
     quality: bool = True,
@@ -150,14 +150,12 @@ def _write_models(writer: Writer, encoded: Encoded) -> None:
         writer.shared(b"MODL", build(record, "MODL"))
 
 
-def asked(options: Mapping[str, Any]) -> dict[str, Any]:
+def asked(options: Params) -> JsonObject:
     """The targets among the options of a codec."""
     return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
 
 
-def _coded(
-    motion: Motion, index: int, codec: Codec, options: Mapping[str, Any], segment_bytes: int
-) -> _Coded:
+def _coded(motion: Motion, index: int, codec: Codec, options: Params, segment_bytes: int) -> _Coded:
     if index and not codec.lossless:
         codec = by_name(BESIDE)
         options = codec.options({})
@@ -174,7 +172,7 @@ def _coded(
 
 def _write_signal(
     writer: Writer, motion: Motion, index: int, coded: _Coded, progress: Progress | None
-) -> NDArray[Any]:
+) -> Values:
     """Write the segments of a signal; return its values as a reader will have them."""
     kept = []
     for segment in coded.encoded.segments:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from mcz.clock import SAME_RATE
 from mcz.codecs import DEFAULT, by_name
@@ -29,6 +28,7 @@ from mcz.reading.source_files import (
     with_facts,
 )
 from mcz.reading.source_rates import stating_rate
+from mcz.types import Params
 from mcz.units import facing, in_unit, unit_cm_of
 from mcz.writing.clip_writer import Progress, write_skeleton
 from mcz.writing.draft import Draft
@@ -50,7 +50,7 @@ class Terms:
     """
 
     codec: str = DEFAULT
-    params: Mapping[str, Any] | None = None
+    params: Params | None = None
     skeleton: str | os.PathLike[str] | None = None
     rate: Fraction | float | None = None
     force_rate: bool = True

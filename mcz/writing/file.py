@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -21,6 +20,7 @@ from mcz.errors import OptionError, SkeletonWarning
 from mcz.formats import is_table
 from mcz.motion import Motion
 from mcz.threads import limited
+from mcz.types import JsonObject, Params
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -81,7 +81,7 @@ def encode(
     *,
     codec: str | None = None,
     effort: str | None = None,
-    params: Mapping[str, Any] | None = None,
+    params: Params | None = None,
     skeleton: str | os.PathLike[str] | None = None,
     rate: Fraction | float | None = None,
     unit: str | None = None,
@@ -110,7 +110,7 @@ def encode(
             "a skeleton alone is kept as it is; say the up axis of its AMC", path=path
         )
     coded = chosen(codec, effort)
-    said: dict[str, Any] = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
+    said: JsonObject = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
     terms = Terms(coded, params, skeleton, verbatim=verbatim, keep_skeleton=True, **said)
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file

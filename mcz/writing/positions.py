@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from mcz.codecs.contract import Codec
 from mcz.container.writer import Writer
@@ -13,10 +11,11 @@ from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import in_positions
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion, Skeleton
+from mcz.types import Params
 from mcz.writing.clip_writer import write_skeleton
 
 
-def wants_positions(codec: Codec, options: Mapping[str, Any], skeleton: Skeleton) -> bool:
+def wants_positions(codec: Codec, options: Params, skeleton: Skeleton) -> bool:
     """Whether a codec is to be given the positions of points instead of the channels of a clip."""
     if not codec.positions or options.get("domain") == "channels" or not skeleton.joints:
         return False
@@ -35,9 +34,7 @@ def check_bones(skeleton: Skeleton, what: str) -> None:
         )
 
 
-def as_codec_wants(
-    writer: Writer, motion: Motion, codec: Codec, options: Mapping[str, Any]
-) -> Motion:
+def as_codec_wants(writer: Writer, motion: Motion, codec: Codec, options: Params) -> Motion:
     """``motion``, or the positions of its points where that is what the codec codes."""
     if not wants_positions(codec, options, motion.skeleton):
         return motion

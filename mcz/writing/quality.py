@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.metrics import compare
 from mcz.metrics.sums import channel_errors
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.schema import build
+from mcz.types import JsonObject, Params, Values
 
 CHUNK = b"QUAL"
 # What a record does without, for its bytes: the radius is 3 cm where it is not stated.
@@ -26,9 +25,9 @@ LEFT_OUT = ("shell_radius_cm", "shell_max_frame", "shell_max_joint")
 
 def quality_record(
     original: Motion,
-    decoded: Sequence[NDArray[Any]],
+    decoded: Sequence[Values],
     codec_name: str,
-    options: Mapping[str, Any],
+    options: Params,
     remarks: Mapping[str, str],
 ) -> dict[str, str]:
     """The entries of the record; ``decoded`` are the values of every signal as a reader has them.
@@ -43,7 +42,7 @@ def quality_record(
     return entries | dict(remarks)
 
 
-def _greatest_error(original: Motion, decoded: Signal) -> dict[str, Any]:
+def _greatest_error(original: Motion, decoded: Signal) -> JsonObject:
     """The greatest error of a channel, less whole turns, and its frame and channel."""
     skeleton, signal = original.skeleton, original.signals[0]
     given, found = (np.asarray(one.masked(), np.float64) for one in (signal, decoded))
@@ -67,7 +66,7 @@ def quality_payload(entries: Mapping[str, str]) -> bytes:
 
 
 def quality_entries(
-    original: Motion, decoded: Motion, codec_name: str, options: Mapping[str, Any]
+    original: Motion, decoded: Motion, codec_name: str, options: Params
 ) -> dict[str, str]:
     """Settings, then figures, as text; what there is no figure of is left out.
 
@@ -77,18 +76,18 @@ def quality_entries(
     return texts_of({"codec": codec_name, **settings, **figures(original, decoded)})
 
 
-def figures(original: Motion, decoded: Motion) -> dict[str, Any]:
+def figures(original: Motion, decoded: Motion) -> JsonObject:
     """The figures of a record by their metric ids, None where there is none."""
     found = compare(original, decoded).entries()
     return {key: value for key, value in found.items() if key not in LEFT_OUT}
 
 
-def texts_of(entries: Mapping[str, Any]) -> dict[str, str]:
+def texts_of(entries: Params) -> dict[str, str]:
     """Settings or figures as text, without those that are None."""
     return {key: _text(value) for key, value in entries.items() if value is not None}
 
 
-def with_values(signal: Signal, values: NDArray[Any]) -> Signal:
+def with_values(signal: Signal, values: Values) -> Signal:
     """``signal`` with decoded values, which need not lie on its grids."""
     return replace(
         signal,
@@ -100,7 +99,7 @@ def with_values(signal: Signal, values: NDArray[Any]) -> Signal:
     )
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """
     >>> _text(0.1), _text(3), _text(True), _text((1.0, -0.5))
     ('0.1', '3', 'true', '1.0,-0.5')

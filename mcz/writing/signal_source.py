@@ -6,11 +6,10 @@ values themselves.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from mcz.formats import recording_of
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind, values_of_texts
 from mcz.schema import build
+from mcz.types import Params, Values
 
 KEPT_BLOCKS = 8
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
@@ -41,7 +41,7 @@ class MemorySource:
         index: int,
         codec: Codec,
         segment_bytes: int,
-        options: Mapping[str, Any] = MappingProxyType({}),
+        options: Params = MappingProxyType({}),
     ) -> None:
         """``options``: all of the codec's, where it has groups of ordinals beside values."""
         signal = motion.signals[index]
@@ -68,7 +68,7 @@ class MemorySource:
     def grids(self, frame: int) -> tuple[Grid, ...]:
         return self.signal.cut(frame, frame).grids
 
-    def values(self, start: int, stop: int) -> NDArray[Any]:
+    def values(self, start: int, stop: int) -> Values:
         return self.signal.cut(start, stop).values
 
     def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +23,7 @@ from mcz.metrics import compare
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.sizes import clip_sizes
+from mcz.types import Params
 from mcz.writing.clip_writer import write_clip
 
 Floats = NDArray[np.float64]
@@ -46,14 +46,12 @@ class Target:
 class Trials:
     """The figures of a clip at one setting of the dial, measured on a file in memory."""
 
-    def __init__(
-        self, motion: Motion, codec: Codec, params: Mapping[str, Any], writer: Writer
-    ) -> None:
+    def __init__(self, motion: Motion, codec: Codec, params: Params, writer: Writer) -> None:
         self.motion, self.codec, self.params, self.writer = motion, codec, params, writer
         self.alone = replace(motion, signals=motion.signals[:1])
         self.others = 0.0  # bytes of the further signals, which no dial changes
 
-    def given(self, more: Mapping[str, Any]) -> Trials:
+    def given(self, more: Params) -> Trials:
         """Trials with more parameters."""
         return Trials(self.motion, self.codec, {**self.params, **more}, self.writer)
 
@@ -62,7 +60,7 @@ class Trials:
         assert self.codec.dial is not None
         return self.figure(target, {self.codec.dial.parameter: setting})
 
-    def figure(self, target: Target, found: Mapping[str, Any]) -> float:
+    def figure(self, target: Target, found: Params) -> float:
         """The figure of ``target`` with these parameters."""
         figure = self._measure(self.alone, target, found)
         if len(self.motion.signals) > 1 and target.falls:
@@ -71,7 +69,7 @@ class Trials:
             figure += self.others
         return figure
 
-    def frame_errors(self, found: Mapping[str, Any]) -> Floats:
+    def frame_errors(self, found: Params) -> Floats:
         """The greatest position error of each frame in cm with these parameters, (n_frames,)."""
         clip = self._written(self.alone, found)[1]
         unit, decoded = self.motion.skeleton.unit_cm, clip.motion()
@@ -87,7 +85,7 @@ class Trials:
             greatest[rows] = np.nan_to_num(distances).max(axis=1, initial=0.0) * unit
         return greatest
 
-    def joint_errors(self, found: Mapping[str, Any]) -> Floats:
+    def joint_errors(self, found: Params) -> Floats:
         """The mean position error of each joint in cm with these parameters, (n_joints,).
 
         0 for one that has no point.
@@ -97,7 +95,7 @@ class Trials:
         unit = self.motion.skeleton.unit_cm
         return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
 
-    def _written(self, motion: Motion, found: Mapping[str, Any]) -> tuple[Container, Clip]:
+    def _written(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
         out = io.BytesIO()
         scratch = Writer(out, profile=self.writer.profile)
         with warnings.catch_warnings():
@@ -107,7 +105,7 @@ class Trials:
         container = Container(open_source(out.getvalue()), max_decoded=2**53)
         return container, Clip(container, container.directory.clips[motion.name])
 
-    def _measure(self, motion: Motion, target: Target, found: Mapping[str, Any]) -> float:
+    def _measure(self, motion: Motion, target: Target, found: Params) -> float:
         container, clip = self._written(motion, found)
         if not target.falls:
             figures = compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)

@@ -7,9 +7,8 @@ measure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics import positions_of
 from mcz.motion import Motion
+from mcz.types import JsonObject, Params
 from mcz.writing.bounding import REFINEMENT, bounded
 from mcz.writing.clip_writer import Amend, Progress, asked, write_clip
 from mcz.writing.positions import as_codec_wants, check_bones
@@ -43,7 +43,7 @@ def write_tuned(
     writer: Writer,
     motion: Motion,
     codec: Codec,
-    params: Mapping[str, Any],
+    params: Params,
     progress: Progress | None = None,
     *,
     amend: Amend | None = None,
@@ -79,9 +79,7 @@ def write_tuned(
     return write_clip(writer, motion, codec, params, progress, remarks=remarks, amend=amend)
 
 
-def _check_preset(
-    codec: Codec, params: Mapping[str, Any], options: Mapping[str, Any], targets: Mapping[str, Any]
-) -> None:
+def _check_preset(codec: Codec, params: Params, options: Params, targets: Params) -> None:
     """A preset that promises an error stands beside nothing that says another."""
     if not (codec.promise and codec.dial) or params.get(PRESET) is None:
         return
@@ -90,7 +88,7 @@ def _check_preset(
         raise OptionError(f"{PRESET} and {others[0]} are given, only one can be")
 
 
-Found = tuple[dict[str, Any], dict[str, str]]  # parameters, and what the quality record says
+Found = tuple[JsonObject, dict[str, str]]  # parameters, and what the quality record says
 
 
 def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Limits) -> Found:
@@ -100,7 +98,7 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
     """
     assert codec.dial is not None
     _check_unit(trial.motion, QUALITY)
-    weights: dict[str, Any] = {}
+    weights: JsonObject = {}
     for _ in range(MOST_TURNS):
         found, remarks = _meet(codec, target, trial.given(weights))
         weights, kept = weighted(codec.dial, trial, limits, {**found, **weights})
@@ -149,9 +147,7 @@ def _searched(dial: Dial, target: Target, trial: Trials) -> Found:
     return {dial.parameter: int(setting) if dial.whole else setting}, remarks
 
 
-def _target(
-    motion: Motion, dial: Dial, options: Mapping[str, Any], targets: Mapping[str, Any]
-) -> Target:
+def _target(motion: Motion, dial: Dial, options: Params, targets: Params) -> Target:
     if len(targets) > 1:
         raise OptionError(f"{' and '.join(targets)} are asked for, only one can be")
     ((name, limit),) = targets.items()

@@ -6,8 +6,7 @@ and one ``weights``, what each joint counts for in its metric.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from mcz.codecs.parameters import Dial
 from mcz.errors import OptionError
 from mcz.kinematics.words import joints_of
+from mcz.types import JsonObject, Params
 from mcz.writing.trials import Trials
 
 Floats = NDArray[np.float64]
@@ -27,8 +27,8 @@ MOST_WEIGHT = 2.0**24
 
 
 def weighted(
-    dial: Dial, trial: Trials, limits: Limits, found: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, str]]:
+    dial: Dial, trial: Trials, limits: Limits, found: Params
+) -> tuple[JsonObject, dict[str, str]]:
     """Weights with which the joints keep their ``limits``, with the parameters ``found``.
 
     Also returns what the quality record says of it. Raises OptionError where they cannot be kept.

@@ -6,7 +6,6 @@ mcz/codecs/curves/README.md describes it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +18,7 @@ from mcz.codecs.segments import segment_frames_of
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
 from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Skeleton
+from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,7 +29,7 @@ LEAST_LEVER = 2.0**-30
 STEP_SHARE = 0.75  # of the distance that is allowed, a step, where no decimals are given
 FEWEST_MOST = 512  # frames between marks up to which the fewest breaks are looked for
 
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     "default": {"d2_lmt": 1.0, "delta": 40, "Q": None, "middle": "least-squares"},
     "khan2014": {"d2_lmt": 4.0, "delta": 80, "Q": 2, "middle": "published"},
 }
@@ -86,7 +86,7 @@ def _lever(skeleton: Skeleton | None) -> float:
     return lever if LEAST_LEVER <= lever <= 1 / LEAST_LEVER else 1.0
 
 
-def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
+def plan_of_options(params: Params, layout: Layout) -> Plan:
     """The plan for a clip; raises OptionError for parameters that do not fit."""
     chosen, published = chosen_of(PRESETS, params), params["preset"] == "khan2014"
     limit, decimals = chosen["d2_lmt"], chosen["Q"]
@@ -112,7 +112,7 @@ def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
     )
 
 
-def plan_of_header(fields: Any, options: Mapping[str, Any]) -> Plan:
+def plan_of_header(fields: Any, options: Params) -> Plan:
     """What the encoder of a clip had decided, as far as its header and its options say."""
     preset = PRESETS[options["preset"]]
     scaled = fields.decimals == SCALED

@@ -13,8 +13,7 @@ fine one has the curves between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from construct import Float64l, If, Int8ul, this
@@ -66,6 +65,7 @@ from mcz.codecs.parameters import (
 from mcz.codecs.segments import SEGMENT_FRAMES, SEGMENT_FRAMES_PARAMETER, Lengths, halving
 from mcz.errors import FormatError, OptionError
 from mcz.schema import UVARINT, Checked, Record, bounded, build, field, parse
+from mcz.types import Params
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,7 +91,7 @@ class QbcHeader(Record):
     position_step: float | None = field(STEP, "the same of the channels tx, ty, tz and length")
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ class Curves:
 
 
 @cache
-def _kernels() -> Any:
+def _kernels() -> ModuleType:
     from mcz.codecs.curves import kernels
 
     return kernels

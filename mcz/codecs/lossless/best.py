@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
 
 from mcz.codecs.contract import (
     Codec,
@@ -29,11 +28,12 @@ from mcz.codecs.lossless.copying import Ints
 from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
 from mcz.codecs.segments import Sizing
 from mcz.threads import in_force
+from mcz.types import Params
 
 SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MAX_ROWS, spare=1, full=True)
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
     return copying.encode_streams(source, params, SIZING, build_stream, in_force())
 

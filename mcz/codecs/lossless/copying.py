@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from mcz.coding.ordinals.streams import Own, Seen
 from mcz.errors import FormatError
 from mcz.numbers import Grid
 from mcz.schema import varint
+from mcz.types import Params
 
 Ints = NDArray[np.int64]
 
@@ -30,7 +30,7 @@ Build = Callable[[Ints, Sequence[Own], int, Seen | None], bytes]  # makes the st
 
 def encode_streams(
     source: SignalSource,
-    params: Mapping[str, Any],
+    params: Params,
     sizing: Sizing,
     build: Build,
     threads: int = 1,

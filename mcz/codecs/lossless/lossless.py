@@ -9,10 +9,9 @@ that are copies of another group's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +35,7 @@ from mcz.coding.ordinals.degrees import is_tiny
 from mcz.coding.ordinals.streams import build_stream, parse_stream
 from mcz.coding.ordinals.units import find_unit
 from mcz.numbers import GridKind
+from mcz.types import Params
 
 Ints = NDArray[np.int64]
 
@@ -44,7 +44,7 @@ PLACES, TRIED_ROWS, TRIED_CHANNELS = 3, 512, 24  # that decide on it for form 34
 SIZING = Sizing(57_000, 64_000, value_bytes=2, most_rows=MAX_ROWS, spare=1)
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
     version = _least_version(source)
     encoded = encode_streams(source, params, SIZING, partial(build_stream, version=version))

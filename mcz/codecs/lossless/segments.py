@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from mcz.codecs.parameters import Parameter, integer
 from mcz.codecs.segments import Sizing, guessing
 from mcz.errors import FormatError
 from mcz.numbers import Grid
+from mcz.types import Params
 
 Ints = NDArray[np.int64]
 
@@ -26,9 +26,7 @@ Build = Callable[
 ]
 
 
-def encode_groups(
-    build: Build, sizing: Sizing, source: SignalSource, params: Mapping[str, Any]
-) -> Encoded:
+def encode_groups(build: Build, sizing: Sizing, source: SignalSource, params: Params) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
     prepare = partial(_prepare, build, source, range(len(source.layout.groups)), True)
     return Encoded(b"", guessing(source, params["segment_frames"], sizing, prepare))

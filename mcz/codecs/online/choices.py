@@ -8,11 +8,10 @@ motion-adaptive post-processing, eqs. 2, 3 and 17.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from mcz.codecs.contract import Layout
 from mcz.codecs.online.units import MODES
 from mcz.errors import OptionError
 from mcz.hints import Hint
+from mcz.types import Params
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class Plan:
         numbers[kernels.AHEAD] = min(ahead, rate * numbers[kernels.BUFFER])
 
 
-def plan_of(chosen: Mapping[str, Any], layout: Layout, step: float) -> Plan:
+def plan_of(chosen: Params, layout: Layout, step: float) -> Plan:
     """The plan at the start of a signal, ``step`` being that of its header.
 
     Raises OptionError where a rate is asked for and the frame rate is not known.
@@ -81,7 +81,7 @@ def plan_of(chosen: Mapping[str, Any], layout: Layout, step: float) -> Plan:
     return plan
 
 
-def set_plan(plan: Plan, chosen: Mapping[str, Any], layout: Layout, step: float) -> None:
+def set_plan(plan: Plan, chosen: Params, layout: Layout, step: float) -> None:
     """Let other parameters hold from the next group on."""
     kernels, numbers = _kernels(), plan.numbers
     mode = chosen["rate_control"]
@@ -156,7 +156,7 @@ def gaussian(step: float) -> float:
 
 
 @cache
-def _kernels() -> Any:
+def _kernels() -> ModuleType:
     from mcz.codecs.online import rate_kernels
 
     return rate_kernels

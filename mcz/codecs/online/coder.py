@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -43,14 +44,14 @@ class OnlineHeader(Record):
 
 
 @cache
-def _kernels() -> Any:
+def _kernels() -> ModuleType:
     from mcz.codecs.online import kernels
 
     return kernels
 
 
 @cache
-def _coding() -> Any:
+def _coding() -> ModuleType:
     from mcz.coding import mixing
 
     return mixing

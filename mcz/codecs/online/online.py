@@ -10,9 +10,8 @@ states). No delay: a frame is coded before the next is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,13 +49,14 @@ from mcz.codecs.space import SpaceFields, check, uses_of
 from mcz.codecs.space_choices import sample_of
 from mcz.errors import FormatError, OptionError
 from mcz.schema import build
+from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
 
 SEGMENT_FRAMES = 1200  # at least, but for the last
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, or is too large, OptionError for parameters
@@ -70,7 +70,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     return Encoded(header, _segments(source, writer), models=choice.models, known=choice.known)
 
 
-def _header(space: SpaceFields, order: int, chosen: Mapping[str, Any]) -> OnlineHeader:
+def _header(space: SpaceFields, order: int, chosen: Params) -> OnlineHeader:
     coder = MIXED if chosen["coder"] == "mixed" else GOLOMB
     return OnlineHeader(space=space, order=order, coder=coder)
 
@@ -78,14 +78,14 @@ def _header(space: SpaceFields, order: int, chosen: Mapping[str, Any]) -> Online
 class _Writer:
     """Which frames are LTRs, and which of these are intra coded; shared by file and live stream."""
 
-    def __init__(self, header: bytes, layout: Layout, chosen: Mapping[str, Any]) -> None:
+    def __init__(self, header: bytes, layout: Layout, chosen: Params) -> None:
         self.chosen, self.layout = dict(chosen), layout
         self.coder = Coder(header, layout)
         self.plan = plan_of(chosen, layout, self.coder.space.step)
         self.left = 0  # frames of the group that are still to come
         self._size = 0  # of the group
         self._groups = 0  # since the last intra coded one
-        self._waiting: dict[str, Any] | None = None  # parameters of the next group on
+        self._waiting: Settings | None = None  # parameters of the next group on
 
     def kind(self) -> int:
         """What the next frame is."""
@@ -110,7 +110,7 @@ class _Writer:
         self.left -= len(frames)
         return unit
 
-    def change(self, options: Mapping[str, Any]) -> None:
+    def change(self, options: Params) -> None:
         """Let parameters hold from the next group on."""
         self._waiting = settled({**self.chosen, **(self._waiting or {}), **options})
 
@@ -203,7 +203,7 @@ class _LiveEncoder(LiveEncoder):
 
     version: int | None = None
 
-    def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
+    def __init__(self, layout: Layout, options: Params) -> None:
         chosen = settled(options)
         choice, order = choose_live(layout, chosen)
         self.header = build(_header(choice.fields, order, chosen), f"{NAME} header")
@@ -219,7 +219,7 @@ class _LiveEncoder(LiveEncoder):
         self._is_intra = unit.kind == INTRA
         return build_units([unit]), self._is_intra
 
-    def change(self, options: Mapping[str, Any]) -> None:
+    def change(self, options: Params) -> None:
         fixed = sorted(set(options) - CHANGEABLE)
         if fixed:
             raise OptionError(

@@ -5,9 +5,7 @@ mcz/codecs/online/README.md describes them; a decoder needs none of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from mcz.codecs.contract import Layout
 from mcz.codecs.online.choices import FLOOR_CM
@@ -32,6 +30,7 @@ from mcz.codecs.space_choices import (
     live_sample,
 )
 from mcz.errors import OptionError
+from mcz.types import Params, Settings
 
 MOST_GOF = 2**20
 
@@ -42,7 +41,7 @@ _PUBLISHED = {
     "ltr_step": 1.0,
     "intra_period": 0,
 }
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     "default": {
         "threshold": THRESHOLD,
         "coder": "mixed",
@@ -70,7 +69,7 @@ CHANGEABLE = {
 }
 
 
-def settled(params: Mapping[str, Any]) -> dict[str, Any]:
+def settled(params: Params) -> Settings:
     """All parameters with what the preset says; raises OptionError for a contradiction."""
     values = PRESETS[params["preset"]].items()
     chosen = dict(params) | {n: v if params[n] is None else params[n] for n, v in values}
@@ -86,7 +85,7 @@ def settled(params: Mapping[str, Any]) -> dict[str, Any]:
     return chosen
 
 
-def choose(sample: Sample, chosen: Mapping[str, Any]) -> tuple[Choice, int]:
+def choose(sample: Sample, chosen: Params) -> tuple[Choice, int]:
     """The fields of SPACE and the order of points, from what an encoder looks at."""
     which, order = chosen["basis"], AS_IS
     step = chosen["step"] or default_step(sample)
@@ -100,7 +99,7 @@ def choose(sample: Sample, chosen: Mapping[str, Any]) -> tuple[Choice, int]:
     return choose_space(NAME, sample, step, which, changes), order
 
 
-def choose_live(layout: Layout, chosen: Mapping[str, Any]) -> tuple[Choice, int]:
+def choose_live(layout: Layout, chosen: Params) -> tuple[Choice, int]:
     """The same before any frame is known."""
     sample, _ = live_sample(NAME, layout, chosen["basis"])
     step = chosen["step"]

@@ -11,8 +11,7 @@ states). A stream holds all channels of one segment, with a basis of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from construct import Int8ul
@@ -42,6 +41,7 @@ from mcz.codecs.segments import (
 from mcz.codecs.steps import ratio_of
 from mcz.errors import FormatError
 from mcz.schema import Checked, Record, build, field, parse
+from mcz.types import Params, Settings, Values
 
 Floats = NDArray[np.float64]
 
@@ -57,13 +57,13 @@ class PcaHeader(Record):
     )  # PCA-05
 
 
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     "khan2014": {"q": 13, "Q": 2},
     "default": {"q": 20, "Q": None},
 }
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, or is too large.
@@ -141,7 +141,7 @@ def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, wanted: i
     return out
 
 
-def _plain(values: NDArray[Any]) -> Floats:
+def _plain(values: Values) -> Floats:
     return np.ascontiguousarray(values, np.float64)
 
 

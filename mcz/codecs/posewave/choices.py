@@ -6,9 +6,7 @@ mcz/codecs/posewave/README.md describes it; a decoder needs none of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +38,7 @@ from mcz.hints import Hint
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
 from mcz.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
 
@@ -76,7 +75,7 @@ class Choice:
     keeper: Keeper | None = None
 
 
-def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
+def choose(source: SignalSource, params: Params) -> Choice:
     """Raises MotionError for values that cannot be coded."""
     skeleton = skeleton_of(NAME, source.layout)
     unit = skeleton.unit_cm
@@ -104,7 +103,7 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
 
 
 def _contacts(
-    source: SignalSource, params: Mapping[str, Any], in_cm: float
+    source: SignalSource, params: Params, in_cm: float
 ) -> tuple[list[ContactsFields], Keeper | None]:
     """The header's field, and what is to be kept; ``in_cm``: length units a centimeter."""
     if not params.get("contacts") or not source.layout.n_frames:
@@ -174,7 +173,7 @@ def weights_of(step_cm: float) -> Weights:
     return Weights(COARSEST_WEIGHT, float(np.interp(math.log(step_cm), places, RATE_WEIGHTS)))
 
 
-def _fields(skeleton: Skeleton, step: float, step_cm: float) -> dict[str, Any]:
+def _fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
     in_cm = step / step_cm  # length units a centimeter
     degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
     first = 2 if step_cm <= FINE_CM else 0
@@ -212,7 +211,7 @@ def _spreads(rows: Floats) -> Floats:
     return found
 
 
-def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> dict[str, Any]:
+def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> Settings:
     """Steps of channels that move nothing: a share of how far they spread, (n_channels,)."""
     share = step_cm / SPREAD_CM
     kinds = [channel.kind for channel in skeleton.channels]
@@ -242,9 +241,7 @@ def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> dict[st
     }
 
 
-def best_levels(
-    source: SignalSource, skeleton: Skeleton, fields: Mapping[str, Any], weights: Weights
-) -> int:
+def best_levels(source: SignalSource, skeleton: Skeleton, fields: Params, weights: Weights) -> int:
     """How many levels make the beginning of the clip smallest for what they get wrong."""
     layout = source.layout
     n_frames = min(TRIAL_FRAMES, layout.n_frames, layout.most_frames)

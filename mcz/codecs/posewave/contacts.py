@@ -7,7 +7,8 @@ point moves, on a fine grid, and a decoder changes the pose as little as it can 
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,21 +41,21 @@ WEIGHT = 26214  # of each opinion, in 2^-16
 
 
 @cache
-def _kernels() -> Any:
+def _kernels() -> ModuleType:
     from mcz.codecs.posewave import contact_kernels
 
     return contact_kernels
 
 
 @cache
-def _coding() -> Any:
+def _coding() -> ModuleType:
     from mcz.codecs.posewave import displacement_kernels
 
     return displacement_kernels
 
 
 @cache
-def _mixing() -> Any:
+def _mixing() -> ModuleType:
     from mcz.coding import mixing
 
     return mixing

@@ -5,7 +5,7 @@ SPEC.md, "Exact channels", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -21,6 +21,7 @@ from mcz.errors import FormatError, OptionError
 from mcz.kinematics.words import joints_of
 from mcz.motion import Skeleton
 from mcz.schema import parse
+from mcz.types import Params
 
 Ints = NDArray[np.int64]
 Groups = tuple[tuple[int, ...], ...]
@@ -44,9 +45,7 @@ def joint_words(text: Any) -> tuple[str, ...]:
     return found
 
 
-def partition(
-    skeleton: Skeleton, options: Mapping[str, Any]
-) -> tuple[Groups, tuple[int, ...]] | None:
+def partition(skeleton: Skeleton, options: Params) -> tuple[Groups, tuple[int, ...]] | None:
     """The groups of a clip and the numbers of the exact ones; None where no joint is exact."""
     words = options.get(OPTION)
     if words is None:

@@ -7,8 +7,6 @@ encoder chooses.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +22,7 @@ from mcz.codecs.posewave.state import MAX_EXPONENT
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import FormatError, LostFrameError, OptionError
 from mcz.kinematics.single import FramePositions
+from mcz.types import Params
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +40,7 @@ class LiveEncoder(contract.LiveEncoder):
     models: tuple[Model, ...] = ()
     version: int | None
 
-    def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
+    def __init__(self, layout: Layout, options: Params) -> None:
         self.skeleton = skeleton_of(NAME, layout)
         if options["levels"]:
             raise OptionError(f"{NAME}: levels {options['levels']} needs frames that are to come")
@@ -79,7 +78,7 @@ class LiveEncoder(contract.LiveEncoder):
         away = self._places(row) - self._places(decoded)
         return bool((np.sqrt((away * away).sum(axis=1)) <= self._bound).all())
 
-    def change(self, options: Mapping[str, Any]) -> None:
+    def change(self, options: Params) -> None:
         raise OptionError(f"{NAME}: {', '.join(options)} cannot change while frames come")
 
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from mcz.codecs.posewave.state import (
 from mcz.coding import mixing
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.kernels.types import Floats, Ints
+from mcz.types import Params
 
 N_SECOND = 33
 START_ENERGY = 500.0
@@ -70,7 +70,7 @@ def start_tables() -> tuple[Start, ...]:
     return tuple(start_of(table, counts) for table in document["sets"])
 
 
-def start_of(table: Mapping[str, Any], counts: Ints) -> Start:
+def start_of(table: Params, counts: Ints) -> Start:
     """A start table as arrays; ``counts`` (16,) are what its digits of counts stand for."""
     slots = _bytes(table["probabilities"]) * 65536 + 32768 + counts[_digits(table["counts"])]
     own = slots[N_SHARED * N_SLOTS :].reshape(-1, N_OWN * N_SLOTS)

@@ -14,9 +14,8 @@ states). A stream holds one resolution of one segment; a segment decodes by itse
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +49,7 @@ from mcz.codecs.segments import (
 )
 from mcz.errors import FormatError
 from mcz.motion import Skeleton
+from mcz.types import Params, Settings, Values
 
 Floats = NDArray[np.float64]
 
@@ -57,12 +57,12 @@ MOST_FRAMES = 8192  # of a segment, where the caller leaves it open
 LEAST_FRAMES = 512
 
 
-def promise(options: Mapping[str, Any]) -> dict[str, Any]:
+def promise(options: Params) -> Settings:
     """The greatest error in cm of the preset."""
     return {"max_error_cm": PRESETS[options["preset"]]}
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
 
     Raises MotionError for a value that is not finite or too large.
@@ -75,7 +75,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
 
 
 def _segments(
-    source: SignalSource, header: Header, choice: Choice, params: Mapping[str, Any]
+    source: SignalSource, header: Header, choice: Choice, params: Params
 ) -> Iterator[Segment]:
     layout = source.layout
     skeleton = skeleton_of(NAME, layout)
@@ -133,7 +133,7 @@ def decode(
     request: Request,
     fetch: Fetch,
     version: int = 1,
-) -> NDArray[Any]:
+) -> Values:
     """The values, (frames, channels of the groups), ordinals of exact groups.
 
     Raises FormatError on bad bytes.

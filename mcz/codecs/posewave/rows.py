@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from copy import copy, deepcopy
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,21 +30,21 @@ MOST_WANTED = 2.0**29
 
 
 @cache
-def _model() -> Any:
+def _model() -> ModuleType:
     from mcz.codecs.posewave import model_kernels
 
     return model_kernels
 
 
 @cache
-def _head() -> Any:
+def _head() -> ModuleType:
     from mcz.codecs.posewave import head_kernels
 
     return head_kernels
 
 
 @cache
-def _coding() -> Any:
+def _coding() -> ModuleType:
     from mcz.coding import mixing
 
     return mixing

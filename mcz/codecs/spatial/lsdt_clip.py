@@ -10,9 +10,7 @@ states). A window decodes by itself; its length is the delay.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 from mcz.codecs.contract import Codec, Encoded, SignalSource
 from mcz.codecs.parameters import Dial, chosen_of, preset_parameter
@@ -33,16 +31,17 @@ from mcz.codecs.space_choices import (
 )
 from mcz.codecs.spatial import windows
 from mcz.codecs.spatial.windows import Plan
+from mcz.types import Params, Settings
 
 NAME = "lsdt-clip"
 
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     "default": {"window": 240, "threshold": THRESHOLD, "coder": "mixed"},
     "hou2016": {"window": 240, "threshold": 0.5, "coder": "prefix"},
 }
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, or is too large.

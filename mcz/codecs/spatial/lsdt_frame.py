@@ -10,9 +10,10 @@ states). No delay: a frame is coded before the next is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,7 @@ from mcz.coding.start import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
 from mcz.schema import Record, build, field, parse
+from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -76,13 +78,13 @@ class FrameHeader(Record):
     code: CodeFields = field(CodeFields, "how coefficients become bits")
 
 
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     "default": {"threshold": THRESHOLD, "coder": "mixed"},
     "hou2016": {"threshold": 0.5, "coder": "prefix"},
 }
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, or is too large.
@@ -175,7 +177,7 @@ def uses(header: bytes) -> tuple[bytes, ...]:
 
 
 @cache
-def _kernels() -> Any:
+def _kernels() -> ModuleType:
     from mcz.codecs.spatial import lsdt_frame_kernels
 
     return lsdt_frame_kernels
@@ -273,7 +275,7 @@ class _LiveEncoder(LiveEncoder):
 
     version: int | None = None
 
-    def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
+    def __init__(self, layout: Layout, options: Params) -> None:
         chosen = chosen_of(PRESETS, options)
         choice = live_choice(NAME, layout, options["step"], options["basis"])
         if chosen["coder"] == "prefix":
@@ -297,7 +299,7 @@ class _LiveEncoder(LiveEncoder):
         self._at += 1
         return stream, fresh
 
-    def change(self, options: Mapping[str, Any]) -> None:
+    def change(self, options: Params) -> None:
         raise OptionError(f"{NAME}: {', '.join(options)} cannot change while frames come")
 
 

@@ -10,9 +10,7 @@ states). Mean, components and courses are in the file, as a model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 from mcz.codecs.contract import Codec, Encoded, SignalSource
 from mcz.codecs.parameters import Dial, chosen_of
@@ -20,17 +18,18 @@ from mcz.codecs.space import APART, COURSES, MEAN, WEIGHTED
 from mcz.codecs.space_choices import default_step, sample_of
 from mcz.codecs.spatial import windows
 from mcz.codecs.spatial.window_choices import THRESHOLD, asked_of, parameters_of, plan_of
+from mcz.types import Params, Settings
 
 NAME = "pca-rdo"
 WINDOW = 120
 
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     "default": {"window": WINDOW, "threshold": THRESHOLD, "coder": "mixed"},
     "hou2016": {"window": WINDOW, "threshold": 0.5, "coder": "prefix"},
 }
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, or is too large.

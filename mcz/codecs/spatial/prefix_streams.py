@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from construct import If, Int8ul, this
@@ -49,7 +49,7 @@ class Codes:
 
 
 @cache
-def _kernels() -> Any:
+def _kernels() -> ModuleType:
     from mcz.codecs.spatial import prefix_kernels
 
     return prefix_kernels

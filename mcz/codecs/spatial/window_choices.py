@@ -7,10 +7,9 @@ same to the last bit on every machine; what is decoded is.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +42,7 @@ from mcz.codecs.spatial.windows import MAX_WINDOW, Plan
 from mcz.codecs.steps import ratio_of
 from mcz.errors import MotionError
 from mcz.transforms.dct import dct_matrix
+from mcz.types import Params
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,7 +91,7 @@ class Asked:
     frequencies: int | None
 
 
-def asked_of(params: Mapping[str, Any], chosen: Mapping[str, Any], step: float) -> Asked:
+def asked_of(params: Params, chosen: Params, step: float) -> Asked:
     """The parameters, those on which a preset has a say among ``chosen``."""
     return Asked(
         step,

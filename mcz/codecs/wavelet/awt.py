@@ -13,9 +13,7 @@ resolution of one segment. An encoder needs the whole clip in memory.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,12 +40,13 @@ from mcz.codecs.wavelet.shared import (
     transform_of,
 )
 from mcz.codecs.weights import SAMPLED_FRAMES, weights_of
+from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
 
 FRAMES_A_COEFFICIENT = 8  # where a_w is not given
 DISTORTIONS = ("positions", "channels")
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     # As published: any coefficient may be dropped, the whole clip at once, and the levels that
     # were asked for however short it is.
     "khan2014": {"a_w": 40.0, "Q": 2, "N": 4, "wavelet": "db2", "distortion": "channels"},
@@ -55,7 +54,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
@@ -90,7 +89,7 @@ def _weights(source: SignalSource, distortion: str) -> Floats:
     return weights_of(skeleton, frames, "sensitivity", unit_aware=True)
 
 
-def _weigh(source: SignalSource, options: Mapping[str, Any]) -> tuple[Floats, None]:
+def _weigh(source: SignalSource, options: Params) -> tuple[Floats, None]:
     """Weights of a clip that was coded with these options; its thresholds are not known."""
     return _weights(source, chosen_of(PRESETS, options)["distortion"]), None
 

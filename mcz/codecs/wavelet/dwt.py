@@ -12,9 +12,7 @@ resolution of one segment.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +31,11 @@ from mcz.codecs.wavelet.shared import (
     transform_of,
 )
 from mcz.codecs.weights import weights_of
+from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
 
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     # As published: t_w in the units of the source for positions too, the whole clip at once, and
     # the levels that were asked for however short it is.
     "khan2014": {"t_w": 3.0, "Q": 2, "N": 4, "wavelet": "db2"},
@@ -44,7 +43,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
@@ -64,7 +63,7 @@ def _weights(layout: Layout, *, unit_aware: bool) -> Floats:
     return weights_of(skeleton_of("dwt", layout), no_sample, "flat", unit_aware=unit_aware)
 
 
-def _weigh(source: SignalSource, options: Mapping[str, Any]) -> tuple[Floats, float | None]:
+def _weigh(source: SignalSource, options: Params) -> tuple[Floats, float | None]:
     """Weights and t_w of a clip that was coded with these options."""
     return _weights(source.layout, unit_aware=options["preset"] != "khan2014"), options["t_w"]
 

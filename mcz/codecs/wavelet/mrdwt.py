@@ -12,9 +12,7 @@ that SPEC.md states). A stream holds one channel at one resolution of one segmen
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +31,11 @@ from mcz.codecs.wavelet.shared import (
     transform_of,
 )
 from mcz.codecs.weights import RULES, SAMPLED_FRAMES, weights_of
+from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
 
-PRESETS: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, Settings] = {
     # Exactly as published: T_g in the units of the source for positions too, the whole clip at
     # once, and the levels that were asked for however short it is.
     "khan2016": {"T_g": 12.0, "Q": 1, "N": 4, "wavelet": "db3", "threshold_rule": "depth"},
@@ -50,7 +49,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 
 
-def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
 
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
@@ -71,7 +70,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     return shared.encode(source, plan)
 
 
-def _weigh(source: SignalSource, options: Mapping[str, Any]) -> tuple[Floats, float | None]:
+def _weigh(source: SignalSource, options: Params) -> tuple[Floats, float | None]:
     """Weights and T_g of a clip that was coded with these options."""
     preset = PRESETS[options["preset"]]
     weights = weights_of(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from mcz.codecs.wavelet.shared import Plan, Transform, WaveletHeader, segment_st
 from mcz.codecs.wavelet.windows import Frames
 from mcz.schema import parse
 from mcz.transforms.wavelets import INLINE, Wavelet, by_id
+from mcz.types import Params
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class _Held(Quantizer):
 
 # (source, options) -> the weights (n_channels,) of the signal, which times a threshold are the
 # thresholds of its channels, and that threshold; None: as large as the header says the least is.
-Weigh = Callable[[SignalSource, Mapping[str, Any]], tuple[Floats, float | None]]
+Weigh = Callable[[SignalSource, Params], tuple[Floats, float | None]]
 
 
 def recoder(name: str, weigh: Weigh) -> Recode:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,7 @@ class Coding:
 
 
 @cache
-def _kernels() -> Any:
+def _kernels() -> ModuleType:
     from mcz.codecs.wavelet import kernels
 
     return kernels

@@ -27,6 +27,7 @@ from mcz.conversion.scenes.solids import (
     solid_of,
 )
 from mcz.kinematics.chain import Floats
+from mcz.types import JsonObject, Values
 
 UBYTE, USHORT, UINT, FLOAT = 5121, 5123, 5125, 5126  # component types
 VERTICES, INDICES = 34962, 34963  # what a buffer view is for
@@ -40,7 +41,7 @@ UP_MATRICES = {
 }
 
 
-def glb(scene: Scene, keys: Keyed, generator: str, extras: dict[str, Any]) -> bytes:
+def glb(scene: Scene, keys: Keyed, generator: str, extras: JsonObject) -> bytes:
     """The file; ``extras`` are facts about the motion, which are kept under "asset"."""
     return _Document(scene, keys).bytes(generator, extras)
 
@@ -51,8 +52,8 @@ class _Document:
     def __init__(self, scene: Scene, keys: Keyed) -> None:
         self.scene, self.keys = scene, keys
         self.buffer = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
+        self.views: list[JsonObject] = []
+        self.accessors: list[JsonObject] = []
         self.sides = [s for s in SIDES if any(node.side == s for node in scene.nodes)]
         self.up = np.array(UP_MATRICES[scene.up_axis])
         self.nodes = self._nodes()
@@ -61,8 +62,8 @@ class _Document:
             self.meshes = self._knobs()
         self.animations = self._animations()
 
-    def bytes(self, generator: str, extras: dict[str, Any]) -> bytes:
-        document: dict[str, Any] = {
+    def bytes(self, generator: str, extras: JsonObject) -> bytes:
+        document: JsonObject = {
             "asset": {"version": "2.0", "generator": generator, "extras": extras},
             "scene": 0,
             "scenes": [{"nodes": [0] if self.scene.is_markers else [0, len(self.nodes) - 1]}],
@@ -90,16 +91,16 @@ class _Document:
             ]
         )
 
-    def _nodes(self) -> list[dict[str, Any]]:
+    def _nodes(self) -> list[JsonObject]:
         """Node 0, then those of the scene, then that of the mesh where there is one skin."""
         scene = self.scene
         roots = [number + 1 for number, node in enumerate(scene.nodes) if node.parent < 0]
-        top: dict[str, Any] = {"name": scene.name, "children": roots}
+        top: JsonObject = {"name": scene.name, "children": roots}
         if scene.up_axis in UP_TURNS:
             top["rotation"] = UP_TURNS[scene.up_axis]
         nodes = [top]
         for node, below in zip(scene.nodes, scene.children, strict=True):
-            made: dict[str, Any] = {"name": node.name}
+            made: JsonObject = {"name": node.name}
             rest = _floats(node.rest)
             if any(rest):
                 made["translation"] = rest
@@ -114,7 +115,7 @@ class _Document:
             nodes.append({"name": "bones", "mesh": 0, "skin": 0})
         return nodes
 
-    def _skinned(self) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    def _skinned(self) -> tuple[list[JsonObject], list[JsonObject]]:
         """The mesh of the bones, in the world at rest, and its skin."""
         solid, count = solid_of(self.scene), len(self.scene.nodes)
         attributes = self._attributes(solid)
@@ -149,7 +150,7 @@ class _Document:
         data = triangles.reshape(-1, 1).astype(kind)
         return self._accessor(data, code, view=self._view(INDICES))
 
-    def _knobs(self) -> list[dict[str, Any]]:
+    def _knobs(self) -> list[JsonObject]:
         """A mesh for each color of markers."""
         corners = knob(MARKER * self.scene.size).astype("<f4")
         position = self._accessor(corners, FLOAT, True, self._view(VERTICES))
@@ -163,10 +164,10 @@ class _Document:
             for number in range(len(self.sides))
         ]
 
-    def _animations(self) -> list[dict[str, Any]]:
+    def _animations(self) -> list[JsonObject]:
         view = self._view()
-        samplers: list[dict[str, Any]] = []
-        channels: list[dict[str, Any]] = []
+        samplers: list[JsonObject] = []
+        channels: list[JsonObject] = []
         inputs: dict[bytes, int] = {}
 
         def add(number: int, path: str, keys: Keys, how: str) -> None:
@@ -175,7 +176,7 @@ class _Document:
             if key not in inputs:
                 inputs[key] = self._accessor(times, FLOAT, True, view)
             output = self._accessor(keys.values.astype("<f4"), FLOAT, view=view)
-            sampler: dict[str, Any] = {"input": inputs[key], "output": output}
+            sampler: JsonObject = {"input": inputs[key], "output": output}
             if how != "LINEAR":
                 sampler["interpolation"] = how
             target = {"node": number + 1, "path": path}
@@ -198,14 +199,14 @@ class _Document:
     def _view(self, target: int | None = None) -> int:
         """A new buffer view, at the end of the buffer, for what is added next."""
         self.buffer += bytes(-len(self.buffer) % 4)
-        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": 0}
+        view: JsonObject = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": 0}
         if target is not None:
             view["target"] = target
         self.views.append(view)
         return len(self.views) - 1
 
     def _accessor(
-        self, data: NDArray[Any], code: int, bounds: bool = False, view: int = 0, **more: Any
+        self, data: Values, code: int, bounds: bool = False, view: int = 0, **more: Any
     ) -> int:
         """Add rows of numbers to the last buffer view, which is number ``view``."""
         start = self.views[view]["byteOffset"]
@@ -228,7 +229,7 @@ def _sizes(seen: NDArray[np.bool_]) -> Keys:
     return Keys(frames, values.astype(np.float32))
 
 
-def _material(side: str) -> dict[str, Any]:
+def _material(side: str) -> JsonObject:
     return {
         "name": side or "middle",
         "pbrMetallicRoughness": {
@@ -239,6 +240,6 @@ def _material(side: str) -> dict[str, Any]:
     }
 
 
-def _floats(values: Sequence[Any] | NDArray[Any] | Floats) -> list[float]:
+def _floats(values: Sequence[Any] | Values | Floats) -> list[float]:
     """Numbers as float32 has them."""
     return [float(value) for value in np.asarray(values, np.float32)]

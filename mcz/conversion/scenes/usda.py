@@ -18,12 +18,13 @@ from mcz.conversion.scenes.keys import Keyed, Keys
 from mcz.conversion.scenes.nodes import Node, Scene
 from mcz.conversion.scenes.solids import COLORS, MARKER, SIDES, Solid, solid_of
 from mcz.kinematics.chain import Floats
+from mcz.types import JsonObject
 
 X_UP = "(0, 0, 90)"  # degrees about x, y and z: the axis x becomes y
 IDENTIFIER = re.compile(r"[^A-Za-z0-9_]")
 
 
-def usda(scene: Scene, keys: Keyed, generator: str, facts: dict[str, Any]) -> bytes:
+def usda(scene: Scene, keys: Keyed, generator: str, facts: JsonObject) -> bytes:
     """The file, of keys in every frame; ``facts`` about the motion are kept with the layer."""
     name = identifiers([scene.name])[0]
     body = _markers(scene, keys) if scene.is_markers else _skeleton(scene, keys, name)
@@ -33,7 +34,7 @@ def usda(scene: Scene, keys: Keyed, generator: str, facts: dict[str, Any]) -> by
     return "\n".join(lines).encode("utf-8", "replace")
 
 
-def _layer(scene: Scene, name: str, generator: str, facts: dict[str, Any]) -> Iterator[str]:
+def _layer(scene: Scene, name: str, generator: str, facts: JsonObject) -> Iterator[str]:
     rate = _number(float(scene.rate))
     yield "#usda 1.0"
     yield "("
@@ -240,7 +241,7 @@ def _indented(lines: Iterable[str]) -> Iterator[str]:
     return (f"    {line}" for line in lines)
 
 
-def _number(value: Any) -> str:
+def _number(value: object) -> str:
     """The shortest text that is read as the same number."""
     text = str(value)  # of a float32 with as many digits as that needs
     return text.removesuffix(".0")

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.formats.arrays.files import Array
 from mcz.formats.body_trees import BodyTree, skeleton_of, tree
 from mcz.motion import Skeleton
+from mcz.types import Values
 
 WHOLE = ("poses", "fullpose", "full_pose")  # all joints
 PLACES = ("trans", "transl")  # where the root is
@@ -37,7 +36,7 @@ class Body:
 
     skeleton: Skeleton
     n_frames: int
-    words: list[NDArray[Any]]
+    words: list[Values]
     places: dict[int, Sequence[int]]
 
 
@@ -121,7 +120,7 @@ def _repeated(
             yield index, range(first + at, first + stop)
 
 
-def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
+def _same(one: Values, other: Values) -> bool:
     """Whether two arrays have the same type and the same bits."""
     if one.dtype != other.dtype or one.shape != other.shape:
         return False

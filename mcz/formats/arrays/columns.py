@@ -6,7 +6,6 @@ Which grid a column gets is a writer's choice; all bits of a column come back fr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from mcz.formats.arrays.header import Head
 from mcz.motion import Channel, Signal
 from mcz.numbers import Grid, GridKind
+from mcz.types import Values
 
 BINARY32, BINARY64, INTEGER = (
     Grid(kind) for kind in (GridKind.BINARY32, GridKind.BINARY64, GridKind.INTEGER)
@@ -32,12 +32,12 @@ class Columns:
     ``ordinals`` are there where values do not say them: of NaNs with other bits than usual.
     """
 
-    values: NDArray[Any]
+    values: Values
     grids: tuple[Grid, ...]
     ordinals: NDArray[np.int64] | None = None
 
 
-def words_of(data: bytes, head: Head) -> NDArray[Any]:
+def words_of(data: bytes, head: Head) -> Values:
     """The numbers of an array as they are stored, a row for each index of its first axis."""
     order = ">" if head.big_endian else "<"
     n_words = head.size // int(head.code[1:])
@@ -53,7 +53,7 @@ def file_columns(head: Head) -> NDArray[np.int64]:
     return columns.ravel(order="F" if head.by_columns else "C")
 
 
-def unfit(words: NDArray[Any]) -> str:
+def unfit(words: Values) -> str:
     """Why no grid holds such numbers bit for bit, "" where one does."""
     kind, size = words.dtype.kind, words.dtype.itemsize
     if kind == "b":
@@ -71,7 +71,7 @@ def unfit(words: NDArray[Any]) -> str:
     return ""
 
 
-def columns_of(words: NDArray[Any]) -> Columns:
+def columns_of(words: Values) -> Columns:
     """The columns of numbers (rows, columns) that are not ``unfit``."""
     if words.dtype.kind != "f":
         return Columns(words.astype(np.int64), (INTEGER,) * words.shape[1])
@@ -89,7 +89,7 @@ def columns_of(words: NDArray[Any]) -> Columns:
     return Columns(values, (grid,) * len(grids), grid.ordinals_of_bits(bits))
 
 
-def _bits(words: NDArray[Any]) -> NDArray[Any]:
+def _bits(words: Values) -> Values:
     """The bits of floats, in this machine's order."""
     plain = np.ascontiguousarray(words, words.dtype.newbyteorder("<"))
     return plain.view(f"<u{words.dtype.itemsize}")

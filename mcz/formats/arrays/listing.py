@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 from mcz.formats.arrays.layout import BIG_ENDIAN, BY_COLUMNS, TYPES, Kind, Piece, parse_arrays
 from mcz.motion import Source
+from mcz.types import JsonObject
 
 LOCAL, HEADER = b"PK\3\4", 30  # how a member of a ZIP begins; bytes before its name
 
 
-def arrays_listed(source: Source, signals: Sequence[str]) -> list[dict[str, Any]]:
+def arrays_listed(source: Source, signals: Sequence[str]) -> list[JsonObject]:
     """The arrays of a file in order: ``name type order columns signal``, ``name`` alone where kept.
 
     ``columns`` are the numbers of a row, ``order`` is "C" or "F"; ``signals`` are the names of the
@@ -36,7 +36,7 @@ def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
     ]
 
 
-def _listed(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> dict[str, Any]:
+def _listed(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonObject:
     listed = _kept(name)
     for piece in pieces:
         if piece.kind == Kind.DATA:
@@ -49,7 +49,7 @@ def _listed(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> dict[
     return listed
 
 
-def _kept(name: str) -> dict[str, Any]:
+def _kept(name: str) -> JsonObject:
     return {"name": name, "type": None, "order": None, "columns": None, "signal": None}
 
 

@@ -1,0 +1,20 @@
+"""Names of the types that travel between the parts of the package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+from numpy.typing import NDArray
+
+Values: TypeAlias = NDArray[Any]
+"""An array of numbers of either type: binary64, or int64 where grids are of integers."""
+
+Params: TypeAlias = Mapping[str, Any]
+"""Parameters of a codec by name; its table of parameters has the type of each."""
+
+JsonObject: TypeAlias = dict[str, Any]
+"""An object of JSON, as ``--json`` prints it."""
+
+Settings: TypeAlias = dict[str, Any]
+"""Parameters or options by name, as they are put together."""
