@@ -1,6 +1,6 @@
 """Bjontegaard deltas: two rate-distortion curves as two numbers.
 
-SPEC.md, "Bjontegaard deltas", is normative.
+docs/measures.md, "Bjontegaard deltas", is normative.
 """
 
 from __future__ import annotations

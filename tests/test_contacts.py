@@ -185,7 +185,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert contacts(motion) == whole
 
 
-# The rule, as SPEC.md, "Contacts", says it
+# The rule, as docs/contacts.md, says it
 
 
 def by_definition(p: np.ndarray, rate: float, up: int) -> list[tuple[int, int]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import re
@@ -163,7 +162,7 @@ def test_bad_settings(rate: float) -> None:
 
 def test_the_annex_and_the_text_have_the_taps() -> None:
     annex = json.loads(ANNEX.read_text("utf-8"))
-    assert len(annex) == int(re.search(r"for (\d+) frame rates", SECTION)[1])
+    assert len(annex) == int(re.search(r"(\d+)\s+frame rates", SECTION)[1])
     for text, filters in annex.items():
         rate = Fraction(text)
         taps = taps_of(rate.numerator / rate.denominator).tolist()
@@ -171,7 +170,6 @@ def test_the_annex_and_the_text_have_the_taps() -> None:
         assert all(row[0] + 2 * sum(row[1:]) == SCALE for row in taps)
         plain = [plain_taps(cutoff, rate.numerator / rate.denominator) for cutoff in CUTOFFS]
         assert [[tap / SCALE for tap in row] for row in taps] == plain
-    assert hashlib.sha256(ANNEX.read_bytes()).hexdigest() in SECTION
     printed = [
         int(n) for n in re.findall(r"\b\d+\b", re.sub(r"\d Hz", "", SECTION.split("```")[3]))
     ]

@@ -24,9 +24,9 @@ SPEC = re.sub(r" \[[A-Z][A-Z0-9]+-\d\d\]", "", TEXT)  # without the ids of rules
 HEADINGS = set(re.findall(r"^#+ (.+)$", SPEC, re.M))
 
 
-def rows_under(heading: str) -> list[list[str]]:
+def rows_under(heading: str, text: str = SPEC) -> list[list[str]]:
     """The cells of the first table under ``heading``, its two head lines left out."""
-    section = SPEC.split(f"# {heading}\n", 1)[1]
+    section = text.split(f"# {heading}\n", 1)[1]
     lines = re.search(r"(?:^\|.*\n)+", section, re.M)
     assert lines is not None
     return [[c.strip() for c in row.strip("|").split("|")] for row in lines[0].splitlines()[2:]]
@@ -131,10 +131,6 @@ def test_wavelets_of_the_text_and_the_annex_are_those_of_the_package() -> None:
     assert annex == found
     rows = [(int(row[0]), row[1], int(row[2])) for row in rows_under("Wavelets")]
     assert rows == [(IDS[name], name, w.n_taps) for name, w in WAVELETS.items()]
-    text = SPEC.split("## Wavelets")[1].split("```")[1]
-    printed = [float(word) for word in text.split() if word[0] in "-.0123456789"]
-    derived = [w.lo if name != "bior4.4" else (*w.lo, *w.hi) for name, w in WAVELETS.items()]
-    assert printed == [tap for taps in derived for tap in taps]
 
 
 def test_ids_of_rules() -> None:
@@ -171,11 +167,11 @@ def test_ids_end_their_sentences_and_lines_are_short() -> None:
     assert len(long) <= 27  # rows with hashes, and rows of the registry
 
 
-def test_contents_lead_to_all_headings() -> None:
+def test_contents_lead_to_all_sections() -> None:
     listed, rest = TEXT.split("<!-- contents -->\n")[1].split("<!-- end of contents -->\n")
     links = re.findall(r"\[(.+)\]\(#(.+)\)", listed)
     prose = "".join(rest.split("```")[::2])
-    assert [heading for heading, _ in links] == re.findall(r"^#+ (.+)$", prose, re.M)
+    assert [heading for heading, _ in links] == re.findall(r"^##? (.+)$", prose, re.M)
     assert len({anchor for _, anchor in links}) == len(links)
     assert ("Codec 0: raw", "codec-0-raw") in links
 

@@ -135,7 +135,7 @@ def test_nodes_of_the_mixer() -> None:
         ("Entropy coding", f"clamp(dot, -{logistic.LIMIT}, {logistic.LIMIT})"),
         ("Entropy coding", f"clamp(a.p, {mixing.LEAST_ONE}, {65536 - mixing.LEAST_ONE})"),
         ("Entropy coding", f"-2^{mixing.MAX_WEIGHT.bit_length() - 1}, 2^24)"),
-        ("Residuals", "refuse if n > 60"),
+        ("Residuals", "refuse if n > 53"),
         ("Codec 1: lossless", f"refuse if t > {lossless_kernels.MAX_STEPS_LENGTH}"),
         ("Codec 1: lossless", f"{lossless_kernels.DECIMAL_WIDTH} for base 10 and 44 for base 2"),
         ("Codec 1: lossless", f"j = max(c - P, -{lossless_kernels.LAST_POWER})"),
@@ -380,7 +380,8 @@ def test_signals_of_c3d() -> None:
 def test_sizes_and_ratios() -> None:
     """Each figure of the table is one that the package states under that name."""
     code = "\n".join(path.read_text() for path in (ROOT / "mcz/reading").glob("*.py"))
-    for name, _ in rows_under("Sizes and ratios"):
+    text = (ROOT / "docs/measures.md").read_text("utf-8")
+    for name, _ in rows_under("Sizes and ratios", text):
         assert f'"{name}"' in code, name
 
 

@@ -2,7 +2,8 @@
 
     python tools/registry.py [--check]
 
-SPEC.md is normative; the file is for programs that would rather not parse it.
+SPEC.md is normative, and docs/measures.md of metrics; the file is for programs that would rather
+not parse them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "SPEC.md"
+MEASURES = (ROOT / "docs/measures.md", ROOT / "docs/contacts.md")
 REGISTRY = ROOT / "conformance" / "annex" / "registry.json"
 Rows = list[list[str]]
 
@@ -25,7 +27,7 @@ def rows_after(text: str, mark: str) -> Rows:
     _, found, rest = text.partition(mark)
     table = re.search(r"(?:^\|.*\n)+", rest, re.M)
     if not found or table is None:
-        raise ValueError(f"SPEC.md: no table after {mark!r}")
+        raise ValueError(f"no table after {mark!r}")
     lines = table[0].splitlines()[2:]
     return [[cell.strip().strip("`") for cell in line.strip("|").split("|")] for line in lines]
 
@@ -68,15 +70,15 @@ def registry(text: str) -> dict[str, Any]:
         "edit_keys": _keyed(rows_after(text, "## Replacing a joint\n"), "key", "value"),
         "metrics": [
             {"id": name, "unit": unit, "meaning": meaning}
-            for heading in ("### Metrics\n", "### Contacts\n")
-            for names, unit, meaning in rows_after(text, heading)
+            for page, heading in zip(MEASURES, ("## Metrics\n", "# Contacts\n"), strict=True)
+            for names, unit, meaning in rows_after(page.read_text("utf-8"), heading)
             for name in names.split(", ")
         ],
         "model_kinds": _keyed(rows_after(text, "**Model kinds**"), "id", "name"),
         "bases": _keyed(
             rows_after(text, "Some models are well known."), "name", "annex", "id", "meaning"
         ),
-        "wavelets": _keyed(rows_after(text, "## Wavelets\n"), "id", "name", "taps", "lo", "hi"),
+        "wavelets": _keyed(rows_after(text, "## Wavelets\n"), "id", "name", "taps"),
         "annexes": _keyed(rows_after(text, "**Annexes**"), "file", "sha256", "meaning"),
     }
 

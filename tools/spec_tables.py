@@ -68,7 +68,7 @@ SPEC = Path(__file__).parent.parent / "SPEC.md"
 MARK = re.compile(r"(<!-- table: (\S+) -->\n)((?:\|.*\n)*)")
 CONTENTS = re.compile(r"(<!-- contents -->\n)(.*?)(<!-- end of contents -->\n)(.*)", re.DOTALL)
 TRACE = re.compile(r"(<!-- trace -->\n```\n).*?(```\n)", re.DOTALL)
-HEADING = re.compile(r"^(#{1,3}) (.+)$", re.MULTILINE)
+HEADING = re.compile(r"^(##?) (.+)$", re.MULTILINE)
 
 
 def structures() -> dict[str, Any]:
@@ -143,14 +143,13 @@ def table(structure: Any) -> str:
 
 
 def contents(text: str) -> str:
-    """A list of links to the headings of ``text``: parts, sections, and what these have."""
+    """A list of links to the parts and sections of ``text``."""
     lines = []
     for marks, heading in HEADING.findall(re.sub(r"(?ms)^```.*?^```$", "", text)):
         if len(marks) == 1:
             lines += ["", f"**[{heading}](#{anchor(heading)})**", ""]
         else:
-            indent = "  " * (len(marks) - 2)
-            lines.append(f"{indent}- [{heading}](#{anchor(heading)})")
+            lines.append(f"- [{heading}](#{anchor(heading)})")
     return "\n".join(lines).strip() + "\n"
 
 

@@ -60,7 +60,7 @@ def as_coded(motion: Motion, codec: Codec, options: Params) -> Motion:
 
 
 def coded_bytes(case: Case, variant: Variant, params: Params) -> int:
-    """Payload and overhead, SPEC.md's "Sizes and ratios", and the models that the file has."""
+    """Payload and overhead, docs/measures.md, and the models that the file has."""
     motion = what_is_coded(load(case).motion, variant.codec)
     data = write_file(motion, variant.codec, variant.options(params))
     with mcz.open(data, max_decoded=2**53) as file:

@@ -71,7 +71,7 @@ def code_residual(
     kf, ks = quarters(scales[0] + 1), quarters(scales[1] + 1)
     size = abs(residual)
     length = code_length(state, data, bits(size), kf, ks, near, first)
-    if length < 0 or length > 53:  # RESID-03
+    if length < 0:
         return FAULT
     if length == 0:
         return 0
@@ -106,7 +106,7 @@ def code_length(
                 at -= 1
             return at
     at = base
-    while at <= 60:  # RESID-02
+    while at <= 53:  # RESID-02
         f, s = clamp(at - bf + 4, 0, 23), clamp(at - bs + 4, 0, 23)
         a, b = contexts + C_MORE + 24 * cf + f, contexts + C_MORE + 768 + 24 * cs + s
         c = contexts + C_MORE + 1536 + 2 * (24 * near + f) + (1 if bf > bs else 0)  # RESID-01

@@ -1,7 +1,7 @@
 """How far a decoded motion is from the original: channels, points, markers, shell, contacts.
 
-SPEC.md, "Metrics", defines every id. Figures are sums of binary64 in no fixed order: they agree
-between machines to about 1e-9, not to the last bit.
+docs/measures.md, "Metrics", defines every id. Figures are sums of binary64 in no fixed order: they
+agree between machines to about 1e-9, not to the last bit.
 """
 
 from __future__ import annotations

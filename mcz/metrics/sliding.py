@@ -1,4 +1,4 @@
-"""How far feet slide that stood in the original. SPEC.md, "Contacts", has the definitions."""
+"""How far feet slide that stood in the original. docs/contacts.md, has the definitions."""
 
 from __future__ import annotations
 

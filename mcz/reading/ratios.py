@@ -1,4 +1,4 @@
-"""Compression ratios: SPEC.md, "Sizes and ratios", is normative."""
+"""Compression ratios: docs/measures.md, "Sizes and ratios", is normative."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Where the bytes of a clip go.
 
-SPEC.md, "Sizes and ratios", is normative.
+docs/measures.md, "Sizes and ratios", is normative.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The quality record: what a lossy codec changed, and how it was asked to.
 
-SPEC.md, "QUAL" and "Metrics", are normative.
+SPEC.md, "QUAL", is normative; docs/measures.md defines the figures.
 """
 
 from __future__ import annotations

@@ -95,10 +95,9 @@ export class Residuals {
         const m = mixer + MORE_MIXER + Math.min(x, 11);
         if (!model.mixed(coder, m, a + x, b + y, c + 2 * x)) break;
         n++;
-        if (n > 60) break;
+        if (n > 53) throw new Refused(`a residual of ${n} bits or more`);
       }
     }
-    if (n > 53) throw new Refused(`a residual of ${n} bits or more`);
     if (n === 0) return 0;
 
     let v = 1;

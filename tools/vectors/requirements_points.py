@@ -62,11 +62,6 @@ ARGUED: dict[str, str] = {
     "ONLINE-27": f"{LOST} tests/codecs/test_online.py::"
     "test_a_predicted_ltr_is_not_decoded_from_the_wrong_one",
     "KIN-01": f"{DECODERS} tests/test_kinematics.py::test_positions_of_any_skeleton",
-    "KIN-02": f"{DECODERS} tests/cli/test_solve_ik.py::test_there_and_back_keeps_the_rest",
     "FILT-03": "A decoder is asked to filter only what can be; shown by "
     "tests/test_post_filter.py::test_what_cannot_be_filtered",
-    "METRIC-01": f"{DECODERS} tests/test_metrics.py::test_a_hinge_by_hand",
-    "METRIC-02": f"{DECODERS} tests/test_metrics.py::test_infinite_and_huge_values_give_no_figure",
-    "METRIC-03": f"{DECODERS} tests/test_bench.py::"
-    "test_a_curve_of_half_the_bytes_is_50_percent_and_6_db_better",
 }
