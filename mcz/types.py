@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from os import PathLike
+from typing import Any, BinaryIO, TypeAlias
 
 from numpy.typing import NDArray
 
@@ -18,3 +19,6 @@ JsonObject: TypeAlias = dict[str, Any]
 
 Settings: TypeAlias = dict[str, Any]
 """Parameters or options by name, as they are put together."""
+
+Target: TypeAlias = str | PathLike[str] | bytes | BinaryIO
+"""A file: a path, an address that fsspec knows, its bytes, or a stream."""

@@ -71,7 +71,7 @@ class Cache:
             return None
         return held.get("result") if isinstance(held, dict) else None
 
-    def put(self, key: str, result: Any) -> None:
+    def put(self, key: str, result: object) -> None:
         """Keep ``result``; a folder that takes nothing is no error."""
         if self.folder is None:
             return

@@ -194,6 +194,6 @@ class Runner:
             if running:
                 self.progress(len(results), total, next(iter(running.values())).label)
 
-    def _keep(self, task: Task, result: Any, results: dict[Task, Any]) -> None:
+    def _keep(self, task: Task, result: object, results: dict[Task, Any]) -> None:
         results[task] = result
         self.cache.put(key_of(task), result)

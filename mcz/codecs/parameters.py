@@ -28,7 +28,7 @@ class Parameter:
     """
 
     name: str
-    default: Any
+    default: object
     help: str
     parse: Callable[[Any], Any]
     inner: bool = False

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -309,7 +308,7 @@ def _expected_bytes(
     return bits / 8 * whole + sum(len(model.data) for model in models)
 
 
-def _which(text: Any) -> str:
+def _which(text: object) -> str:
     if not isinstance(text, (str, Path)):
         raise OptionError(f"basis is {text!r}, neither {', '.join(WHICH)} nor a file's name")
     return str(text)
@@ -348,7 +347,7 @@ DOMAIN = Parameter(
 )
 
 
-def _flag(text: Any) -> bool:
+def _flag(text: object) -> bool:
     words = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
     found = words.get(str(text).lower())
     if found is None:

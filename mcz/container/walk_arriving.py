@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import BinaryIO
 
 from mcz.container.bounds import NOBODY, Bounds
 from mcz.container.chunks import COPY, SIGNATURE, Chunk, check_signature
@@ -26,7 +26,7 @@ MOST_AT_ONCE = 64 * 1024  # bytes that are taken from the stream where it has th
 class PipeSource(ByteSource):
     """A stream that is read front to back; it need not be seekable, and its end is not known."""
 
-    def __init__(self, stream: Any, name: str = "stream") -> None:
+    def __init__(self, stream: BinaryIO, name: str = "stream") -> None:
         super().__init__(stream, name=name, size=MAX_COUNT)
         self.block = 0  # nothing is waited for that is not needed yet
         self._start = 0  # offset of the first byte that is kept
@@ -96,7 +96,7 @@ class Arrival:
 class ArrivingWalker(Walker):
     """A strict walk along a stream."""
 
-    def __init__(self, stream: Any, name: str = "stream") -> None:
+    def __init__(self, stream: BinaryIO, name: str = "stream") -> None:
         self.pipe = PipeSource(stream, name)
         super().__init__(self.pipe, False, True, Bounds(NOBODY))
 

@@ -10,7 +10,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import BinaryIO
 
 from mcz.container.chunks import (
     ANCILLARY,
@@ -116,7 +116,7 @@ class WalkerWithLosses:
     """
 
     def __init__(
-        self, stream: Any, frame_of: Callable[[int], int | None], *, join: bool = False
+        self, stream: BinaryIO, frame_of: Callable[[int], int | None], *, join: bool = False
     ) -> None:
         self.pipe = PipeSource(stream)
         self._frame_of = frame_of

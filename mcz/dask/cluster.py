@@ -38,7 +38,7 @@ class Cluster:
         return int(n_threads)
 
     def in_order(
-        self, function: Callable[[Any, Any], Any], items: Iterable[Any], state: Any
+        self, function: Callable[[Any, Any], Any], items: Iterable[Any], state: object
     ) -> Generator[Answer[Any] | None, None, None]:
         """What gives ``function(state, item)`` for each item, in order; for None, None."""
         import cloudpickle

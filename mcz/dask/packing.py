@@ -17,7 +17,7 @@ from mcz.editing.folders import NO_MOTION, motion_files
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.jobs import Answer
-from mcz.types import Params
+from mcz.types import Params, Target
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -27,7 +27,7 @@ from mcz.writing.file import profile_of
 
 def pack(
     root: str | os.PathLike[str],
-    target: Any,
+    target: Target,
     client: Any = None,
     *,
     codec: str | None = None,

@@ -14,12 +14,17 @@ from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.report import Problem
 from mcz.reading.sharing import can_be_shared, shared_out
+from mcz.types import Target
 
 Result = TypeVar("Result")
 
 
 def verify(
-    target: Any, client: Any = None, *, max_decoded: int | None = None, where: Where | None = None
+    target: Target,
+    client: Any = None,
+    *,
+    max_decoded: int | None = None,
+    where: Where | None = None,
 ) -> list[Problem]:
     """Check an MCZ file as ``mcz.verify`` does, its clips on the workers of ``client``.
 
@@ -31,7 +36,7 @@ def verify(
 
 
 def map_clips(
-    target: Any,
+    target: Target,
     function: Callable[[Clip], Result],
     client: Any = None,
     *,

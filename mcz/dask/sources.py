@@ -18,6 +18,7 @@ from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, MczError, OptionError, SourceError
 from mcz.formats import wants_skeleton
 from mcz.hints import Remark
+from mcz.types import Target
 from mcz.writing.entry import Terms
 
 
@@ -44,7 +45,7 @@ def is_url(root: str) -> bool:
     return "://" in root
 
 
-def listed(root: str, target: Any) -> tuple[list[Found], list[Outcome]]:
+def listed(root: str, target: Target) -> tuple[list[Found], list[Outcome]]:
     """The files below ``root`` but for an earlier ``target``, in the order of an archive.
 
     Raises OptionError where it is no folder, AccessError where it cannot be listed.

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 from mcz.codecs import chosen
 from mcz.container import payloads
@@ -36,7 +35,7 @@ from mcz.hints import split_hint
 from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
 from mcz.threads import limited
-from mcz.types import Params, Settings
+from mcz.types import Params, Settings, Target
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -48,7 +47,7 @@ from mcz.writing.names import check_name
 
 def pack(
     directory: str | os.PathLike[str],
-    target: Any,
+    target: Target,
     *,
     codec: str | None = None,
     effort: str | None = None,

@@ -35,6 +35,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where, getter_of
 from mcz.reading.file import File, open
 from mcz.reading.names import clips_meant, listed
+from mcz.types import Target
 from mcz.writing.clip_writer import Progress
 from mcz.writing.names import check_name
 
@@ -42,7 +43,7 @@ FOLDER = "folder"  # split by the first part of the names
 
 
 def delete_clips(
-    target: Any,
+    target: Target,
     names: str | Iterable[str] = (),
     *,
     where: Where | None = None,
@@ -149,7 +150,7 @@ def _lost_aliases(file: File, gone: Plan, plan: Plan) -> list[tuple[str, str]]:
 
 
 def rename_clips(
-    target: Any,
+    target: Target,
     names: Mapping[str, str],
     *,
     output: Any = None,
@@ -213,7 +214,7 @@ def paths_of(file: File, plan: Plan) -> list[str]:
 
 
 def reorder_clips(
-    target: Any,
+    target: Target,
     names: Sequence[str] = (),
     *,
     by: str | None = None,
@@ -262,7 +263,7 @@ def natural(value: Value) -> tuple[Any, ...]:
 
 
 def split(
-    target: Any,
+    target: Target,
     directory: str | os.PathLike[str],
     *,
     by: str = FOLDER,
@@ -351,7 +352,7 @@ def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
 
 def _finish(
     report: Report,
-    target: Any,
+    target: Target,
     output: Any,
     force: bool,
     file: File,

@@ -24,6 +24,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.rate_notes import states_rate
+from mcz.types import Target
 from mcz.writing.clip_writer import Progress
 
 Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more
@@ -93,7 +94,7 @@ def _record(file: File, name: str, said: Said) -> Record:
 
 
 def set_rate(
-    target: Any,
+    target: Target,
     rate: Fraction | float,
     names: Iterable[str] | None = None,
     *,
@@ -141,7 +142,7 @@ def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
         )
 
 
-def _check_sources(target: Any, names: Iterable[str]) -> None:
+def _check_sources(target: Target, names: Iterable[str]) -> None:
     """Raise ChecksumError where a source does not come back any more, which cannot be."""
     if not isinstance(target, (str, os.PathLike)):
         return

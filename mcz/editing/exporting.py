@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from mcz.conversion import TARGETS, converted_files, left_out, suffixes_of
 from mcz.conversion.scenes import WRITERS, to_scene
@@ -22,6 +21,7 @@ from mcz.reading.file import File, open
 from mcz.reading.sharing import shared_out
 from mcz.reading.source_files import told
 from mcz.tables.files import EXPORTS, table_of
+from mcz.types import Target
 from mcz.writing.atomic import replacing
 
 Progress = Callable[[int, int, str], None]
@@ -29,7 +29,7 @@ FORMS = (*EXPORTS, *TARGETS, *WRITERS)
 
 
 def export(
-    target: Any,
+    target: Target,
     directory: str | os.PathLike[str],
     to: str,
     *,
@@ -79,7 +79,7 @@ def export(
 
 
 def _write(
-    name: str, data: bytes, folder: Folder, written: set[str], target: Any, force: bool
+    name: str, data: bytes, folder: Folder, written: set[str], target: Target, force: bool
 ) -> None:
     if name in written:
         raise FormatError(f"another clip becomes {name}, too")

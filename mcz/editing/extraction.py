@@ -53,7 +53,7 @@ from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
-from mcz.types import Params
+from mcz.types import Params, Target
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Amend, Progress
 
@@ -95,7 +95,7 @@ class Extraction:
 
 def extract(
     source: Any,
-    target: Any,
+    target: Target,
     *,
     resolution: int = 0,
     joints: Joints = None,

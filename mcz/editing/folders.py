@@ -6,18 +6,18 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, OptionError, reason_of, remark_of
 from mcz.formats import FORMATS
 from mcz.hints import Hint, Remark
 from mcz.reading.names import FEW, listed
+from mcz.types import Target
 
 SNIFFED = 2**16  # bytes that tell what a file is
 
 
-def files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
+def files_below(root: Path, target: Target | None) -> tuple[list[Path], list[Outcome]]:
     """The files below ``root`` but for an earlier ``target``, and what else there is, in order."""
     own = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
     if own is not None and own.suffix.lower() != ".mcz":
@@ -117,7 +117,7 @@ def size_of(path: Path) -> int:
 def sources_named(
     sources: Sequence[str | os.PathLike[str]],
     root: str | os.PathLike[str] | None,
-    target: Any,
+    target: Target,
 ) -> tuple[list[tuple[Path, str]], list[Outcome]]:
     """The files that ``sources`` name, each with its name in an archive; and what is left out.
 

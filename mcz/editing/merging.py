@@ -33,6 +33,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.names import listed
 from mcz.schema import parse
+from mcz.types import Target
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -42,7 +43,7 @@ CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"
 
 def merge(
     sources: Sequence[str | os.PathLike[str]],
-    target: Any,
+    target: Target,
     *,
     rename: bool = False,
     skip_identical: bool = False,

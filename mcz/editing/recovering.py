@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain as chain_from
 from itertools import takewhile
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from mcz.recovery.field import Ints
 from mcz.recovery.making import Step, made
 from mcz.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
 from mcz.recovery.shape import HASH, Shape
+from mcz.types import Target
 from mcz.writing.clip_writer import Progress
 
 MOST_SHIFTS = 16
@@ -320,7 +321,7 @@ def _behind(source: ByteSource, last: Examined) -> int:
     return max(0, source.size - last.set.shape.stop - last.shift)
 
 
-def checked(target: Any) -> Recovery | None:
+def checked(target: Target) -> Recovery | None:
     """What the recovery data of a file find bad in it; None where it has none.
 
     Raises AccessError where it cannot be read.

@@ -22,6 +22,7 @@ from mcz.editing.salvage_copier import Repair as Repair
 from mcz.editing.salvaging import write_whole
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.reading.file import File, file_of, reached
+from mcz.types import Target
 from mcz.writing.atomic import replacing, rereadable
 from mcz.writing.clip_writer import Progress
 
@@ -30,7 +31,7 @@ Content = set[tuple[object, ...]]
 
 def repair(
     source: Any,
-    target: Any,
+    target: Target,
     *,
     force: bool = False,
     max_decoded: int | None = None,
@@ -58,7 +59,7 @@ def repair(
         data.close()
 
 
-def _refuse_same(source: ByteSource, target: Any) -> None:
+def _refuse_same(source: ByteSource, target: Target) -> None:
     if isinstance(source.target, str) and isinstance(target, (str, os.PathLike)):
         with suppress(OSError):
             if Path(source.target).samefile(target):

@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from mcz.container import payloads
 from mcz.container.strict import check_path
@@ -24,7 +23,7 @@ from mcz.reading.file import File, open
 from mcz.reading.names import listed
 from mcz.reading.rate_notes import text_notes
 from mcz.reading.sharing import shared_out
-from mcz.types import Settings
+from mcz.types import Settings, Target
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 
@@ -32,7 +31,7 @@ NAMES = ("stored", "portable", "strict")  # what unpack does about names that ar
 
 
 def unpack(
-    target: Any,
+    target: Target,
     directory: str | os.PathLike[str],
     *,
     clips: Sequence[str] | None = None,
@@ -174,7 +173,7 @@ class _Writing:
     """
 
     def __init__(
-        self, target: Any, folder: Folder, force: bool, names: str, paths: Sequence[str]
+        self, target: Target, folder: Folder, force: bool, names: str, paths: Sequence[str]
     ) -> None:
         self._target, self._folder, self._force = target, folder, force
         self._names, self._notes, self._written = names, notes_on(paths), set[str]()

@@ -86,7 +86,7 @@ class Format:
 def _of(module: str, name: str) -> Callable[..., Any]:
     """The function of a format's module, which is imported when it is called."""
 
-    def call(*arguments: Any, **options: Any) -> Any:
+    def call(*arguments: object, **options: object) -> Any:
         return getattr(import_module(f"{__name__}.{module}"), name)(*arguments, **options)
 
     return call

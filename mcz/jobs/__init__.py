@@ -31,7 +31,7 @@ class Engine(Protocol):
     def jobs(self) -> int: ...
 
     def in_order(
-        self, function: Callable[[Any, Any], Any], items: Iterable[Any], state: Any
+        self, function: Callable[[Any, Any], Any], items: Iterable[Any], state: object
     ) -> Generator[Answer[Any] | None, None, None]: ...
 
 

@@ -36,7 +36,7 @@ ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
 class Pool:
     """``jobs`` processes that have ``state``; as a context it ends them, whatever they do."""
 
-    def __init__(self, jobs: int, state: Any = None) -> None:
+    def __init__(self, jobs: int, state: object = None) -> None:
         self.jobs = jobs
         self._first = pickle.dumps(
             (threads_each(jobs), pickle.dumps(state, pickle.HIGHEST_PROTOCOL))
@@ -178,7 +178,7 @@ def answers(
     function: Callable[[Any, Item], Result],
     items: Iterable[Item | None],
     jobs: int,
-    state: Any = None,
+    state: object = None,
 ) -> Iterator[Iterator[Answer[Result] | None]]:
     """``Pool.in_order`` of a pool for this alone, or of the engine in use."""
     other = engine()

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -163,7 +163,7 @@ class LiveReader:
     """
 
     def __init__(
-        self, stream: Any, lost: Lost, join: bool, rate: Fraction | None, *, post_filter: bool
+        self, stream: BinaryIO, lost: Lost, join: bool, rate: Fraction | None, *, post_filter: bool
     ) -> None:
         self.summary = StreamSummary()
         self.clip: LiveClip | None = None

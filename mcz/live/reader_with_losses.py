@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +85,7 @@ class _Open:
 class FramesWithLosses:
     """The frames of a stream that survives losses; ``clip`` is the one that the last is of."""
 
-    def __init__(self, stream: Any, lost: Lost, join: bool, summary: StreamSummary) -> None:
+    def __init__(self, stream: BinaryIO, lost: Lost, join: bool, summary: StreamSummary) -> None:
         self._walker = WalkerWithLosses(stream, self._frame_of, join=join)
         self._lost, self._summary = lost, summary
         self._joining = join  # until a frame has come whose number is known

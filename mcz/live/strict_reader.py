@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from typing import Any
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ Frame = tuple[int, Values, NDArray[np.bool_]]
 SHARED = (b"SKEL", b"MODL", b"SRCE")  # what clips refer to
 
 
-def live_frames(stream: Any) -> Iterator[Frame]:
+def live_frames(stream: BinaryIO) -> Iterator[Frame]:
     """The frames of the MCZ file that a binary stream gives, each as soon as its bytes are there.
 
     Yields the number of the frame in its clip, from 0, its values and which of them are valid, both
@@ -51,7 +51,7 @@ class StrictFrames:
     ``is_checked`` is True where a value hash was right.
     """
 
-    def __init__(self, stream: Any) -> None:
+    def __init__(self, stream: BinaryIO) -> None:
         self._walker = ArrivingWalker(stream)
         self.clip: LiveClip | None = None
         self.payload_bytes = 0

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import MappingProxyType, TracebackType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,7 +222,7 @@ class LiveWriter:
         if self._rate:
             traffic.seconds = float((self.n_frames + 1) / self._rate)
 
-    def change(self, /, **params: Any) -> None:
+    def change(self, /, **params: object) -> None:
         """Let parameters of the codec have other values from the next group of frames on.
 
         Raises OptionError for one that cannot change, or a bad value; nothing changes then.

@@ -218,7 +218,7 @@ def draw_runs(
     runs: Sequence[tuple[int, int]],
     color: str,
     label: str,
-    **options: Any,
+    **options: object,
 ) -> None:
     """A line through the points of each run of rows, none over the gaps between."""
     for start, stop in runs if len(runs) <= MOST_RUNS else [(0, len(points[0]))]:

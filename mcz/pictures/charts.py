@@ -108,7 +108,7 @@ def styled(axes: Any, theme: Theme, *, x: str = "", y: str = "", title: str = ""
     return axes
 
 
-def legend(axes: Any, theme: Theme, **options: Any) -> None:
+def legend(axes: Any, theme: Theme, **options: object) -> None:
     """The legend in the colors of the theme; its texts are no mathematics."""
     found = axes.legend(frameon=False, fontsize=8, labelcolor=theme.ink, **options)
     for text in found.get_texts():
@@ -124,7 +124,7 @@ def name_ticks(axes: Any, places: Any, names: Sequence[str], most: int) -> None:
     axes.grid(False, axis="y")
 
 
-def line(axes: Any, x: Floats, y: Floats, color: str, label: str = "", **options: Any) -> None:
+def line(axes: Any, x: Floats, y: Floats, color: str, label: str = "", **options: object) -> None:
     """A line of many points, of which those are drawn that are seen; breaks where y is NaN."""
     x, y = thinned(x, y)
     axes.plot(x, y, color=color, label=printable(label), **{"linewidth": 1.1} | options)

@@ -19,7 +19,7 @@ def library(name: str) -> Any:
     return import_extra(name, EXTRAS[top], package=PACKAGES.get(top, top), purpose="this picture")
 
 
-def new_figure(width: int, height: int, **options: Any) -> Any:
+def new_figure(width: int, height: int, **options: object) -> Any:
     """A matplotlib figure of so many pixels, apart from every global state of pyplot."""
     library("matplotlib")
     canvas = library("matplotlib.backends.backend_agg")

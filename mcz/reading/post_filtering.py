@@ -153,7 +153,7 @@ def _with_places(
     return replace(motion, signals=(signal, *motion.signals[1:]))
 
 
-def _check_markers(name: str, skeleton: Skeleton, own: Any) -> None:
+def _check_markers(name: str, skeleton: Skeleton, own: object) -> None:
     """Raise MotionError for a motion that has other joints than markers, or channels of its own."""
     if own is not None or point_set(skeleton) != "markers":
         raise MotionError(

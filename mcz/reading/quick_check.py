@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from mcz.brief import brief
 from mcz.container.checksums import Checked, check_checksums
 from mcz.container.source import ByteSource
 from mcz.errors import MczError
 from mcz.reading.file import open, reached
+from mcz.types import Target
 
 HEADINGS = tuple(
     "HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL META REPT COPY RECV INDX".split()
@@ -39,7 +39,7 @@ def heading(source: ByteSource, offset: int) -> str:
 
 
 def quick_check(
-    target: Any, progress: Callable[[int, int], object] | None = None
+    target: Target, progress: Callable[[int, int], object] | None = None
 ) -> tuple[Checked, list[Problem]]:
     """Check every checksum of a file and its index; what was seen, and the faults.
 

@@ -6,7 +6,6 @@ Everything that ``mcz info`` and ``mcz verify`` print is computed here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 from mcz.clock import time_facts
 from mcz.codecs.basis_models import name_of
@@ -40,7 +39,7 @@ from mcz.reading.sharing import shared_out
 from mcz.reading.signal_info import SignalInfo, read_segments
 from mcz.reading.sizes import Sizes, clip_sizes, file_parts, models_used
 from mcz.schema import parse
-from mcz.types import JsonObject
+from mcz.types import JsonObject, Target
 
 Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a file
 
@@ -282,7 +281,7 @@ def structure_problems(file: File) -> list[Problem]:
 
 
 def verify(
-    target: Any,
+    target: Target,
     max_decoded: int | None = None,
     threads: int | None = None,
     where: Where | None = None,

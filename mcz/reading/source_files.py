@@ -71,7 +71,7 @@ def read_source(
     return replace(motion, source=replace(motion.source, path=path.name))
 
 
-def _named(path: Path, reader: Any, data: bytes, *arguments: Any) -> Any:
+def _named(path: Path, reader: Any, data: bytes, *arguments: object) -> Any:
     """What ``reader`` makes of ``data``; its errors say which file."""
     if not data:
         raise SourceError("the file is empty", path=path)

@@ -8,7 +8,6 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
 
 from mcz.brief import brief
 from mcz.codecs import by_name, chosen
@@ -17,7 +16,7 @@ from mcz.hints import Hint, with_hint
 from mcz.metrics.document import difference
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
-from mcz.types import JsonObject, Params
+from mcz.types import JsonObject, Params, Target
 from mcz.viewing.page import Page
 from mcz.viewing.shelf import FACTS, Shelf, Shelved
 from mcz.viewing.tables import deflated, tables_for
@@ -72,7 +71,7 @@ class PageWritten:
 def write_page(
     page: Page,
     shelf: Shelf,
-    target: Any,
+    target: Target,
     wanted: Wanted,
     *,
     most: int = MOST_BYTES,

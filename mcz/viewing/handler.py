@@ -240,5 +240,5 @@ class Handler(BaseHTTPRequestHandler):
     def version_string(self) -> str:
         return "mcz"
 
-    def log_message(self, format: str, *args: Any) -> None:
+    def log_message(self, format: str, *args: object) -> None:
         """Nothing: who asks for what is nobody's business."""

@@ -11,7 +11,6 @@ import warnings
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from mcz.codecs import by_name, chosen
 from mcz.container.limits import ARCHIVE, BASE, Profile
@@ -20,7 +19,7 @@ from mcz.errors import OptionError, SkeletonWarning
 from mcz.formats import is_table
 from mcz.motion import Motion
 from mcz.threads import limited
-from mcz.types import JsonObject, Params
+from mcz.types import JsonObject, Params, Target
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -36,7 +35,7 @@ SHORT = 65536  # bytes of a source file whose skeleton and texts are a large par
 
 def write(
     motion: Motion,
-    target: Any,
+    target: Target,
     codec: str | None = None,
     *,
     effort: str | None = None,
@@ -45,7 +44,7 @@ def write(
     copies: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
-    **params: Any,
+    **params: object,
 ) -> Written:
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
@@ -77,7 +76,7 @@ def profile_of(archive: bool) -> Profile:
 
 def encode(
     source: str | os.PathLike[str],
-    target: Any,
+    target: Target,
     *,
     codec: str | None = None,
     effort: str | None = None,

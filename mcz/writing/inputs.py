@@ -13,7 +13,7 @@ from mcz.errors import OptionError
 LOCAL = ("file", "local")  # protocols of fsspec whose files are those of this machine
 
 
-def refuse_inputs(target: Any, inputs: Iterable[Any]) -> None:
+def refuse_inputs(target: object, inputs: Iterable[object]) -> None:
     """Raise OptionError where ``target`` is one of ``inputs``, by its file and not by its name.
 
     Each is a path, an fsspec target, a stream or anything else, which is no file. Links of both

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mcz.motion import Motion
 from mcz.tables.files import table_of
 from mcz.tables.files import to_npz as npz_of
+from mcz.types import Target
 from mcz.writing.atomic import replacing
 
 
-def to_npz(motion: Motion, target: Any, *, force: bool = False) -> None:
+def to_npz(motion: Motion, target: Target, *, force: bool = False) -> None:
     """Write channels, skeleton, rotations and positions of ``motion`` as an NPZ without pickles.
 
     docs/tables.md lists the arrays; "about" in the file says in words how they hang together.

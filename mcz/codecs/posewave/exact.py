@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ Stream = Callable[[int, int, int], bytes]  # (segment, resolution, group)
 OPTION = "lossless"
 
 
-def joint_words(text: Any) -> tuple[str, ...]:
+def joint_words(text: object) -> tuple[str, ...]:
     """Names of joints or groups of joints; raises OptionError.
 
     >>> joint_words("lfoot, hands")

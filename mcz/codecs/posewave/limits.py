@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 from mcz.errors import OptionError
 from mcz.units import UNIT_CM
@@ -11,7 +10,7 @@ from mcz.units import UNIT_CM
 _ENTRY = re.compile(r"(?P<name>.+)=(?P<number>[0-9.e+-]+) ?(?P<unit>[a-z]+)")
 
 
-def joint_limits(text: Any) -> tuple[tuple[str, float], ...]:
+def joint_limits(text: object) -> tuple[tuple[str, float], ...]:
     """Joints or groups, and their limits in cm; raises OptionError.
 
     >>> joint_limits("feet=0.5mm, lhand=2cm")

@@ -48,7 +48,7 @@ def read_heads(
     heads: list[tuple[int, Any, bytes]] = []
     at = 0
     for channel, grid in enumerate(grids):
-        found: Any
+        found: object
         start = at
         kind, at = _byte(stream, at)
         if kind & 3 == CODED:
