@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     )
     from mcz.formats.body_models import offsets_from_positions, offsets_of_model
     from mcz.formats.body_trees import body_skeleton
+    from mcz.hints import Hint
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
     from mcz.kinematics.rest import rest_positions
@@ -124,6 +125,7 @@ _HOMES = {
     "mcz.editing.recovering": ("Recovery",),
     "mcz.editing.repair": ("Repair", "repair"),
     "mcz.editing.replacing": ("Replacement", "replace"),
+    "mcz.hints": ("Hint",),
     "mcz.errors": (
         "AccessError",
         "ChecksumError",
@@ -206,6 +208,7 @@ __all__ = [
     "Fit",
     "ForcePlatform",
     "FormatError",
+    "Hint",
     "Joint",
     "LimitError",
     "LiveFrame",

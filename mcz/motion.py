@@ -114,7 +114,7 @@ class Motion:
     def __post_init__(self) -> None:
         check_fields(self, MOTION)
         if not self.signals:
-            raise MotionError(f"motion {self.name!r} has no signal")
+            raise MotionError("it has no signal", clip=self.name)
         for signal in self.signals:
             if signal.channels is None and signal.n_channels != self.skeleton.n_channels:
                 raise MotionError(

@@ -56,7 +56,7 @@ def check_bag(
     """
     found = BagCheck(Path(folder))
     if not is_bag(folder):
-        raise OptionError(f"{folder} is no bag: it has no {DECLARATION}")
+        raise OptionError(f"it is no bag: it has no {DECLARATION}", path=folder)
     try:
         _Check(found, progress).run()
     except OSError as error:

@@ -52,7 +52,7 @@ def bag(
     target, paths = Path(folder), [Path(file) for file in files]
     lines = _info_lines(dict(info or {}), software)
     if os.path.lexists(target):
-        raise ExistsError(f"{target} exists; a bag is a new folder")
+        raise ExistsError("it exists; a bag is a new folder", path=target)
     _check(paths)
     try:
         temporary = Path(
@@ -66,7 +66,7 @@ def bag(
         os.umask(umask)
         temporary.chmod(0o777 & ~umask)  # mkdtemp made it private
         if os.path.lexists(target):
-            raise ExistsError(f"{target} exists; a bag is a new folder")
+            raise ExistsError("it exists; a bag is a new folder", path=target)
         temporary.rename(target)
     except BaseException as error:
         with suppress(OSError):

@@ -131,5 +131,5 @@ def skeleton_in(path: str) -> Any:
     elif lower.endswith(".bvh"):
         found = mcz.read(path).skeleton
     else:
-        raise OptionError(f"{path}: a skeleton is in a .bvh, .asf or .mcz file")
+        raise OptionError("a skeleton is in a .bvh, .asf or .mcz file", path=path)
     return replace(found, source=None, base=None)

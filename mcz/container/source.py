@@ -93,7 +93,7 @@ class ByteSource:
         if self._process != os.getpid():
             self._forked()
         if getattr(self._stream, "closed", False):
-            raise OptionError(f"{self.name} is closed")
+            raise OptionError("it is closed", path=self.name)
         data = self._read_stream(offset, size)
         self.n_requests += 1
         self.n_bytes += size
@@ -152,7 +152,7 @@ class ByteSource:
     def __reduce__(self) -> tuple[object, ...]:
         if self.target is None:
             raise OptionError(
-                f"{self.name} was opened as a stream and cannot be pickled; open a path"
+                "it was opened as a stream and cannot be pickled; open a path", path=self.name
             )
         return open_source, (self.target,)
 

@@ -132,7 +132,7 @@ def extract(
         names = [clip] if isinstance(clip, str) else clip
         clips = file.chosen(names, where)
         if not clips:
-            raise OptionError(f"{file.name} has no clip to extract from")
+            raise OptionError("it has no clip to extract from", path=file.name)
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
         for cut in cuts:
             if cut.anew:

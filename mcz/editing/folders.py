@@ -142,4 +142,4 @@ def _relative(path: Path, root: str | os.PathLike[str]) -> str:
     try:
         return path.resolve().relative_to(Path(root).resolve()).as_posix()
     except ValueError:
-        raise OptionError(f"{path} does not lie below {root}") from None
+        raise OptionError(f"it does not lie below {root}", path=path) from None

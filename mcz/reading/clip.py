@@ -115,14 +115,14 @@ class Clip(StoredClip, Posed):
 
     def _info(self, signal: int) -> SignalInfo:
         if not 0 <= signal < len(self.signals):
-            raise OptionError(f"clip {self.name!r} has {len(self.signals)} signals, not {signal}")
+            raise OptionError(f"it has {len(self.signals)} signals, not {signal}", clip=self.name)
         return self.signals[signal]
 
     def _check_resolution(self, info: SignalInfo, resolution: int) -> None:
         if not 0 <= resolution < info.counts.n_resolutions:
             raise OptionError(
-                f"clip {self.name!r} has resolutions 0 to {info.counts.n_resolutions - 1}, "
-                f"not {resolution}"
+                f"it has resolutions 0 to {info.counts.n_resolutions - 1}, not {resolution}",
+                clip=self.name,
             )
 
     def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
@@ -141,8 +141,9 @@ class Clip(StoredClip, Posed):
         stored, found = self.value_hashes[info.index], value_hash(values, mask)
         if found != stored:  # CEND-05
             raise ChecksumError(
-                f"clip {self.name!r}, signal {info.index}: value hash is {found.hex()}, "
-                f"stored is {stored.hex()}"
+                f"value hash is {found.hex()}, stored is {stored.hex()}",
+                clip=self.name,
+                where=f"signal {info.index}",
             )
 
     def motion(

@@ -231,7 +231,9 @@ class File:
             return self.clips[name]
         if len(self.clips) != 1:
             names = listed(self.clips)
-            raise OptionError(f"{self.name} has {len(self.clips)} clips, choose one: {names}")
+            raise OptionError(
+                f"it has {len(self.clips)} clips, choose one: {names}", path=self.name
+            )
         return next(iter(self.clips.values()))
 
     def clips_called(self, names: Iterable[str]) -> list[Clip]:

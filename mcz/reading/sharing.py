@@ -47,7 +47,9 @@ def _checked(
 ) -> Result:
     file, size, said = state
     if file.size != size:
-        raise FormatError(f"{file.name} has changed meanwhile: {file.size} bytes, before {size}")
+        raise FormatError(
+            f"it has changed meanwhile: {file.size} bytes, before {size}", path=file.name
+        )
     return function((file, said), item)
 
 

@@ -99,7 +99,7 @@ class StoredClip:
         """The signals, the motion first."""
         fields = self._fields
         if not fields.signals:  # CLIP-05
-            raise FormatError(f"clip {self.name!r} has no signal")
+            raise FormatError("it has no signal", clip=self.name)
         skeleton, rate = self.skeleton, self.frame_rate
         return tuple(
             read_signal(self.container, self._row, fields, index, skeleton, rate)
@@ -134,7 +134,7 @@ class StoredClip:
             raise OptionError(f"frames {frames!r}: not two integers, first and end") from None
         if not 0 <= start <= stop <= self.n_frames:
             raise OptionError(
-                f"clip {self.name!r} has frames 0 to {self.n_frames}, not {start}:{stop}"
+                f"it has frames 0 to {self.n_frames}, not {start}:{stop}", clip=self.name
             )
         return start, stop
 
@@ -213,7 +213,7 @@ class StoredClip:
     def value_hashes(self) -> tuple[bytes, ...]:
         """The SHA-256 of the values and the mask of every signal, as the file states them."""
         if self._cend is None:  # of a damaged file
-            raise FormatError(f"clip {self.name!r} has no CEND")
+            raise FormatError("it has no CEND", clip=self.name)
         hashes = tuple(bytes(each) for each in self._cend.value_sha256)
         if len(hashes) != len(self.signals):  # CEND-02
             raise FormatError(

@@ -101,7 +101,9 @@ def test_nothing_is_overwritten(folder: Path, call: Call) -> None:
     (folder / "x.trc").write_bytes(b"mine")
     words = ("convert", folder / "walk.c3d", folder / "x.trc")
     code, _, err = call(*words)
-    assert code == 2 and "exists; use --force" in err and (folder / "x.trc").read_bytes() == b"mine"
+    assert (
+        code == 2 and "it exists; use --force" in err and (folder / "x.trc").read_bytes() == b"mine"
+    )
     assert call(*words, "--force")[0] == 0 and (folder / "x.trc").read_bytes() != b"mine"
     data = (folder / "walk.bvh").read_bytes()
     code, _, err = call("convert", folder / "walk.bvh", folder / "walk.bvh", "--force")

@@ -114,9 +114,9 @@ def test_unknown_units_have_steps_in_their_own() -> None:
     motion = smooth(60)
     motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=None))
     assert np.isfinite(decoded(NAME, motion, step=0.05)).all()
-    with pytest.raises(mcz.OptionError, match="--unit"):
+    with pytest.raises(mcz.OptionError, match="give the unit"):
         saved(NAME, motion, mean_error_cm=0.1)
-    with pytest.raises(mcz.OptionError, match="preset promises .*--unit says it, or give step"):
+    with pytest.raises(mcz.OptionError, match="promises .*without which step is to be given"):
         saved(NAME, motion)
 
 

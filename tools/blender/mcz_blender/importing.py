@@ -152,8 +152,8 @@ def bring(
                 for note in notes:
                     operator.report({"WARNING"}, mcz_line(note))
     except mcz.MczError as error:
-        name, text = Path(path).name, str(error)
-        operator.report({"ERROR"}, mcz_line(text if name in text else f"{name}: {text}"))
+        error.add(path=Path(path).name)
+        operator.report({"ERROR"}, mcz_line(str(error)))
         return {"FINISHED"} if made else {"CANCELLED"}
     finally:
         manager.progress_end()
