@@ -23,7 +23,7 @@ from mcz.transforms.wavelets import IDS, WAVELETS
 from tools import registry
 
 LIMITS = {
-    "channels": "channels of a signal",
+    "channels": "channels of a signal, and of a skeleton",
     "joints": "joints of a skeleton",
     "segment_bytes": "decoded bytes of a segment (8 a value)",
     "model_bytes": "bytes of the payloads of all MODL chunks, repeated ones too",

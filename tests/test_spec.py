@@ -169,7 +169,7 @@ def test_ids_end_their_sentences_and_lines_are_short() -> None:
 
 def test_contents_lead_to_all_sections() -> None:
     listed, rest = TEXT.split("<!-- contents -->\n")[1].split("<!-- end of contents -->\n")
-    links = re.findall(r"\[(.+)\]\(#(.+)\)", listed)
+    links = re.findall(r"\[(.+?)\]\(#(.+?)\)", listed)
     prose = "".join(rest.split("```")[::2])
     assert [heading for heading, _ in links] == re.findall(r"^##? (.+)$", prose, re.M)
     assert len({anchor for _, anchor in links}) == len(links)

@@ -143,14 +143,25 @@ def table(structure: Any) -> str:
 
 
 def contents(text: str) -> str:
-    """A list of links to the parts and sections of ``text``."""
-    lines = []
+    """Links to the parts of ``text``, each with a paragraph of links to its sections."""
+    blocks: list[list[str]] = [[]]
     for marks, heading in HEADING.findall(re.sub(r"(?ms)^```.*?^```$", "", text)):
+        link = f"[{heading}](#{anchor(heading)})"
         if len(marks) == 1:
-            lines += ["", f"**[{heading}](#{anchor(heading)})**", ""]
+            blocks += [[f"**{link}**"], []]
         else:
-            lines.append(f"- [{heading}](#{anchor(heading)})")
-    return "\n".join(lines).strip() + "\n"
+            blocks[-1].append(link)
+    return "\n".join("\n" + _wrapped(block) for block in blocks if block).strip() + "\n"
+
+
+def _wrapped(links: list[str]) -> str:
+    """The links as a paragraph; none is broken over two lines."""
+    lines = [""]
+    for link in links:
+        if lines[-1] and len(lines[-1]) + len(link) > 106:
+            lines.append("")
+        lines[-1] += f"{' · ' if lines[-1] else ''}{link}"
+    return " ·\n".join(lines)
 
 
 def anchor(heading: str) -> str:

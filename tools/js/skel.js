@@ -110,6 +110,7 @@ function readJoints(reader, limits) {
     const joint = readJoint(reader, index, firstColumn);
     joints.push(joint);
     firstColumn += joint.channels.length;
+    within(firstColumn, limits.channels, "channels of a skeleton");
   }
   return joints;
 }
