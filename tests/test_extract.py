@@ -368,17 +368,6 @@ def test_an_open_clip_is_closed() -> None:
     assert clip_fields_of(part).flags == 0
 
 
-def test_open_data_is_cut_and_closed() -> None:
-    out = io.BytesIO()
-    writer = _Live(out)
-    write_clip(writer, rich(), codecs.by_name("raw"), {"segment_frames": 5})
-    writer.finish()
-    part = extracted(out.getvalue(), frames=(11, 30))
-    check(out.getvalue(), part, 11, 30, None, 0)
-    with mcz.open(part) as file:
-        assert not any(row.packet for row in file.container.directory.clips["smooth"].segments)
-
-
 class _Live(Writer):
     """Every clip in one open DATA, behind an ancillary chunk."""
 
@@ -432,25 +421,6 @@ def test_quality_says_what_was_cut() -> None:
     assert again == found | {"cut-frames": "13:15", "cut-joints": "knee"}
     assert quality(extracted(part, clip="smooth")) == found
     assert quality(extracted(written(rich()), frames=(1, 2))) == {"cut-frames": "1:2"}
-
-
-def test_a_quality_record_that_makes_no_sense() -> None:
-    parts = parts_of(extracted(written(rich()), frames=(1, 9)))
-    which = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"QUAL")
-    entries = [{"key": "cut-frames", "value": "one"}]
-    payload = built(payloads.Qual, {"entries": entries, "extension": b"more"}, "QUAL")
-    data = joined(replaced(parts, which, payload))
-    assert quality(extracted(data, frames=(1, 2))) == {"cut-frames": "1:2"}
-    cut = parts_of(extracted(data, joints=["hips"]))
-    assert next(p for c, p in cut if c.type == b"QUAL").endswith(b"more")
-
-
-def test_notes_of_joint_cuts() -> None:
-    whole = written(replace(rich(), metadata={"skeleton-note": "flat"}))
-    part = extracted(whole, joints=["hips", "spine"])
-    with mcz.open(extracted(part, joints=["hips"])) as file:
-        metadata = file.clips["smooth"].metadata
-        assert metadata["skeleton-note"] == "flat; the channels of other joints were cut"
 
 
 @pytest.mark.parametrize("suffix", ["amc", "bvh", "c3d"])
@@ -601,17 +571,6 @@ def test_files_at_a_resolution(samples: Path, tmp_path: Path, suffix: str) -> No
         elif step == 2:
             assert back.frame_numbers is not None
             assert list(back.frame_numbers[:3]) == [1, 3, 5]
-
-
-def test_sources_of_a_coarser_clip(samples: Path, tmp_path: Path) -> None:
-    motion = mcz.read(samples / "walk.bvh")
-    mcz.write(motion, tmp_path / "a.mcz", "overlap", length=20)
-    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", resolution=1)
-    with mcz.open(tmp_path / "a.mcz") as old, mcz.open(tmp_path / "b.mcz") as new:
-        wanted = old.clips["walk"].source_bytes(resolution=1)
-        assert new.clips["walk"].source_bytes() == wanted
-        assert new.clips["walk"].source is not None
-        assert new.clips["walk"].source.size == len(wanted)
 
 
 # Hostile

@@ -162,12 +162,6 @@ def test_several_samples_are_no_poses(name: str) -> None:
     assert "positions" not in table
 
 
-@pytest.mark.parametrize("make", [mcz.Joint, lambda name: mcz.Channel("", name, "V")])
-def test_names_are_whole_characters(make: Callable[[str], object]) -> None:
-    with pytest.raises(mcz.MotionError, match="not text that UTF-8 can hold"):
-        make("a\ud800")
-
-
 def test_tables_without_frames_have_their_columns() -> None:
     motion = smooth(5)
     for what in ("positions", "channels", "quat"):

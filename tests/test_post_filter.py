@@ -22,7 +22,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.motion import Channel, Motion, Signal
 from mcz.reading.post_filtering import filtered_motion, filtered_part, live_filter
 from mcz.sample import acclaim_walk, marker_walk
-from mcz.transforms.post_filter import CUTOFFS, DELAY, RING, SCALE, PostFilter, filter_rows
+from mcz.transforms.post_filter import CUTOFFS, DELAY, SCALE, PostFilter, filter_rows
 from mcz.transforms.post_filter import filter_taps as taps_of
 from tools import make_vectors
 from tools.vectors.valid import filtered as filtered_vectors
@@ -90,14 +90,6 @@ def test_row_by_row_is_the_same(
     assert same(streamed(stream, rows), filter_rows(rows, *settings))
     more = np.resize(more, (len(more), rows.shape[1])) if more.size else rows[:3]
     assert same(streamed(stream, more), filter_rows(more, *settings))  # it is as new
-
-
-def test_long_streams() -> None:
-    noise = np.random.default_rng(5)
-    rows = np.rint(np.cumsum(noise.normal(size=(3 * RING + 77, 3)), axis=0))
-    rows[noise.random(rows.shape) < 0.01] = np.nan
-    meant = filter_rows(rows, 120.0, 0.1)
-    assert same(streamed(PostFilter(3, 120.0, 0.1), rows), meant)
 
 
 @given(
@@ -210,21 +202,6 @@ def test_motions() -> None:
     assert not np.array_equal(signal.values, first.values)
     again = mcz.post_filter(made)
     assert again.metadata["source-note"].count("post-filtered") == 2
-
-
-def test_two_rows_a_frame() -> None:
-    motion = walk()
-    first = motion.signals[0].cut(0, 40)
-    short = replace(motion, signals=(replace(first, samples_per_frame=2),), frame_numbers=None)
-    meant = plain_rows(first.masked(), 240.0, motion.skeleton.unit_cm)
-    assert same(mcz.post_filter(short).signals[0].masked(), meant)
-
-
-def test_integers_become_numbers() -> None:
-    motion = walk()
-    values = np.rint(motion.signals[0].values).astype(np.int64)
-    made = mcz.post_filter(replace(motion, signals=(Signal(values),), frame_numbers=None))
-    assert same(made.values, plain_rows(values.astype(float), 120.0, motion.skeleton.unit_cm))
 
 
 def test_what_cannot_be_filtered() -> None:

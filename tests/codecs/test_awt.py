@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -75,14 +74,6 @@ def test_annealing_is_deterministic_and_needs_its_seed() -> None:
     assert saved("awt", motion, seed=3) == saved("awt", motion, seed=3)
 
 
-def test_without_iterations_channels_keep_as_many() -> None:
-    motion = wandering(300, ["tx", "rx", "ry", "rz"])
-    found, _ = chosen(motion, 30, iterations=0)
-    assert found.counts.tolist() == [30] * 4 and found.after == found.before
-    found, _ = chosen(motion, 30.5, iterations=0)
-    assert sorted(found.counts.tolist()) == [30, 30, 31, 31]
-
-
 # What is coded
 
 
@@ -103,12 +94,3 @@ def test_presets() -> None:
     assert len(published.segments) == 1
     default = parse(WaveletHeader, Direct("awt", smooth(400)).header, "header")
     assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
-
-
-def test_long_clips_are_analyzed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    source = source_of(wandering(700, ["tx", "rx"]))
-    transform = transform_of(source.layout, "db3", 4)
-    whole = choice.coefficients_of("awt", source, transform)
-    monkeypatch.setattr(choice, "BLOCK_FRAMES", 100)
-    for a, b in zip(whole, choice.coefficients_of("awt", source, transform), strict=True):
-        np.testing.assert_array_equal(a, b)

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import pywt
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -26,7 +25,6 @@ from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS, Motion
 from mcz.schema import build, parse
 from mcz.transforms import wavelets
-from mcz.transforms.dwt import own_range
 from tests.codecs import lossy
 from tests.codecs.lossy import bones, clip_of, gapped, wandering
 from tests.formats.c3d_files import INTEL, SGI, made
@@ -54,28 +52,6 @@ class Direct(lossy.Direct):
     def __init__(self, motion: Motion, **params: Any) -> None:
         super().__init__("mrdwt", motion, **params)
         self.fields = parse(WaveletHeader, self.header, "header")
-
-    def coefficients(self, channel: int) -> list[Array]:
-        """All bands of a channel, the coarsest first, put together from the streams."""
-        levels, fields = self.fields.levels, self.fields
-        wavelet = wavelets.by_id(fields.wavelet) if fields.wavelet else None
-        assert wavelet is not None
-        coding = streams.Coding("mrdwt", fields.decimals == 255, fields.least, wavelet.n_taps // 2)
-        coding = replace(coding, shift=(wavelet.n_taps - 2) // 2)
-        lengths = wavelet.lengths(fields.coded_frames, levels)
-        whole: list[list[Array]] = [[] for _ in range(levels + 1)]
-        for index, span in enumerate(self.spans):
-            places = [levels, *range(levels, 0, -1)]
-            owns = [own_range(span.first, span.stop, level, lengths) for level in places]
-            counts = [b - a for a, b in owns]
-            bands, step = streams.parse_streams(
-                lambda band, at=index: self.stream(at, band, channel), counts, counts, coding
-            )
-            size = 10.0**-fields.decimals if not coding.scaled else fields.unit * ratio_of(step)
-            for place, band in enumerate(bands):
-                inward = np.sign(band) / 16 if place and coding.scaled else 0
-                whole[place].append((band - inward) * size)
-        return [np.concatenate(parts) for parts in whole]
 
 
 @cache
@@ -193,21 +169,6 @@ def test_a_long_clip_is_cut_into_segments_by_size() -> None:
 
 
 # Resolutions
-
-
-def test_decoded_values_are_those_of_pywavelets() -> None:
-    motion = wandering(173, ["tx", "rx", "ry"])
-    for settings in ({"preset": "khan2016", "T_g": 2.0}, {"wavelet": "db4"}, {"Q": 2}):
-        coded = Direct(motion, **settings, segment_frames=48)
-        name = next(n for n, id_ in wavelets.IDS.items() if id_ == coded.fields.wavelet)
-        for resolution in range(coded.layout.n_resolutions):
-            found = coded.read(resolution=resolution)
-            for channel in range(3):
-                bands = coded.coefficients(channel)
-                for finest in range(resolution):
-                    bands[-1 - finest] = np.zeros_like(bands[-1 - finest])
-                meant = pywt.waverec(bands, name, mode="symmetric")[:173]
-                np.testing.assert_allclose(found[:, channel], meant, rtol=0, atol=1e-9)
 
 
 @given(FRAMES, KINDS, NAMES, st.integers(0, 5), st.integers(1, 90), st.data())
@@ -343,16 +304,6 @@ def test_thresholds_by_depth() -> None:
 
 
 # Hostile bytes
-
-
-def test_random_streams_of_many_coefficients() -> None:
-    """The greatest integers that bits can spell, summed by every predictor."""
-    coded = Direct(clip_of(np.cumsum(np.ones((4000, 1)), axis=0)), T_g=1.0, segment_frames=4000)
-    random = np.random.default_rng(5)
-    with memory_below(MEMORY):
-        for form in range(256):
-            data = bytes([form, 128, 2]) + random.integers(0, 256, 200, "u1").tobytes()
-            outcome(coded, **coded.with_stream((0, 0, 0), data))
 
 
 def test_the_greatest_that_a_header_allows_is_finite() -> None:

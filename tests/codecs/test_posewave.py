@@ -18,11 +18,9 @@ from tests.codecs.lossy import (
     Array,
     Direct,
     amc,
-    bones,
     bytes_of,
     clip_of,
     decoded,
-    markers,
     saved,
     wandering,
 )
@@ -80,11 +78,6 @@ def test_channels_that_stand_still_cost_nothing() -> None:
     signals = [(Signal(v),) for v in (still, one)]
     sizes = [Direct(NAME, replace(motion, signals=s), step=0.05).n_bytes for s in signals]
     assert sizes[0] < 60 and sizes[1] < 1500
-
-
-def test_markers_are_points_of_their_own() -> None:
-    motion = markers(300, 20)
-    assert mean_error_cm(motion, decoded(NAME, motion, step=0.05)) < 0.2  # a mean of 20 points
 
 
 @pytest.mark.parametrize("angle_unit", ["deg", "rad", ""])
@@ -156,14 +149,6 @@ def test_text_of_many_grids() -> None:
         found = file.only_clip().motion()
     assert not len(found.signals[0].exceptions)
     assert not np.isin([1e-9], found.values).any()
-
-
-def test_a_skeleton_of_no_extent() -> None:
-    skeleton = bones(["rx", "ry"])
-    joints = tuple(replace(joint, offset=(0.0, 0.0, 0.0)) for joint in skeleton.joints)
-    motion = wandering(50, ["rx", "ry"], 1)
-    motion = replace(motion, skeleton=replace(skeleton, joints=joints))
-    assert np.isfinite(decoded(NAME, motion, step=0.1)).all()
 
 
 @pytest.mark.real

@@ -16,7 +16,6 @@ from mcz.bench import plots
 from mcz.bench.cases import Case
 from mcz.cli.common import run as run_command
 from mcz.codecs import by_name
-from mcz.codecs.online.units import Unit
 from mcz.errors import OptionError
 from tests.papers.walks import put_walk
 from tools import fit_bit_allocation
@@ -41,14 +40,10 @@ from tools.papers.kwak.clips import (
     find_clips,
     motion_in_positions,
 )
-from tools.papers.kwak.coder import indices_of, rice_bits
 from tools.papers.kwak.fit import Point
 from tools.papers.kwak.losses import INTRA, LTR, STR, received, regardless
 from tools.papers.kwak.measure import (
-    code,
     errors,
-    group_bytes,
-    rate_point,
     rates,
 )
 from tools.papers.kwak.tasks import (
@@ -118,19 +113,6 @@ def test_rates_are_held_or_searched_for(clip: Clip) -> None:
     assert held["framed_kbps"] > held["kbps"]
 
 
-def test_rates_are_those_of_units(clip: Clip) -> None:
-    motion = motion_in_positions(clip)
-    found = code(motion, {"step": 0.2})
-    point = rate_point(motion, {"step": 0.2})
-    size = sum(len(unit.data) for unit in found.units)
-    assert point["kbps"] == pytest.approx(size * 8 / motion.n_frames * 120 / 1000)
-    assert point["framed_kbps"] == pytest.approx(
-        found.stream_bytes * 8 / motion.n_frames * 120 / 1000
-    )
-    assert point["sqnr"] == pytest.approx(errors(motion, found.values)[0])
-    assert point["sqnr_filtered"] != point["sqnr"]
-
-
 def test_errors_are_those_of_valid_places() -> None:
     source = np.array([[3.0, 0, 0, 9, 9, 9], [0, 4, 0, 8, 8, 8]])
     mask = np.array([[True] * 3 + [False] * 3, [True] * 3 + [False] * 3])
@@ -142,28 +124,6 @@ def test_errors_are_those_of_valid_places() -> None:
     sqnr, cm = errors(motion, source + np.array([[0, 0, 0.5, 100, 0, 0], [0, 0, 0, 0, 7, 0]]))
     assert sqnr == pytest.approx(10 * np.log10(25 / 0.25))
     assert cm == pytest.approx(0.1 * 0.25)
-
-
-def test_bytes_of_whole_groups_alone_count() -> None:
-    units = [
-        *(Unit(2, 30, b"a" * 7), Unit(1, 20, b"b" * 5), Unit(0, 10, b"c" * 4)),
-        Unit(1, 3, b"d"),
-    ]
-    assert group_bytes(units, 30) == [7, 9]
-
-
-# Coders
-
-
-def test_indices_come_back(clip: Clip) -> None:
-    motion = motion_in_positions(clip)
-    for options in ({"preset": "mod", "step": 0.5}, {"ltr_step": 1.0, "step": 0.5}):
-        found = code(motion, options)
-        indices, starts, kinds = indices_of(found)
-        assert indices.shape == (motion.n_frames, int(starts[-1]))
-        assert kinds[0] == INTRA and kinds[1] == STR
-        # Coded again, they take as many bits as the signs at least.
-        assert rice_bits(found, motion) > np.count_nonzero(indices)
 
 
 # Losses
@@ -196,26 +156,6 @@ def test_a_live_decoder_goes_on_where_it_can(clip: Clip) -> None:
 
 
 # Fits
-
-
-def test_a_line_without_outliers() -> None:
-    points = [Point("a", 30, 5.0, 10.0, 2.0**x, 0.25 * x - 1.5) for x in range(100)]
-    points[50] = replace(points[50], g=1e3)
-    found = fit.fit(points)
-    assert (found.a, found.b) == (pytest.approx(0.25), pytest.approx(-1.5))
-    assert (found.n_points, found.n_outliers) == (99, 1)
-    assert found.residual == pytest.approx(0, abs=1e-9)
-
-
-def test_g_follows_from_the_best_ratio(clip: Clip) -> None:
-    motion = motion_in_positions(clip)
-    (point,) = fit.points_of(motion, (30,), (5.0,), (5.0, 20.0))
-    assert point.alpha in (5.0, 20.0)
-    bits = 5000 * 30 / 120 / (motion.values.shape[1] * (point.alpha + 29))
-    expected = (point.alpha - 1) * bits - 0.5 * np.log2(point.ratio)
-    assert point.g == pytest.approx(expected)
-    start = replace(motion, signals=(motion.signals[0].cut(0, 60),))
-    assert len(fit.curve_of(start, {"preset": "rc"}, (3.0, 9.0))) == 2
 
 
 def test_the_tool_fits_the_papers_training_clips(

@@ -60,7 +60,7 @@ def command(
         jobs or os.cpu_count() or 1, Cache(default_folder() if cache else None, CODE), KINDS
     )
     outcome = Outcome()
-    with Progress() as progress, about(clips[0], *clips):
+    with Progress() as progress, about(clips[0]):
         runner.progress = progress
         for name in PAPERS if paper == "all" else (paper,):
             PAPERS[name](outcome, clips, unit, runner)
