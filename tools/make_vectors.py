@@ -1,6 +1,6 @@
 """Write conformance/vectors and conformance/manifest.json; nothing else ever does.
 
-    python tools/make_vectors.py [--check]
+    python tools/make_vectors.py [--check] [TABLE ...]
 
 The same code and the same zlib give the same bytes: there are no clocks and no dice. ``--check``
 writes nothing and says whether all files are as they would be written. Vectors of a released
@@ -9,6 +9,7 @@ format are frozen (SPEC.md, "Versions").
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import sys
@@ -25,6 +26,8 @@ from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR  # noqa: E402 - ne
 from tools.vectors import invalid, uncommon, valid  # noqa: E402 - needs the path
 from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402
 from tools.vectors.contents import codecs_of, formats_of, since  # noqa: E402
+from tools.vectors.engine.tables import Row, tables  # noqa: E402
+from tools.vectors.engine.tables import rows as table_rows  # noqa: E402
 from tools.vectors.faults import Fault, faults  # noqa: E402
 from tools.vectors.requirements import requirements  # noqa: E402
 
@@ -39,6 +42,8 @@ def vectors(without: Collection[ModuleType] = ()) -> list[Vector]:
     for group in GROUPS:
         modules = [module for module in group.MODULES if module not in without]
         made = [vector for module in modules for vector in module.vectors()]
+        start = group.__name__.rpartition(".")[2] + "/"
+        made += [row.vector() for row in table_rows().values() if row.name.startswith(start)]
         found += sorted(made, key=lambda vector: vector.name)
     names = [vector.name for vector in found]
     assert len(names) == len(set(names)), sorted(n for n in names if names.count(n) > 1)
@@ -112,6 +117,24 @@ def files() -> dict[str, bytes]:
     }
 
 
+def files_of(names: Collection[str]) -> dict[str, bytes]:
+    """Those of the tables ``names``; the manifest's other rows stay as they are."""
+    unknown = sorted(set(names) - set(tables()))
+    if unknown:
+        raise SystemExit(f"make_vectors: there is no table {', '.join(unknown)}")
+    own: dict[str, Row] = {row.name: row for name in names for row in tables()[name]}
+    made = [row.vector() for row in own.values()]
+    listed = json.loads((CONFORMANCE / "manifest.json").read_text("utf-8"))["vectors"]
+    kept = [fields for fields in listed if fields["file"].removesuffix(".mcz") not in own]
+    every = [*own, *(fields["file"].removesuffix(".mcz") for fields in kept)]
+    groups = [group.__name__.rpartition(".")[2] for group in GROUPS]
+    whole = [*kept, *rows(made, every)]
+    whole.sort(key=lambda fields: (groups.index(fields["group"]), fields["file"][:-4]))
+    return {f"vectors/{vector.name}.mcz": vector.data for vector in made} | {
+        "manifest.json": _manifest(whole).encode()
+    }
+
+
 def _manifest(listed: Sequence[dict[str, Any]]) -> str:
     """A line a vector, so that the file stays small and a change shows what it changes."""
     head = {
@@ -124,14 +147,20 @@ def _manifest(listed: Sequence[dict[str, Any]]) -> str:
     return f'{start}, "vectors": [\n' + ",\n".join(lines) + "\n]}\n"
 
 
-def main() -> int:
-    made = files()
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--check", action="store_true", help="write nothing, list what differs")
+    parser.add_argument(
+        "tables", nargs="*", metavar="TABLE", help="make these tables alone, such as invalid/clip"
+    )
+    options = parser.parse_args(arguments)
+    made = files_of(options.tables) if options.tables else files()
     old = {p.relative_to(CONFORMANCE).as_posix() for p in CONFORMANCE.glob("vectors/**/*.mcz")}
-    stale = sorted(old - set(made))
+    stale = [] if options.tables else sorted(old - set(made))
     changed = [name for name in made if not _is_same(CONFORMANCE / name, made[name])]
     for name in [*stale, *changed]:
         print(name)
-    if "--check" in sys.argv[1:]:
+    if options.check:
         return int(bool(stale or changed))
     for name in stale:
         (CONFORMANCE / name).unlink()

@@ -8,9 +8,10 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from tools.vectors.engine.tables import CHECKSUM, EFFECTS, KINDS
+from tools.vectors.engine.tables import rows as table_rows
+
 TABLE = Path(__file__).with_name("faults.txt")
-KINDS = MALFORMED, IMPOSSIBLE, CHECKSUM = "malformed", "impossible", "checksum"
-EFFECTS = ("crash", "memory", "hang", "wrong data", "silent loss")
 MOST_CHECKSUMS = 3  # vectors in which nothing is wrong but a checksum, beside those of PARTS
 PARTS = "invalid/parts/"  # is about checksums
 SHARED = "*"  # the folder of rows that count in every folder of a codec
@@ -70,7 +71,12 @@ def faults(names: Sequence[str]) -> dict[str, Fault]:
     """
     found: dict[str, Fault] = {}
     unused = {(folder, g) for folder, rows in table().items() for row in rows for g in row.names}
+    told = {name: row.fault for name, row in table_rows().items()}
     for name in names:
+        own = told.get(name)
+        if own is not None:
+            found[name] = Fault(own.kind, own.effect, (), own.reason)
+            continue
         _, folder, base = name.split("/")
         place = next(_places(folder, base), None)
         if place is None:

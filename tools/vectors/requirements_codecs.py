@@ -13,8 +13,6 @@ VECTORS: dict[str, tuple[str, ...]] = {
         "invalid/qbc/header-*",
         "invalid/pca/header-*",
         "invalid/?wt/header-*",
-        "invalid/clip/codec-header",
-        "invalid/clip/resolutions-of-raw",
         "invalid/qbc/resolutions*",
         "invalid/*/frames-varint",
         "invalid/*/wavelet-*",

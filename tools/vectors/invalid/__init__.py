@@ -3,8 +3,6 @@
 from tools.vectors.invalid import (
     awt,
     best,
-    chunks,
-    clip,
     copies,
     cut,
     data,
@@ -34,11 +32,9 @@ from tools.vectors.invalid import (
 )
 
 MODULES = (
-    chunks,
     grammar,
     index,
     shared,
-    clip,
     data,
     parts,
     packets,

@@ -1,0 +1,161 @@
+"""Base files of the tables, by name: motions that the encoders of mcz write, and whole files.
+
+A row names one as ``dance(8)``, several clips as ``dance() + dance(3, name='encore')``.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from mcz.codecs import CODECS
+from mcz.container import payloads
+from mcz.container.limits import ARCHIVE
+from mcz.motion import Channel, Motion, Signal
+from tools.vectors.build import motions
+from tools.vectors.build.files import Crafter, file_of, finished
+from tools.vectors.build.source_files import ODD, PLAIN, take
+
+
+@dataclass(frozen=True)
+class Base:
+    """A file: clips that ``file_of`` writes, or its bytes, and what it holds."""
+
+    motions: tuple[Motion, ...] = ()
+    data: bytes | None = None
+    sources: tuple[tuple[str, bytes], ...] = ()
+    attached: tuple[tuple[str, str], ...] = ()  # names of attachments, and aliases
+
+    def __add__(self, other: Base) -> Base:
+        sources = self.sources + other.sources
+        return Base(self.motions + other.motions, None, sources, self.attached + other.attached)
+
+
+BASES: dict[str, Callable[..., Base]] = {}
+
+
+def base(make: Callable[..., Any]) -> Callable[..., Any]:
+    """Let rows name ``make``, which returns a Base, a Motion or the bytes of a file."""
+
+    def called(*given: Any, **named: Any) -> Base:
+        made = make(*given, **named)
+        if isinstance(made, Motion):
+            return Base((made,))
+        return Base((), made) if isinstance(made, bytes) else made
+
+    BASES[make.__name__] = called
+    return make
+
+
+for _make in (
+    motions.dance,
+    motions.with_exceptions,
+    motions.with_grid_changes,
+    motions.with_mask,
+):
+    base(_make)
+
+
+@base
+def plain() -> Base:
+    return Base((take(PLAIN, "plain"),), None, (("plain.bvh", PLAIN),))
+
+
+@base
+def odd() -> Base:
+    return Base((take(ODD, "odd"),), None, (("odd.bvh", ODD),))
+
+
+@base
+def analog() -> Motion:
+    """The dance beside a second signal of two rows a frame."""
+    signal = Signal(np.arange(8.0).reshape(8, 1), name="analog", samples_per_frame=2)
+    signal = replace(signal, channels=(Channel("", "force"),))
+    return replace(motions.dance(), signals=(*motions.dance().signals, signal))
+
+
+@base
+def own_channels() -> Motion:
+    """The dance whose channels are its own, not those of the joints."""
+    dance = motions.dance()
+    return motions.dance(signals=(replace(dance.signals[0], channels=dance.skeleton.channels),))
+
+
+@base
+def wide(n_channels: int) -> Motion:
+    """No frames of so many channels of one joint, in an archive."""
+    hips = replace(motions.puppet().joints[0], channels=motions.channels("tx") * n_channels)
+    skeleton = replace(motions.puppet(), joints=(hips,))
+    return Motion(skeleton, (Signal(np.zeros((0, n_channels))),), name="wide")
+
+
+@base
+def nothing() -> Base:
+    """A file without clips."""
+    return Base()
+
+
+def _limited(found: Base, options: dict[str, Any]) -> bytes:
+    """The file of clips beyond the base profile, which its HEAD has all the same."""
+    crafter = Crafter()
+    crafter.profile = ARCHIVE
+    for motion in found.motions:
+        crafter.clip(motion, **options)
+    return finished(crafter)
+
+
+@base
+def attached(name: str, content: str, alias: str = "") -> Base:
+    """An attachment, and an alias of it, before the clips."""
+    return Base((), None, ((name, content.encode()),), ((name, alias),))
+
+
+def _with_attachments(found: Base, index: bool = True) -> bytes:
+    crafter = Crafter()
+    for (name, content), (_, alias) in zip(found.sources, found.attached, strict=True):
+        crafter.parts(name, content)
+        if alias:
+            crafter.alias(alias, payloads.OF_ATTACHMENT, name.encode())
+    return finished(crafter, *found.motions, index=index)
+
+
+def _evaluated(node: ast.expr) -> Any:
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return _evaluated(node.left) + _evaluated(node.right)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        given = [ast.literal_eval(argument) for argument in node.args]
+        named = {k.arg: ast.literal_eval(k.value) for k in node.keywords if k.arg}
+        return BASES[node.func.id](*given, **named)
+    raise ValueError(f"{ast.unparse(node)!r} is no base file")
+
+
+@cache
+def base_of(text: str) -> Base:
+    """The base that a row names."""
+    found: Base = _evaluated(ast.parse(text, mode="eval").body)
+    return found
+
+
+def base_bytes(text: str, options: Mapping[str, Any]) -> bytes:
+    """The file of a base; ``options`` are those of ``file_of``."""
+    return _written(text, tuple(sorted(options.items())))
+
+
+@cache
+def _written(text: str, options: tuple[tuple[str, Any], ...]) -> bytes:
+    found = base_of(text)
+    if found.data is not None:
+        return found.data
+    named = dict(options)
+    if found.attached:
+        return _with_attachments(found, **named)
+    if "codec" in named:
+        (named["codec"],) = (c for c in CODECS.values() if c.name == named["codec"])
+    if named.pop("beyond", False):
+        return _limited(found, named)
+    return file_of(*found.motions, **named)

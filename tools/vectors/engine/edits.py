@@ -1,0 +1,269 @@
+"""The edits of a row: fields, slices, streams, chunks, and the bytes of the file.
+
+README.md has the notation. Edits of chunks and their streams come first, in the order of the row;
+then all is repaired, and those of INDEX, INDX, FOOT and ``file`` come where each is made.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from mcz.container.chunks import ANCILLARY
+from mcz.container.index_records import Index, IndexedAncillary
+from mcz.container.packets import body_check
+from mcz.schema import build, read_varint, varint
+from tools.vectors.engine.fields import SCHEMAS, STREAMS, VIEWS, place_of, swapped
+from tools.vectors.engine.layout import Layout, Part, foot_of, index_of, index_payload
+from tools.vectors.engine.notation import integer, read_bytes
+
+FIELD = re.compile(
+    r"(?P<name>\w{4,})(?:#(?P<number>-?\d+))?(?:/(?P<stream>\d+))?(?P<own>:\w*)?"
+    r"(?P<path>(?:\.\w+)*)(?:\[(?P<slice>[-\w:]+)\])?"
+)
+EDIT = re.compile(FIELD.pattern + r"\s*(?P<operator>=|\+=|\^=)\s*(?P<value>.*)", re.DOTALL)
+HEADER = {"signal", "first", "n_frames", "lead", "tail", "flags"}
+PACKET = {"kind", "sequence", "fresh"}
+LATE = ("INDEX", "INDX", "FOOT", "file")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A place that an edit names."""
+
+    name: str
+    number: int
+    stream: int | None
+    own: str | None  # of the chunk's header; empty for all its bytes
+    path: str
+    slice: str | None
+
+    @classmethod
+    def of(cls, match: re.Match[str]) -> Target:
+        found = match.groupdict()
+        stream, own = found["stream"], found["own"]
+        return cls(
+            found["name"],
+            int(found["number"] or 0),
+            None if stream is None else int(stream),
+            None if own is None else own[1:],
+            found["path"][1:],
+            found["slice"],
+        )
+
+    @property
+    def type(self) -> bytes:
+        if self.name in STREAMS:
+            return b"DATA"
+        return VIEWS[self.name].type if self.name in VIEWS else self.name.encode()
+
+
+class Editor:
+    """The edits of one row on one file."""
+
+    def __init__(self, base: bytes, edits: Sequence[str], constants: Mapping[str, str]) -> None:
+        self.layout = Layout(base)
+        self.constants = constants
+        self.edits = [edit.strip() for edit in edits]
+        self.indexed: list[tuple[Part, Part]] = []  # an ancillary chunk, the CLIP it belongs to
+
+    def data(self) -> bytes:
+        """The edited file."""
+        late = [edit for edit in self.edits if edit.startswith(LATE)]
+        for edit in self.edits:
+            if edit not in late:
+                self._apply(edit)
+        layout = self.layout
+        layout.settle()
+        layout.place()
+        feet = indexes = 0
+        index: Part | None = None
+        for part in list(layout.parts):
+            if part.type == b"INDX":
+                self._index(part, indexes, late)
+                layout.place()
+                index, indexes = part, indexes + 1
+            elif part.type == b"FOOT":
+                part.payload = foot_of(index)
+                self._late(part, "FOOT", feet, late)
+                layout.place()
+                index, feet = None, feet + 1
+        whole = layout.signature + b"".join(part.build() for part in layout.parts)
+        for edit in late:
+            match = EDIT.fullmatch(edit)
+            if match and match["name"] == "file":
+                whole = self._changed(None, whole, Target.of(match), match)
+        return whole
+
+    def _index(self, part: Part, number: int, late: Sequence[str]) -> None:
+        content = index_of(part)
+        self.layout.indexed(content)
+        for chunk, owner in self.indexed:
+            for clip in content.clips:
+                if clip.offset == owner.offset - 16:
+                    row = IndexedAncillary(
+                        type=chunk.type, offset=chunk.offset - 16, length=len(chunk.payload)
+                    )
+                    clip.ancillary.append(row)
+        made = Part(b"INDX", build(content, "INDX"))
+        self._late(made, "INDEX", number, late)
+        part.payload = index_payload(made.payload)
+        self._late(part, "INDX", number, late)
+
+    def _late(self, part: Part, name: str, number: int, late: Sequence[str]) -> None:
+        schema = {"INDEX": Index}.get(name) or SCHEMAS.get(name)
+        for edit in late:
+            words = edit.split()
+            if words[0] == "swap" and words[1].startswith(name + "."):
+                continue
+            match = EDIT.fullmatch(edit)
+            if match is None:
+                raise ValueError(f"{edit!r} is no edit")
+            target = Target.of(match)
+            if target.name == name and target.number == number:
+                if target.own is not None:
+                    self._outer(part, target, match)
+                else:
+                    part.payload = self._changed(schema, part.payload, target, match)
+
+    def _apply(self, edit: str) -> None:
+        verb, _, rest = edit.partition(" ")
+        match = EDIT.fullmatch(edit)
+        if match is not None:
+            self._edit(match)
+        elif verb in ("drop", "copy", "move", "insert", "swap"):
+            getattr(self, f"_{verb}")(rest)
+        else:
+            raise ValueError(f"{edit!r} is no edit")
+
+    def _part(self, text: str) -> Part:
+        match = FIELD.fullmatch(text.strip())
+        if match is None:
+            raise ValueError(f"{text!r} is no part of a file")
+        target = Target.of(match)
+        return self.layout.find(target.type, target.number)
+
+    def _drop(self, rest: str) -> None:
+        self.layout.parts.remove(self._part(rest))
+
+    def _place(self, where: str, words: str) -> int:
+        index = self.layout.parts.index(self._part(words))
+        return index if where == "before" else index + 1
+
+    def _copy(self, rest: str) -> None:
+        """``copy SKEL after CEND``: the same chunk a second time."""
+        what, where, anchor = rest.split()
+        part = self._part(what)
+        twin = replace(part, place=None, frame=dict(part.frame))
+        self.layout.parts.insert(self._place(where, anchor), twin)
+
+    def _move(self, rest: str) -> None:
+        what, where, anchor = rest.split()
+        part = self._part(what)
+        self.layout.parts.remove(part)
+        self.layout.parts.insert(self._place(where, anchor), part)
+
+    def _insert(self, rest: str) -> None:
+        """``insert xtra+1 after CEND = "more"``: a chunk with flags."""
+        head, _, value = rest.partition("=")
+        what, where, anchor = head.split()
+        type_, _, flags = what.partition("+")
+        part = Part(type_.encode(), self._bytes(value), int(flags or 0))
+        place = self._place(where, anchor)
+        self.layout.parts.insert(place, part)
+        before = [p for p in self.layout.parts[:place] if p.type in (b"CLIP", b"CEND", b"FOOT")]
+        if part.flags & ANCILLARY and before and before[-1].type == b"CEND":
+            clips = [p for p in self.layout.parts[:place] if p.type == b"CLIP"]
+            self.indexed.append((part, clips[-1]))
+
+    def _swap(self, rest: str) -> None:
+        """``swap CLIP.signals.0 CLIP.signals.1``: items of a list."""
+        one, other = (FIELD.fullmatch(word) for word in rest.split())
+        assert one is not None and other is not None
+        target = Target.of(one)
+        part = self.layout.find(target.type, target.number)
+        schema = SCHEMAS[target.name]
+        part.payload = swapped(schema, part.payload, target.path, Target.of(other).path)
+
+    def _edit(self, match: re.Match[str]) -> None:
+        target = Target.of(match)
+        part = self.layout.find(target.type, target.number)
+        if target.own is not None:
+            self._outer(part, target, match)
+        elif target.stream is not None:
+            self._stream(part, target, match)
+        elif target.name in VIEWS:
+            view = VIEWS[target.name]
+            inner = self._changed(view.schema, view.read(part.payload), target, match)
+            part.payload = view.write(part.payload, inner)
+        elif target.path in HEADER and part.type in (b"DATA", b"packet"):
+            segment = part.taken_apart()
+            value = integer(match["value"])
+            segment.header = replace(segment.header, **{target.path: value})
+        elif target.path == "streams":
+            self._streams(part, match)
+        else:
+            schema = SCHEMAS.get(target.name)
+            part.payload = self._changed(schema, part.payload, target, match)
+
+    def _stream(self, part: Part, target: Target, match: re.Match[str]) -> None:
+        segment, index = part.taken_apart(), target.stream or 0
+        segment.streams += [b""] * (index + 1 - len(segment.streams))
+        schema = STREAMS.get(target.name)
+        segment.streams[index] = self._changed(schema, segment.streams[index], target, match)
+
+    def _streams(self, part: Part, match: re.Match[str]) -> None:
+        """``DATA.streams = 0 0 "new" 1``: streams of now by number, or bytes in parentheses."""
+        segment = part.taken_apart()
+        segment.streams = [
+            segment.streams[int(word)] if word.isdigit() else self._bytes(word)
+            for word in re.findall(r"\([^()]*\)|\d+", match["value"])
+        ]
+
+    def _outer(self, part: Part, target: Target, match: re.Match[str]) -> None:
+        """The header of a chunk or packet, or its bytes as they are written."""
+        value = match["value"]
+        if target.own == "":
+            part.outer.append(lambda data: self._changed(None, data, target, match))
+        elif target.own == "number" and part.packet is not None:
+            check = body_check(part.payload, integer(value))
+            part.packet = replace(part.packet, check=check)
+        elif target.own in PACKET and part.packet is not None:
+            part.packet = replace(part.packet, **{target.own: integer(value)})
+        else:
+            part.frame[str(target.own)] = self._bytes(value)
+
+    def _bytes(self, text: str) -> bytes:
+        return read_bytes(text, self._lookup, self.constants)
+
+    def _lookup(self, text: str) -> bytes:
+        match = FIELD.fullmatch(text)
+        if match is None:
+            raise ValueError(f"{text!r} is no place in a file")
+        target = Target.of(match)
+        part = self.layout.find(target.type, target.number)
+        data, schema = part.payload, SCHEMAS.get(target.name)
+        if target.stream is not None:
+            data, schema = part.taken_apart().streams[target.stream], STREAMS.get(target.name)
+        elif target.name in VIEWS:
+            data, schema = VIEWS[target.name].read(data), VIEWS[target.name].schema
+        start, stop = place_of(schema, data, target.path, target.slice)
+        return data[start:stop]
+
+    def _changed(self, schema: object, data: bytes, target: Target, match: re.Match[str]) -> bytes:
+        start, stop = place_of(schema, data, target.path, target.slice)
+        value, old = match["value"], data[start:stop]
+        if match["operator"] == "+=":
+            new = varint(read_varint(old, 0)[0] + integer(value))
+        elif match["operator"] == "^=":
+            mask = self._bytes(value)
+            new = bytes(a ^ b for a, b in zip(old, mask, strict=True))
+        else:
+            new = self._bytes(value)
+        return data[:start] + new + data[stop:]
+
+
+def edited(base: bytes, edits: Sequence[str], constants: Mapping[str, str] | None = None) -> bytes:
+    """The file ``base`` with these edits."""
+    return Editor(base, edits, constants or {}).data() if edits else base

@@ -1,0 +1,139 @@
+"""Fields of records and slices of bytes: the one place of the engine that knows ``mcz.schema``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.index_records import Index
+from mcz.container.packed import words
+from mcz.formats import notes
+from mcz.formats.c3d_layout import C3dDetail, C3dTemplate
+from mcz.formats.layout import Detail, Template
+from mcz.schema import Record, deflate, inflate, parse, read_varint, varint
+from tools.records import built, span
+
+SCHEMAS: dict[str, Any] = {
+    "HEAD": payloads.Head,
+    "SKEL": payloads.Skel,
+    "SRCE": payloads.Srce,
+    "MODL": payloads.Modl,
+    "ATTA": payloads.Atta,
+    "ALIA": payloads.Alia,
+    "CLIP": payloads.Clip,
+    "CEND": payloads.Cend,
+    "COPY": payloads.Copy,
+    "META": payloads.Meta,
+    "QUAL": payloads.Qual,
+    "INDX": payloads.Indx,
+    "INDEX": Index,
+}
+
+
+@dataclass(frozen=True)
+class View:
+    """Bytes within the payloads of chunks of ``type``: how to take them out and put them back."""
+
+    type: bytes
+    schema: type[Record] | None
+    read: Callable[[bytes], bytes]
+    write: Callable[[bytes, bytes], bytes]
+
+
+def _content(payload: bytes) -> bytes:
+    fields = parse(payloads.Srce, payload, "SRCE")
+    if fields.encoding == payloads.STORED:
+        return fields.data
+    known = words() if fields.encoding == payloads.AFTER_WORDS else b""
+    return (
+        inflate(fields.data, fields.size, "SRCE", words=known)
+        if known
+        else inflate(fields.data, fields.size, "SRCE")
+    )
+
+
+def _with_content(payload: bytes, content: bytes) -> bytes:
+    """A SRCE of another template, encoded as before."""
+    fields = parse(payloads.Srce, payload, "SRCE")
+    packed = {
+        payloads.STORED: lambda: content,
+        payloads.DEFLATED: lambda: deflate(content),
+        payloads.AFTER_WORDS: lambda: deflate(content, words=words()),
+    }[fields.encoding]()
+    return built(payloads.Srce, vars(fields) | {"size": len(content), "data": packed}, "SRCE")
+
+
+def _copied(payload: bytes) -> bytes:
+    """The content of a COPY or META: encoding, size, data."""
+    size, at = read_varint(payload, 1)
+    return payload[at:] if payload[0] == payloads.STORED else inflate(payload[at:], size, "COPY")
+
+
+def _with_copied(payload: bytes, content: bytes) -> bytes:
+    data = content if payload[0] == payloads.STORED else deflate(content)
+    return payload[:1] + varint(len(content)) + data
+
+
+def _inside(schema: Any, path: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """How to read and write the content of a field of bytes behind their length."""
+
+    def read(payload: bytes) -> bytes:
+        start, stop = span(schema, payload, path)
+        return payload[read_varint(payload, start)[1] : stop]
+
+    def write(payload: bytes, content: bytes) -> bytes:
+        start, stop = span(schema, payload, path)
+        return payload[:start] + varint(len(content)) + content + payload[stop:]
+
+    return read, write
+
+
+# What an edit may name beside chunks. Helpers add theirs for codecs: a header, a stream.
+VIEWS: dict[str, View] = {
+    "INDEX": View(b"INDX", Index, lambda payload: payload, lambda payload, content: content),
+    "TEMPLATE": View(b"SRCE", Template, _content, _with_content),
+    "C3DTEMPLATE": View(b"SRCE", C3dTemplate, _content, _with_content),
+    "DETAIL": View(b"CLIP", Detail, *_inside(payloads.Clip, "source.0.detail")),
+    "C3DDETAIL": View(b"CLIP", C3dDetail, *_inside(payloads.Clip, "source.0.detail")),
+    "COPIES": View(b"COPY", None, _copied, _with_copied),
+    "RECORDS": View(b"META", None, _copied, _with_copied),
+    "HEADER": View(b"CLIP", None, *_inside(payloads.Clip, "signals.0.header")),
+    "HEADER1": View(b"CLIP", None, *_inside(payloads.Clip, "signals.1.header")),
+}
+STREAMS: dict[str, type[Record] | None] = {
+    "DATA": None,
+    "NOTES": payloads.GroupNotes,
+    "ROWS": notes.Notes,
+}
+
+
+def ends_of(size: int, text: str) -> tuple[int, int]:
+    """The bounds that ``[3]``, ``[3:5]``, ``[-1:]`` or ``[end:]`` name in so many bytes."""
+    if ":" not in text:
+        start = int(text) % size
+        return start, start + 1
+    start, stop, _ = slice(*(_bound(part, size) for part in text.split(":"))).indices(size)
+    return start, max(start, stop)
+
+
+def _bound(text: str, size: int) -> int | None:
+    if text == "end":
+        return size
+    return int(text, 0) if text else None
+
+
+def place_of(schema: Any, data: bytes, path: str, slice_: str | None) -> tuple[int, int]:
+    """The bounds of a field, of a slice of it, or of a slice of all."""
+    start, stop = span(schema, data, path) if path else (0, len(data))
+    if slice_ is None:
+        return start, stop
+    first, last = ends_of(stop - start, slice_)
+    return start + first, start + last
+
+
+def swapped(schema: Any, data: bytes, path: str, other: str) -> bytes:
+    """``data`` with two items of a list in each other's place."""
+    (a, b), (c, d) = sorted((span(schema, data, path), span(schema, data, other)))
+    return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]

@@ -1,0 +1,152 @@
+"""Tables of vectors: TOML files whose rows say all that there is of a vector. README.md."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from tools.vectors.bases import Base, base_bytes, base_of
+from tools.vectors.build.files import OK, REFUSED, Vector, arrays, partial
+from tools.vectors.engine.edits import edited
+
+FOLDER = Path(__file__).parent.parent / "tables"
+HEAD = {"folder", "spec", "base", "file", "rules", "also", "modes", "exit"}
+ROW = {"purpose", "spec", "rules", "also", "fault", "base", "file", "edit"} | {
+    "exit", "modes", "parts", "holds", "since",
+}  # fmt: skip
+KINDS = MALFORMED, IMPOSSIBLE, CHECKSUM = "malformed", "impossible", "checksum"
+EFFECTS = ("crash", "memory", "hang", "wrong data", "silent loss")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """``kind`` of fault, ``effect`` if accepted, ``reason`` in a sentence."""
+
+    kind: str
+    effect: str
+    reason: str
+
+    @classmethod
+    def of(cls, text: str) -> Fault:
+        """The fault of ``kind, effect: reason``."""
+        head, _, reason = text.partition(": ")
+        kind, _, effect = head.partition(", ")
+        if kind not in KINDS or effect not in EFFECTS or not reason:
+            raise ValueError(f"{text!r} is no fault")
+        return cls(kind, effect, reason)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A vector as a table describes it: ``name`` is its path, ``fields`` its own and the head's."""
+
+    name: str
+    fields: Mapping[str, Any]
+    constants: Mapping[str, str]
+    fault: Fault | None
+
+    @property
+    def rules(self) -> list[str]:
+        """The rules without which a decoder fails the vector."""
+        return str(self.fields.get("rules", "")).split()
+
+    @property
+    def requirements(self) -> list[str]:
+        """Them, and the other rules that it shows."""
+        return sorted({*self.rules, *str(self.fields.get("also", "")).split()})
+
+    @property
+    def data(self) -> bytes:
+        base = base_bytes(self.fields["base"], self.fields.get("file", {}))
+        edits = self.fields.get("edit", [])
+        edits = [edits] if isinstance(edits, str) else edits
+        return edited(base, edits, self.constants)
+
+    def vector(self) -> Vector:
+        """The file, and what a decoder must make of it."""
+        fields = self.fields
+        group = self.name.partition("/")[0]
+        exit_ = fields.get("exit", REFUSED if group == "invalid" else OK)
+        exit_ = tuple(exit_) if isinstance(exit_, list) else (exit_,)
+        held = base_of(fields.get("holds", fields["base"])) if OK in exit_ else Base()
+        modes = tuple(fields.get("modes", "arrays").split())
+        return Vector(
+            self.name,
+            tuple(heading.strip() for heading in fields["spec"].split(";")),
+            fields["purpose"],
+            self.data,
+            exit=exit_,
+            arrays=arrays(*held.motions),
+            sources=held.sources if "sources" in modes else (),
+            modes=modes,
+            parts=tuple(_part(held, text) for text in fields.get("parts", ())),
+            since=fields.get("since", ""),
+        )
+
+
+def _part(held: Base, text: str) -> Any:
+    """A partial read, such as ``dance 1:3`` or ``dance 1:3 0,2``: clip, frames, joints."""
+    clip, frames, *joints = text.rsplit(" ", text.count(" "))
+    (motion,) = (motion for motion in held.motions if motion.name == clip)
+    start, _, stop = frames.partition(":")
+    listed = [int(joint) for joint in joints[0].split(",")] if joints else None
+    return partial(motion, (int(start), int(stop)), listed)
+
+
+def rows_of(path: Path) -> Iterator[Row]:
+    """The rows of one table; raises ValueError for what no table has."""
+    found = tomllib.loads(path.read_text("utf-8"))
+    head, constants = found.pop("TABLE"), found.pop("BYTES", {})
+    faults = {key: Fault.of(text) for key, text in found.pop("FAULTS", {}).items()}
+    if set(head) - HEAD:
+        raise ValueError(f"{path.name}: TABLE has no {sorted(set(head) - HEAD)}")
+    folders = head["folder"]
+    for folder in [folders] if isinstance(folders, str) else folders:
+        used = set()
+        for name, row in found.items():
+            unknown = sorted(set(row) - ROW)
+            if unknown or ("fault" in row) != folder.startswith("invalid/"):
+                raise ValueError(f"{path.name}: {name}: {unknown or 'fault'}")
+            fields = _filled({**head, **row}, folder.rpartition("/")[2])
+            fields["also"] = f"{head.get('also', '')} {row.get('also', '')}"
+            used.add(row.get("fault"))
+            fault = faults[row["fault"]] if "fault" in row else None
+            yield Row(f"{folder}/{name}", fields, constants, fault)
+        if set(faults) - used:
+            raise ValueError(f"{path.name}: no row has the faults {sorted(set(faults) - used)}")
+
+
+def _filled(fields: dict[str, Any], codec: str) -> dict[str, Any]:
+    """The fields with the folder's own name, a codec's, where they say ``$codec``."""
+
+    def fill(value: Any) -> Any:
+        if isinstance(value, str):
+            return value.replace("$codec", codec)
+        if isinstance(value, dict):
+            return {key: fill(inner) for key, inner in value.items()}
+        return [fill(inner) for inner in value] if isinstance(value, list) else value
+
+    return {key: fill(value) for key, value in fields.items()}
+
+
+@cache
+def tables() -> dict[str, tuple[Row, ...]]:
+    """The rows of all tables, by the names of these."""
+    paths = sorted(FOLDER.rglob("*.toml"))
+    return {p.relative_to(FOLDER).with_suffix("").as_posix(): tuple(rows_of(p)) for p in paths}
+
+
+@cache
+def rows() -> dict[str, Row]:
+    """All rows by the names of their vectors."""
+    found: dict[str, Row] = {}
+    for table, listed in tables().items():
+        for row in listed:
+            if row.name in found:
+                raise ValueError(f"{table}: {row.name} is in two tables")
+            found[row.name] = row
+    return found
