@@ -100,6 +100,14 @@ ASF = b"""\
     lfemur ltibia
   end
 """.replace(b"\n", b"\r\n")
+# The last of a key's lines counts, a bone without an end does not; no name is none.
+ODD_ASF = (
+    ASF.replace(b":name mannequin", b":name \xe9\r:name")
+    .replace(b"position 0 0 0", b"position 1 2 3\r   position(-0 +.5 1.e1 7)")
+    .replace(b"angle deg", b"angle deg\r  ANGLE RADIANS")
+    .replace(b"name ltibia", b"name first second\r     name ltibia third")
+    .replace(b":hierarchy", b"  begin\r     name lost\r:hierarchy")
+)
 # The worked example of SPEC.md, "Source reconstruction".
 EXAMPLE = b":DEGREES\n1\nroot 1 2\ntoe 3\n2\nroot 4 5\ntoe 6"
 # Another order of bones, numbers with a gap, a frame without ltibia, no last line end.

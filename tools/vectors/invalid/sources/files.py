@@ -99,6 +99,14 @@ def _other_skeletons(shelf: Unrestorable) -> None:
     for name, purpose, old, new in (
         ("word", "a word that is no number", b"length 7.04", b"length 7,04"),
         ("circle", "a circle of bones", b"root lfemur", b"ltibia lfemur"),
+        ("two-numbers", "two numbers where three stand", b"position 0 0 0", b"position 0 0"),
+        ("angle-missing", "no word behind angle", b"angle deg", b"angle"),
+        ("angle-other", "an angle unit of its own", b"angle deg", b"angle grad"),
+        ("name-twice", "two bones of a name", b"name ltibia", b"name lfemur"),
+        ("name-missing", "a bone without a name", b"name ltibia", b"name"),
+        ("parents", "a bone with two parents", b"lfemur ltibia", b"lfemur ltibia ltibia"),
+        ("point", "a number of two points", b"length 6.9", b"length 6.9.0"),
+        ("blank", "a key of bones outside of a bone", b":hierarchy", b"length 1\n:hierarchy"),
     ):
         text = ASF.replace(old, new)
         source = Source("asf", text, size=len(text), sha256=hashlib.sha256(text).digest())

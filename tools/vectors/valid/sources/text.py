@@ -24,6 +24,7 @@ from tools.vectors.build.source_files import (
     HEADING,
     HIERARCHY,
     ODD,
+    ODD_ASF,
     ODD_ROWS,
     PLAIN,
     ROWS,
@@ -152,6 +153,15 @@ def _acclaim(shelf: Whole) -> None:
     write_skeleton(crafter, skeleton)
     purpose = "A skeleton with a source file of its own that no ALIA names: nothing is restored."
     shelf.hold("asf-unnamed", spec, purpose, finished(crafter), modes=BOTH)
+    odd = asf.read(ODD_ASF, "nobody")
+    crafter = Crafter()
+    with_asf(crafter, odd)
+    purpose = (
+        "No name behind :name, keys twice, words too many, no end of a bone; Latin-1, \\r alone, (."
+    )
+    named = ("small.asf", ODD_ASF)
+    shelf.hold("asf-odd", spec, purpose, finished(crafter), sources=(named,), modes=BOTH)
+    named = ("small.asf", ASF)
     motion = called(amc.read(AMC, "take", skeleton), "take.amc")
     assert motion.signals[0].mask is not None
     crafter = Crafter()
