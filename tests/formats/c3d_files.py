@@ -6,6 +6,7 @@ import struct
 from dataclasses import dataclass, field
 
 import numpy as np
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 INTEL, DEC, SGI = 84, 85, 86
@@ -164,3 +165,52 @@ def made(
 
     points, analog = words(n_frames, n_points, 4), words(n_frames, subframes, channels)
     return Made(points, analog, **more)  # type: ignore[arg-type]
+
+
+RAW = st.one_of(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([0x7F800001, 0xFFC00001, 0x80000000, 0x00008000, 0xFF800000, 0x7FFF, 1]),
+)
+NUMBERS = st.tuples(
+    st.sampled_from([1, 2, 4]), st.just((2,)), st.binary(min_size=8, max_size=8)
+).map(lambda t: (t[0], t[1], t[2][: 2 * t[0]]))
+EXTRAS = st.dictionaries(
+    st.sampled_from(["POINT", "ANALOG", "TRIAL", "ROTATION", "EVENT"]),
+    st.dictionaries(
+        st.sampled_from(
+            "USED FRAMES LONG_FRAMES SCALE RATE LABELS2 DATA_START RATIO FORMAT UNITS "
+            "ACTUAL_START_FIELD ACTUAL_END_FIELD".split()
+        ),
+        NUMBERS,
+        max_size=3,
+    ),
+    max_size=3,
+)
+
+
+@st.composite
+def c3d_files(draw: st.DrawFn, extras: bool = True) -> Made:
+    """A file of any words, counts, byte order and encoding."""
+    size = draw(st.sampled_from([2, 4]))
+    n_frames, n_points = draw(st.integers(0, 4)), draw(st.integers(0, 3))
+    channels, subframes = draw(st.integers(0, 2)), draw(st.integers(1, 3))
+
+    def words(*shape: int) -> np.ndarray:
+        n = int(np.prod(shape))
+        limit = 2 ** (8 * size) - 1
+        drawn = draw(st.lists(RAW, min_size=n, max_size=n))
+        return np.array([w & limit for w in drawn], np.uint32).reshape(shape)
+
+    block = draw(st.sampled_from([2, 2, 3]))
+    return Made(
+        words(n_frames, n_points, 4),
+        words(n_frames, subframes, channels),
+        processor=draw(st.sampled_from((INTEL, DEC, SGI))),
+        size=size,
+        scale=draw(st.sampled_from([0.25, 0.1, 1.0])),
+        rate=draw(st.sampled_from([100.0, 59.94006, 65.03, 0.0, 69.992615])),
+        first=draw(st.sampled_from([1, 0, 40, 65_535])),
+        parameters=draw(EXTRAS) if extras else {},
+        parameter_block=block,
+        tail=draw(st.one_of(st.just(b""), st.binary(max_size=700), st.just(bytes(512)))),
+    )

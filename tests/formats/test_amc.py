@@ -6,111 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from mcz.errors import MotionError, SourceError
 from mcz.formats import amc, asf
 from mcz.formats.bones import derive
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
+from tests.formats.text_files import AMC, ASF
 
-ASF = b""":version 1.10
-:name small
-:units
-  length 0.45
-  angle deg
-:root
-  order TX TY TZ RX RY RZ
-  axis XYZ
-  position 0 0 0
-  orientation 0 0 0
-:bonedata
-  begin
-    id 1
-    name back
-    direction 0 1 0
-    length 2
-    axis 0 0 30 XYZ
-    dof rx ry rz
-  end
-  begin
-    id 2
-    name toe
-    direction 0 0 1
-    length 1
-    axis 0 0 0 XYZ
-    dof rx
-  end
-:hierarchy
-  begin
-    root back toe
-  end
-"""
-AMC = b"""#!OML:ASF small.asf
-:FULLY-SPECIFIED
-:DEGREES
-1
-root 1 2 3 4 5 6
-toe -0.5
-back 7 8e-005 9
-2
-root 1.5 2 3 4 5 6
-toe -0.25
-back 7 8 -1.5e-014
-"""
 SKELETON = asf.read(ASF)
-BONES = {"root": 6, "back": 3, "toe": 1}
-TOKENS = st.one_of(
-    st.floats(-1e3, 1e3).map(lambda x: f"{x:.6g}"),
-    st.sampled_from(["0", "-0", "1e-014", "nan", "12.50", "+3"]),
-    st.floats().map(repr),
-)
-
-
-@st.composite
-def texts(draw: st.DrawFn) -> bytes:
-    """An AMC file of any layout."""
-    irregular = draw(st.booleans())
-    usual = draw(st.sampled_from(["\n", "\r\n"]))
-    ends = st.sampled_from(["\n", "\r\n", " \n", "\n\n", "\n# 5\n", "\t\r\n"])
-    lines = ["#!OML:ASF x.asf", ":FULLY-SPECIFIED", ":DEGREES"]
-    number = draw(st.integers(-2, 1000))
-    order = draw(st.permutations(list(BONES)))
-    for _ in range(draw(st.integers(1, 6))):
-        lines.append(draw(st.sampled_from(["{}", "{}", "{:03d}", " {} "])).format(number))
-        number += draw(st.sampled_from([1, 1, 1, 10, -3]))
-        for bone in order:
-            if irregular and draw(st.integers(0, 3)) == 0:
-                continue
-            gap = draw(st.sampled_from([" ", "  ", "\t"])) if irregular else " "
-            lines.append(gap.join([bone, *(draw(TOKENS) for _ in range(BONES[bone]))]))
-    text = "".join(line + (draw(ends) if irregular else usual) for line in lines)
-    return (text.rstrip() if draw(st.booleans()) else text).encode()
-
-
-@given(texts(), st.booleans())
-def test_any_text_comes_back(data: bytes, with_skeleton: bool) -> None:
-    motion = amc.read(data, "clip", SKELETON if with_skeleton else None)
-    assert amc.write(motion) == data
-
-
-@given(texts(), st.data())
-def test_a_changed_value_changes_only_its_token(data: bytes, draw: st.DataObject) -> None:
-    motion = amc.read(data, "clip", SKELETON)
-    signal = motion.signals[0]
-    present = np.ones(signal.values.shape, bool) if signal.mask is None else signal.mask
-    cells = np.flatnonzero(present)
-    if not len(cells):
-        return
-    cell = draw.draw(st.sampled_from(cells.tolist()))
-    values = signal.values.copy()
-    values.flat[cell] = 3.0 if values.flat[cell] != 3.0 else 4.0
-    changed = amc.write(motion.with_values(values))
-    differ = [x != y for x, y in zip(data.split(), changed.split(), strict=True)]
-    assert sum(differ) == 1
-    again = amc.read(changed, "clip", SKELETON)
-    assert np.array_equal(again.values, motion.with_values(values).values, equal_nan=True)
 
 
 def test_what_a_file_says() -> None:
@@ -206,17 +110,6 @@ def test_a_table_that_would_dwarf_the_file_is_refused() -> None:
     frames = b"".join(b"%d\n" % k for k in range(2, 20000))
     with pytest.raises(SourceError, match="dwarf"):
         amc.read(b":DEGREES\n1\n" + bones + frames, "sparse")
-
-
-@given(st.integers(0, len(AMC) - 1), st.integers(0, 255))
-def test_every_changed_byte_is_read_or_refused(at: int, byte: int) -> None:
-    data = AMC[:at] + bytes([byte]) + AMC[at + 1 :]
-    for skeleton in (SKELETON, None):
-        try:
-            motion = amc.read(data, "changed", skeleton)
-        except SourceError:
-            continue
-        assert amc.write(motion) == data
 
 
 def test_a_motion_without_source_is_written_plainly_and_comes_back() -> None:

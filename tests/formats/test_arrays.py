@@ -17,7 +17,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 
 import mcz
 from mcz.cli.common import run
@@ -27,15 +26,8 @@ from mcz.errors import MczError, MotionError, OptionError, SourceError
 from mcz.formats import FORMATS, likely_formats
 from mcz.formats.arrays.kinds import KINDS
 from mcz.numbers import GridKind
-from tools.vectors.build.array_files import Member, floats, npy, npz, plain_npz
-
-CODES = ("?", "<i2", ">i4", "<i8", "|u1", "<u8", "<f2", ">f4", "<f4", "<f8", ">f8")
-
-
-def saved(**arrays: Any) -> bytes:
-    buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
-    return buffer.getvalue()
+from tests.formats.saved_arrays import arrays, saved
+from tools.vectors.build.array_files import Member, floats, npy, npz
 
 
 def back(data: bytes, suffix: str = "npz") -> mcz.Motion:
@@ -47,45 +39,6 @@ def back(data: bytes, suffix: str = "npz") -> mcz.Motion:
     with mcz.open(out.getvalue()) as file:
         assert file.only_clip().source_bytes() == data
     return motion
-
-
-@st.composite
-def arrays(draw: st.DrawFn) -> Any:
-    """An array of any type and order; any bits are numbers."""
-    code = draw(st.sampled_from(CODES))
-    shape = draw(hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=4))
-    dtype = np.dtype(code)
-    count = int(np.prod(shape))
-    if draw(st.booleans()):
-        words = draw(st.lists(st.integers(-99, 99), min_size=count, max_size=count))
-        array = (np.array(words, np.float64) / 4).astype(dtype).reshape(shape)
-    else:
-        size = count * dtype.itemsize
-        array = np.frombuffer(draw(st.binary(min_size=size, max_size=size)), dtype).reshape(shape)
-    return np.asfortranarray(array) if draw(st.booleans()) else array
-
-
-@st.composite
-def archives(draw: st.DrawFn) -> bytes:
-    """An NPZ by zipfile, with options of its own for each member."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        archive.comment = draw(st.sampled_from([b"", b"PK\5\6 is no end", b"x" * 300]))
-        names = draw(st.lists(st.text("abc/é", min_size=1, max_size=4), unique=True, max_size=4))
-        for name in (*names, "motion"):
-            array = floats(3, 2) if name == "motion" else draw(arrays())
-            part = io.BytesIO()
-            np.save(part, array)
-            info = zipfile.ZipInfo(f"{name}.npy", (draw(st.integers(1980, 2100)), 2, 3, 4, 5, 6))
-            info.comment = draw(st.binary(max_size=3))
-            info.extra = draw(st.sampled_from([b"", b"\xfe\xca\4\0abcd", b"ab"]))
-            info.external_attr = draw(st.integers(0, 2**32 - 1))
-            method = zipfile.ZIP_DEFLATED if draw(st.booleans()) else zipfile.ZIP_STORED
-            info.compress_type = zipfile.ZIP_STORED if name == "motion" else method
-            wide = draw(st.booleans())
-            with archive.open(info, "w", force_zip64=wide) as file:
-                file.write(part.getvalue())
-    return buffer.getvalue()
 
 
 class Forward(io.BytesIO):
@@ -112,42 +65,6 @@ def test_any_array_comes_back_or_is_refused(array: Any) -> None:
     with np.errstate(invalid="ignore"):  # of NaNs that signal
         shown = array.reshape(len(array), -1).astype(np.float64)
     np.testing.assert_array_equal(motion.values, shown)
-
-
-@given(archives())
-def test_any_archive_comes_back(data: bytes) -> None:
-    motion = back(data)
-    assert motion.signals[0].name == "motion"
-
-
-@given(archives(), st.data())
-def test_damaged_archives_are_refused_or_come_back(data: bytes, pick: st.DataObject) -> None:
-    with pytest.raises(SourceError):
-        FORMATS["npz"].read(data[: pick.draw(st.integers(0, len(data) - 1))])
-    changed = bytearray(data)
-    for _ in range(pick.draw(st.integers(1, 3))):
-        changed[pick.draw(st.integers(0, len(data) - 1))] ^= 1 << pick.draw(st.integers(0, 7))
-    try:
-        motion = FORMATS["npz"].read(bytes(changed))
-    except SourceError:
-        return
-    assert FORMATS["npz"].write(motion) == changed
-
-
-@pytest.mark.parametrize("data", [npy(floats(4, 3)), plain_npz({"a": floats(3, 2)})])
-def test_every_bit_flip_and_prefix(data: bytes) -> None:
-    suffix = "npy" if data[:1] == b"\x93" else "npz"
-    for size in range(len(data)):
-        with pytest.raises(SourceError):
-            FORMATS[suffix].read(data[:size])
-    for bit in range(0, 8 * len(data), 11):
-        changed = bytearray(data)
-        changed[bit // 8] ^= 1 << bit % 8
-        try:
-            motion = FORMATS[suffix].read(bytes(changed))
-        except SourceError:
-            continue
-        assert FORMATS[suffix].write(motion) == changed
 
 
 def test_blanks_of_a_head_end_where_the_numbers_begin() -> None:

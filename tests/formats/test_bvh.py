@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import tracemalloc
 from dataclasses import replace
@@ -21,134 +20,10 @@ from mcz.formats import amc, asf, bvh, hierarchy, likely_formats, limits
 from mcz.formats.notes import join_notes
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
-
-SMALL = b"""HIERARCHY
-ROOT Hips
-{
-  OFFSET 0 0 0
-  CHANNELS 3 Xposition Yposition Zposition
-  JOINT left arm
-  {
-    OFFSET 1.5 -2e-1 0
-    CHANNELS 1 Zrotation
-    End Site
-    {
-      OFFSET 0 1 0
-    }
-  }
-}
-MOTION
-Frames: 3
-Frame Time: .0083333
-1.00 2.00 3.00 -4.00
-1.10 2.10 3.10 -4.10
-1.20 2.20 3.20 -4.20
-"""
-
-CHANNELS = (
-    "Xposition",
-    "Yposition",
-    "Zposition",
-    "Zrotation",
-    "Xrotation",
-    "yrotation",
-    "Xscale",
-    "Bend",
-)
-NAMES = ("Hips", "left arm", "Bein#1", "naïve", "{}"[:0], "a\tb", "End", "ROOT")
-TOKENS = st.one_of(
-    st.floats(allow_nan=False, allow_infinity=False, width=32).map(lambda x: f"{x:.4f}"),
-    st.floats(-1e3, 1e3).map(lambda x: f"{x:.6g}"),
-    st.sampled_from(
-        ["0", "-0", "-0.0", ".5", "1e-5", "1E+003", "nan", "+7", "0001", "1.", "-1.#IND"]
-    ),
-    st.floats().map(repr),
-)
+from tests.formats.text_files import BVH, bvh_texts
 
 
-@st.composite
-def hierarchies(draw: st.DrawFn) -> tuple[str, int]:
-    """A HIERARCHY section and its number of channels."""
-    eol = st.sampled_from(["\n", "\r\n", " \n", "\t\r\n"])
-    lines, total, depth = ["HIERARCHY"], 0, 0
-    for _ in range(draw(st.integers(1, 4))):
-        close = draw(st.integers(0, depth))
-        lines += ["}"] * close
-        depth -= close
-        channels = draw(st.lists(st.sampled_from(CHANNELS), max_size=6))
-        total += len(channels)
-        lines += [
-            f"{'JOINT' if depth else 'ROOT'} {draw(st.sampled_from(NAMES))}",
-            "{",
-            f"OFFSET {draw(st.sampled_from(['0 0 0', '1e-3 -2.5 3', '0.0 10 .5']))}",
-            " ".join(["CHANNELS", str(len(channels)), *channels]),
-        ]
-        depth += 1
-        for _ in range(draw(st.integers(0, 2))):
-            lines += ["End Site", "{", "OFFSET 0 1 0", "}"]
-    lines += ["}"] * depth
-    return "".join(line + draw(eol) for line in lines), total
-
-
-@st.composite
-def texts(draw: st.DrawFn) -> bytes:
-    """A BVH file of any layout."""
-    head, n_channels = draw(hierarchies())
-    n_rows = draw(st.integers(0, 6))
-    gap = st.sampled_from([" ", "\t", "  ", " \t"])
-    usual, end = draw(gap), draw(st.sampled_from(["\n", "\r\n", " \n", " "]))
-    irregular = draw(st.booleans())
-    body = ""
-    for _ in range(n_rows if n_channels else 0):
-        body += (
-            draw(st.sampled_from(["", "", "  ", "\n", "# a comment 1 2\n"])) if irregular else ""
-        )
-        row = [draw(TOKENS) for _ in range(n_channels)]
-        gaps = [draw(gap) if irregular else usual for _ in row]
-        body += "".join(
-            g * (k > 0) + token for k, (g, token) in enumerate(zip(gaps, row, strict=True))
-        )
-        body += draw(st.sampled_from(["\n", "\r\n", " \n", " "])) if irregular else end
-    if draw(st.booleans()):
-        body = body.rstrip()
-    count = draw(st.sampled_from([str(n_rows), str(n_rows + 1), "007", "many"]))
-    time = draw(st.sampled_from(["0.008333", ".0083333", "0", "1", "0.04", "1e-2", "x"]))
-    motion = f"MOTION\nFrames: {count}\r\nFrame Time:\t{time}\n"
-    return (head + motion + body).encode()
-
-
-@given(texts())
-def test_any_text_comes_back(data: bytes) -> None:
-    motion = bvh.read(data, "clip")
-    assert bvh.write(motion) == data
-
-
-@given(texts(), st.data())
-def test_a_changed_value_changes_only_its_token(data: bytes, draw: st.DataObject) -> None:
-    motion = bvh.read(data, "clip")
-    signal = motion.signals[0]
-    if signal.values.size == 0:
-        return
-    cell = draw.draw(st.integers(0, signal.values.size - 1))
-    values = signal.values.copy()
-    values.flat[cell] = 3.0 if values.flat[cell] != 3.0 else 4.0
-    changed = bvh.write(motion.with_values(values))
-    at = _only_difference(data, changed)
-    again = bvh.read(changed, "clip")
-    assert np.array_equal(again.signals[0].values, values, equal_nan=True)
-    assert again.source is not None and at is not None
-
-
-def _only_difference(old: bytes, new: bytes) -> int | None:
-    """The offset of the one token that differs; fails if there are more."""
-    a, b = old.split(), new.split()
-    assert len(a) == len(b)
-    differ = [k for k, (x, y) in enumerate(zip(a, b, strict=True)) if x != y]
-    assert len(differ) == 1
-    return differ[0]
-
-
-@given(texts(), st.data())
+@given(bvh_texts(), st.data())
 def test_a_range_of_frames_can_be_written(data: bytes, draw: st.DataObject) -> None:
     motion = bvh.read(data, "clip")
     n_frames = motion.n_frames
@@ -176,7 +51,7 @@ def cut_motion(motion: Motion, start: int, stop: int) -> Motion:
 
 
 def test_what_a_file_says() -> None:
-    motion = bvh.read(SMALL, "walk")
+    motion = bvh.read(BVH, "walk")
     hips, arm = motion.skeleton.joints
     assert (hips.name, arm.name, arm.parent) == ("Hips", "left arm", 0)
     assert arm.offset == (1.5, -0.2, 0.0) and arm.tails == ((0.0, 1.0, 0.0),)
@@ -189,15 +64,15 @@ def test_what_a_file_says() -> None:
 
 
 def test_clips_that_differ_in_length_share_their_template() -> None:
-    shorter = SMALL.replace(b"Frames: 3", b"Frames: 2")[: SMALL.index(b"1.20") - 0]
-    a, b = bvh.read(SMALL, "a").source, bvh.read(shorter, "b").source
+    shorter = BVH.replace(b"Frames: 3", b"Frames: 2")[: BVH.index(b"1.20") - 0]
+    a, b = bvh.read(BVH, "a").source, bvh.read(shorter, "b").source
     assert a is not None and b is not None
     assert a.template == b.template
     assert a.detail == b.detail
 
 
 def test_latin_1_names_are_flagged() -> None:
-    data = SMALL.replace(b"Hips", b"H\xfcfte")
+    data = BVH.replace(b"Hips", b"H\xfcfte")
     motion = bvh.read(data, "walk")
     assert motion.skeleton.joints[0].name == "Hüfte"
     assert motion.metadata["name-encoding"] == "latin-1"
@@ -205,7 +80,7 @@ def test_latin_1_names_are_flagged() -> None:
 
 
 def test_a_frame_count_that_is_wrong_is_reported() -> None:
-    data = SMALL.replace(b"Frames: 3", b"Frames: 4")
+    data = BVH.replace(b"Frames: 3", b"Frames: 4")
     motion = bvh.read(data, "walk")
     assert motion.metadata["source-note"] == "4 frames are declared, 3 are there"
     assert bvh.write(motion) == data
@@ -223,7 +98,7 @@ def test_a_joint_without_channels_anywhere_has_a_row_a_line() -> None:
 
 @pytest.mark.parametrize("width", ["%8.3f", "%-8.3f", "% .3f"])
 def test_padded_columns_need_no_pattern_a_row(width: str) -> None:
-    head, _, _ = SMALL.partition(b"1.00 2.00")
+    head, _, _ = BVH.partition(b"1.00 2.00")
     values = np.random.default_rng(1).normal(0, 40, (400, 4))
     body = "".join(" ".join(width % x for x in row) + "\n" for row in values)
     data = head + body.encode()
@@ -237,7 +112,7 @@ def test_padded_columns_need_no_pattern_a_row(width: str) -> None:
     ("first", "adds"), [(b"0.5 -1.0 0.0", True), (b"9.0 21.0 0.0", False), (b"0.0 0.0 0.0", True)]
 )
 def test_positions_near_the_offset_replace_it(first: bytes, adds: bool) -> None:
-    data = SMALL.replace(b"OFFSET 0 0 0", b"OFFSET 10 20 0").replace(b"1.00 2.00 3.00", first)
+    data = BVH.replace(b"OFFSET 0 0 0", b"OFFSET 10 20 0").replace(b"1.00 2.00 3.00", first)
     assert bvh.read(data, "walk").skeleton.joints[0].adds_to_offset is adds
 
 
@@ -259,29 +134,10 @@ def test_positions_near_the_offset_replace_it(first: bytes, adds: bool) -> None:
     ],
 )
 def test_what_cannot_be_read_is_refused(old: bytes, new: bytes, message: str) -> None:
-    assert old in SMALL
+    assert old in BVH
     with pytest.raises(SourceError) as error:
-        bvh.read(SMALL.replace(old, new, 1), "bad")
+        bvh.read(BVH.replace(old, new, 1), "bad")
     assert message in str(error.value)
-
-
-@given(st.integers(0, len(SMALL)))
-def test_every_prefix_is_read_or_refused(size: int) -> None:
-    try:
-        motion = bvh.read(SMALL[:size], "prefix")
-    except SourceError:
-        return
-    assert bvh.write(motion) == SMALL[:size]
-
-
-@given(st.integers(0, len(SMALL) - 1), st.integers(0, 255))
-def test_every_changed_byte_is_read_or_refused(at: int, byte: int) -> None:
-    data = SMALL[:at] + bytes([byte]) + SMALL[at + 1 :]
-    try:
-        motion = bvh.read(data, "changed")
-    except SourceError:
-        return
-    assert bvh.write(motion) == data
 
 
 def plain(skeleton: Skeleton, values: np.ndarray, **more: object) -> Motion:
@@ -376,7 +232,7 @@ def test_joints_lie_only_so_deep() -> None:
 def test_channels_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hierarchy, "MOST_CHANNELS", 3)
     with pytest.raises(SourceError, match="line 9: more than 3 channels"):
-        bvh.read(SMALL)
+        bvh.read(BVH)
 
 
 def test_limits_are_those_of_the_largest_profile() -> None:
@@ -384,31 +240,14 @@ def test_limits_are_those_of_the_largest_profile() -> None:
     assert BASE.joints == limits.MOST_DEPTH
 
 
-@pytest.mark.parametrize("live", [False, True])
-def test_a_byte_order_mark_is_kept(live: bool) -> None:
-    data = b"\xef\xbb\xbf" + SMALL
+def test_a_byte_order_mark_is_kept_of_text_that_arrives() -> None:
+    data = b"\xef\xbb\xbf" + BVH
     assert likely_formats(data) == ("bvh",)
-    if live:
-        arriving = bvh.arrive(iter(data.splitlines(keepends=True)))
-        assert [joint.name for joint in arriving.skeleton.joints] == ["Hips", "left arm"]
-        return
-    motion = bvh.read(data)
-    assert motion.skeleton == bvh.read(SMALL).skeleton
-    assert bvh.write(motion) == data
-    out = io.BytesIO()
-    mcz.write(motion, out)
-    with mcz.open(out.getvalue()) as file:
-        assert file.only_clip().source_bytes() == data
-
-
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
-def test_wide_text_is_refused_by_its_name(encoding: str) -> None:
-    data = SMALL.decode().encode(encoding)
-    for read in (bvh.read, amc.read, asf.read):
-        with pytest.raises(SourceError, match=f"the text is {encoding[:6].upper()}.*save it as"):
-            read(data)
-    with pytest.raises(SourceError, match=encoding[:6].upper()):
-        bvh.arrive(iter(data.splitlines(keepends=True)))
+    arriving = bvh.arrive(iter(data.splitlines(keepends=True)))
+    assert [joint.name for joint in arriving.skeleton.joints] == ["Hips", "left arm"]
+    wide = BVH.decode().encode("utf-16")
+    with pytest.raises(SourceError, match="UTF-16"):
+        bvh.arrive(iter(wide.splitlines(keepends=True)))
 
 
 def test_a_byte_order_mark_before_acclaim_hides_nothing(samples: Path) -> None:

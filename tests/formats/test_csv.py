@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import tracemalloc
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import FormatError, LimitError, MczError, MotionError, SourceError
+from mcz.errors import FormatError, MotionError, SourceError
 from mcz.formats import FORMATS, likely_formats
 from mcz.formats.csv_files import is_motion, kind_of
 from mcz.formats.csv_text import cells_of
@@ -23,8 +21,6 @@ from mcz.motion import Motion
 from mcz.sample import bvh_walk
 from tests.formats.csv_files import column_files, motive_files, vicon_files
 from tools.vectors.build.table_files import COLUMNS, DEVICES, EULER, MOTIVE, ODD_SECTIONS, VICON
-
-SMALL = {"motive": MOTIVE, "vicon": VICON, "csv": COLUMNS}
 
 
 def back(data: bytes) -> Motion:
@@ -62,47 +58,6 @@ def test_any_columns_come_back(data: bytes) -> None:
     motion = back(data)
     assert said(motion) == "csv"
     assert {channel.kind for channel in motion.skeleton.channels} <= {""}
-
-
-@given(motive_files() | vicon_files() | column_files(), st.data())
-def test_what_is_cut_off_is_read_exactly_or_refused(data: bytes, choice: st.DataObject) -> None:
-    cut = data[: choice.draw(st.integers(0, len(data)))]
-    try:
-        motion = FORMATS["csv"].read(cut, "table")
-    except SourceError as error:
-        assert "\n" not in str(error)
-    else:
-        assert FORMATS["csv"].write(motion) == cut
-
-
-@given(st.sampled_from([MOTIVE, EULER, VICON, DEVICES, ODD_SECTIONS, COLUMNS]), st.data())
-def test_what_is_damaged_is_read_exactly_or_refused(data: bytes, choice: st.DataObject) -> None:
-    at, bit = choice.draw(st.integers(0, len(data) - 1)), choice.draw(st.integers(0, 7))
-    damaged = data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :]
-    try:
-        motion = FORMATS["csv"].read(damaged, "table")
-    except (SourceError, LimitError) as error:
-        assert "\n" not in str(error)
-    else:
-        assert FORMATS["csv"].write(motion) == damaged
-
-
-@pytest.mark.parametrize("name", SMALL)
-@pytest.mark.parametrize("effort", ["fast", "best"])
-def test_stored_and_restored(name: str, effort: str, tmp_path: Path) -> None:
-    source, target = tmp_path / "table.csv", io.BytesIO()
-    source.write_bytes(SMALL[name])
-    mcz.encode(source, target, effort=effort)
-    again = back(SMALL[name])
-    with mcz.open(target.getvalue()) as file:
-        clip = file.only_clip()
-        assert clip.source_bytes() == SMALL[name]
-        assert clip.source is not None and clip.source.format == name
-        motion = clip.motion()
-    assert np.array_equal(motion.values, again.values, equal_nan=True)
-    assert motion.skeleton.joints == again.skeleton.joints
-    for mine, theirs in zip(motion.signals, again.signals, strict=True):
-        assert np.array_equal(mine.masked(), theirs.masked(), equal_nan=True)
 
 
 def test_motive_says_its_bones_and_markers() -> None:
@@ -285,25 +240,6 @@ def test_notes_of_sections_are_cut_and_joined(patterns: list[int], data: st.Data
     assert np.array_equal(found.patterns, np.repeat(rows, 2))
     with pytest.raises(FormatError, match="rows a frame"):
         again.of(1, 3, 3 * n)
-
-
-@given(st.binary(max_size=40))
-def test_hostile_notes_and_templates_are_refused(noise: bytes) -> None:
-    motion = back(VICON)
-    assert motion.source is not None
-    for key in ("template", "detail"):
-        given_bytes = getattr(motion.source, key)
-        for damaged in (noise, given_bytes[: len(noise)] + noise + given_bytes[2 * len(noise) :]):
-            source = replace(motion.source, **{key: damaged})
-            try:
-                FORMATS["csv"].write(replace(motion, source=source))
-            except (FormatError, LimitError):
-                continue
-    try:
-        source = replace(motion.source, notes=join_table_notes([(0, 3, noise)]))
-        FORMATS["csv"].write(replace(motion, source=source))
-    except MczError as error:
-        assert "\n" not in str(error)
 
 
 def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:
