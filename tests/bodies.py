@@ -8,17 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import mcz
+from mcz import Channel, Joint, Motion, Signal
 from mcz.kinematics.rotation_vectors import continuous
-from mcz.motion import (
-    POSITION_KINDS,
-    QUATERNION_KINDS,
-    TURNING_KINDS,
-    VECTOR_KINDS,
-    Channel,
-    Joint,
-    Motion,
-    Signal,
-)
+from mcz.motion import POSITION_KINDS, QUATERNION_KINDS, TURNING_KINDS, VECTOR_KINDS
 
 NO_AXIS = (0.0, 0.0, 0.0)
 

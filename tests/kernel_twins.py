@@ -23,11 +23,10 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz import kernels
+from mcz import Channel, Joint, Motion, Signal, Skeleton, kernels
 from mcz.codecs import CODECS
 from mcz.coding.ordinals.counts import BINARY32, Law
 from mcz.formats import bvh
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from mcz.sample import bvh_walk
 from tests.codecs.lossy import markers, rough, saved

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mcz import FormatError, LostFrameError, OptionError
 from mcz.codecs.contract import Codec, Encoded, Segment
 from mcz.codecs.parameters import Parameter, integer, number
-from mcz.errors import FormatError, LostFrameError, OptionError
 from mcz.schema import read_varint, varint
 
 ID = 252

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 from hypothesis import strategies as st
 
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 
 ROTATIONS = (Channel("rz"), Channel("ry"), Channel("rx"))

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mcz import FormatError
 from mcz.codecs.contract import Codec, Encoded, Segment
 from mcz.codecs.parameters import Parameter, integer
-from mcz.errors import FormatError
 
 ID = 251
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mcz.motion import Channel, Joint, Skeleton
+from mcz import Channel, Joint, Skeleton
 
 KINDS = "tx ty tz rx ry rz sx sy sz length".split()
 QUATERNION = "qw qx qy qz".split()

@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, Joint, Motion, Signal, Skeleton
+from mcz.motion import POSITION_KINDS
 from mcz.numbers import GridKind
+from tests.commands import run
 
 POSITION = tuple(map(Channel, POSITION_KINDS))
 
@@ -370,7 +370,7 @@ def take(samples: Path, tmp_path: Path) -> Path:
 
 
 def view(*words: object) -> int:
-    return int(run(cli, "mcz", ["view", *map(str, words)]))
+    return int(run("view", *map(str, words)))
 
 
 @pytest.mark.filterwarnings("ignore")

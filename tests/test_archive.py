@@ -16,19 +16,10 @@ import pytest
 
 import mcz
 from mcz.container import payloads
-from mcz.container.chunks import FOOT
 from mcz.container.writer import Writer
 from mcz.editing.unpacking import safe_path
 from mcz.motion import joint_columns
-from mcz.sample import write_samples
 from tests.web_server import Server, served
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("samples")
-    write_samples(folder)
-    return folder
 
 
 @pytest.fixture
@@ -92,27 +83,6 @@ def test_two_packs_are_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     for name in ("one.mcz", "two.mcz"):
         mcz.pack(folder, tmp_path / name, keep_all=True)
     assert (tmp_path / "one.mcz").read_bytes() == (tmp_path / "two.mcz").read_bytes()
-
-
-def test_append_adds_and_shares(samples: Path, tmp_path: Path) -> None:
-    path = tmp_path / "a.mcz"
-    mcz.encode(samples / "walk.bvh", path)
-    size = path.stat().st_size
-    mcz.append([samples / "walk.amc"], path)
-    with mcz.open(path) as file:
-        assert list(file.clips) == ["walk", "walk.amc"]
-        assert file.clips["walk"].source_bytes() == (samples / "walk.bvh").read_bytes()
-        assert file.clips["walk.amc"].source_bytes() == (samples / "walk.amc").read_bytes()
-    assert path.read_bytes()[size - FOOT.size : size].endswith(b"\x89ZCM\r\n\x1a\n")
-
-
-def test_append_that_fails_changes_nothing(samples: Path, tmp_path: Path) -> None:
-    path = tmp_path / "a.mcz"
-    mcz.encode(samples / "walk.bvh", path)
-    before = path.read_bytes()
-    with pytest.raises(mcz.SourceError, match="none.bvh"):
-        mcz.append([samples / "walk.amc", tmp_path / "none.bvh"], path)
-    assert path.read_bytes() == before
 
 
 def small(tmp_path: Path) -> tuple[Path, Path]:

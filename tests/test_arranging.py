@@ -13,13 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz import codecs
+from mcz import LiveWriter, codecs
 from mcz.container.chunks import REPEAT, Chunk
 from mcz.container.scan import scan
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.editing.arranging import natural
-from mcz.live.writer import LiveWriter
 from mcz.sample import write_samples
 from tests import live_codec
 from tests.motions import skeleton

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 
 import mcz
-from mcz import bjontegaard
+from mcz import Motion, OptionError, bjontegaard
 from mcz.bench import cache, ladder, peers, plots, tasks
 from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants_of
 from mcz.bench.measure import cpu_seconds, peak_bytes, point, speeds
@@ -25,8 +25,6 @@ from mcz.bench.tasks import KINDS, Runner, Task, perform
 from mcz.bjontegaard import bd_rate, bd_sqnr
 from mcz.cli.common import run as run_command
 from mcz.codecs.parameters import Dial
-from mcz.errors import OptionError
-from mcz.motion import Motion
 from tests.motions import smooth
 
 SIZES = (1000.0, 2000.0, 4000.0, 8000.0, 16000.0)

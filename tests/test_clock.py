@@ -14,11 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.clock import Timeline
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.tables.events import EVENT_EXPORTS
+from tests.commands import run
 from tests.formats.c3d_files import Made
 
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
@@ -51,14 +50,6 @@ def test_frame_1_is_at_0() -> None:
     near(markers(3).times, [0, 0.01, 0.02])
     near(markers(3, frame_numbers=np.array([101, 102, 150])).times, [1, 1.01, 1.49])
     near(mcz.times(markers(5), slice(-2, None)), [0.03, 0.04])
-
-
-def test_start_time_is_that_of_the_first_frame() -> None:
-    motion = markers(3, metadata={"start-time": "-0.5"}, frame_numbers=np.array([7, 8, 10]))
-    near(motion.times, [-0.5, -0.49, -0.47])
-    near(stored(motion).times, motion.times)
-    near(motion.cut(1, 3).times, motion.times[1:])
-    near(stored(motion.cut(1, 3)).times, motion.times[1:])
 
 
 def test_a_signal_of_times_comes_first() -> None:
@@ -146,17 +137,6 @@ def test_the_clock_outlives_the_source(tmp_path: Path) -> None:
         assert made.frame_numbers is not None and made.frame_numbers.tolist() == NUMBERS
 
 
-def test_irregular_times_outlive_the_source(tmp_path: Path) -> None:
-    (tmp_path / "w.sto").write_text(
-        "w\nversion=1\nnRows=4\nnColumns=2\ninDegrees=no\nendheader\ntime\tx\n"
-        "1.0\t1\n1.013\t2\n1.5\t3\n1.71\t4\n"
-    )
-    motion = mcz.read(tmp_path / "w.sto")
-    near(motion.times, [1, 1.013, 1.5, 1.71])
-    near(mcz.select(motion, ["x"]).times, motion.times)
-    near(stored(mcz.select(motion, ["x"])).times, motion.times)
-
-
 def test_a_decimated_clip_keeps_its_times(tmp_path: Path) -> None:
     trc(tmp_path / "w.trc", list(range(125, 190)), digits=6)
     out = tmp_path / "w.mcz"
@@ -166,15 +146,6 @@ def test_a_decimated_clip_keeps_its_times(tmp_path: Path) -> None:
         thin = clip.motion((3, 60), 1, decimate=True)
         assert np.abs(thin.times - clip.times[3:60:2]).max() <= 1e-6
         assert np.abs(stored(thin).times - clip.times[3:60:2]).max() <= 1e-6
-
-
-def test_cut_files_keep_the_clock(tmp_path: Path) -> None:
-    motion = markers(30, metadata={"start-time": "2.5"})
-    mcz.write(motion, tmp_path / "a.mcz")
-    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(10, 20))
-    with mcz.open(tmp_path / "b.mcz") as file:
-        near(file.only_clip().times, motion.times[10:20])
-        near(file.only_clip().motion((5, 10)).times, motion.times[15:20])
 
 
 @pytest.mark.parametrize("digits", [2, 3, 6])
@@ -545,20 +516,13 @@ def test_info_says_first_last_and_gaps(tmp_path: Path, capsys: pytest.CaptureFix
     motion = read_case(case, tmp_path)
     mcz.write(motion, tmp_path / "a.mcz")
     for name in ("a.trc", "a.mcz"):
-        assert run(cli, "mcz", ["info", str(tmp_path / name)]) == 0
+        assert run("info", tmp_path / name) == 0
         shown = capsys.readouterr().out
         assert "15 frames at 100 Hz (0.41 s)" in shown
         assert "time       1.23 s to 1.63 s, 1 gap" in shown
-        assert run(cli, "mcz", ["info", "--json", str(tmp_path / name)]) == 0
+        assert run("info", "--json", tmp_path / name) == 0
         (clip,) = json.loads(capsys.readouterr().out)["clips"]
         assert clip["times"] == {"first": 1.23, "last": 1.63, "gaps": 1, "note": None}
-
-
-def test_movement_has_the_times_there_and_back() -> None:
-    motion = moving(GAPPED, metadata={"start-time": "0.1234"})
-    data = mcz.to_movement(motion)
-    near(data.time, motion.times)
-    near(mcz.from_movement(data).times, motion.times)
 
 
 def test_a_signal_of_times_is_the_axis_of_xarray() -> None:
@@ -598,13 +562,13 @@ def test_charts_of_signals_by_channel(tmp_path: Path) -> None:
     assert again[1] == rows[1]
     mcz.write(motion, tmp_path / "a.mcz")
     arguments = ["plot", str(tmp_path / "a.mcz"), "-o", str(tmp_path / "c.svg")]
-    assert run(cli, "mcz", [*arguments, "--signal", "analog", "--channel", label]) == 0
+    assert run(*arguments, "--signal", "analog", "--channel", label) == 0
     for options in (
         ["--signal", "forces"],
         ["--channel", "Fz9"],
         ["--signal", "0", "--joint", "a"],
     ):
-        assert run(cli, "mcz", [*arguments, "--force", *options]) == 2
+        assert run(*arguments, "--force", *options) == 2
     with pytest.raises(mcz.OptionError, match="of all joints, not of 'analog'"):
         mcz.plot(motion, tmp_path / "d.svg", "rate-distortion", signal="analog")
 
@@ -661,7 +625,7 @@ def test_a_start_time_that_changes_nothing_is_told(
     for source, told in (("trc", True), ("bvh", False)):
         path = tmp_path / f"{source}.mcz"
         mcz.write(read_case(CASES[source], tmp_path), path)
-        assert run(cli, "mcz", ["meta", str(path), "--set", "start-time=5"]) == 0
+        assert run("meta", path, "--set", "start-time=5") == 0
         assert ("start-time does not change" in capsys.readouterr().err) == told
         with mcz.open(path) as file:
             assert (file.only_clip().times[0] == 5) == (not told)

@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.conversion import left_out
+from mcz import Channel, Joint, Motion, Signal, Skeleton, left_out
 from mcz.formats import FORMATS
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import bvh_walk
 from tests.conftest import Call
 from tests.glb import Glb

@@ -12,18 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import MotionError, OptionError
-from mcz.kinematics.contacts import (
+from mcz import (
+    Channel,
     Contact,
-    ContactRule,
     Contacts,
+    Joint,
+    Motion,
+    MotionError,
+    OptionError,
+    Signal,
+    Skeleton,
     contacts,
-    frames_in,
-    runs_of,
-    speeds,
 )
+from mcz.kinematics.contacts import ContactRule, frames_in, runs_of, speeds
 from mcz.kinematics.feet import is_foot
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tests.motions import POSITIONS
 
 FEET = (

@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import mcz
+from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.conversion import converted_files
-from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.kinematics import point_names, positions, reach
 from mcz.kinematics.euler import ORDERS, euler_angles, euler_order
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import skeletons, values_for
 
@@ -273,13 +272,6 @@ def test_signals_without_a_place_are_left_out_and_named(to: str) -> None:
         assert made.values.tobytes() == plain.values.tobytes()
         losses = set(mcz.left_out(more, to)) - set(mcz.left_out(motion, to))
         assert losses == {"left out: signal dmpls"}
-
-
-def test_a_converted_motion_can_be_stored(tmp_path: Path) -> None:
-    converted = mcz.convert(WALKS["amc"], "bvh")
-    mcz.write(converted, tmp_path / "walk.mcz")
-    stored = mcz.read(tmp_path / "walk.mcz")
-    assert farthest(positions(converted), positions(stored)) < 1e-5
 
 
 @pytest.mark.real

@@ -14,12 +14,11 @@ from typing import Any
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from mcz import MczError
 from mcz.dask import cluster as clusters
 from mcz.dask import map_clips, packing, reading
 from mcz.dask.sources import skeletons_beside
-from mcz.errors import MczError
+from tests.commands import run
 
 pack, verify = packing.pack, reading.verify
 
@@ -164,7 +163,7 @@ def test_a_cluster_packs_and_verifies(
 ) -> None:
     target = tmp_path / "all.mcz"
     words = ["pack", str(folder), str(target), "--scheduler", cluster.scheduler_address]
-    assert run(cli, "mcz", words) == 1  # broken.bvh
+    assert run(*words) == 1  # broken.bvh
     assert target.read_bytes() == packed[0].read_bytes()
     assert verify(target, cluster.scheduler_address) == []
     assert map_clips(target, lambda clip: clip.n_frames, cluster.scheduler_address)

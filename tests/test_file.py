@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given
 
 import mcz
+from mcz import Signal
 from mcz.annexes import annex_bytes
 from mcz.container.frame_numbers import frame_number_metadata, parse_frame_numbers
 from mcz.container.value_hash import canonical
-from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import info
 from mcz.writing.names import METADATA_KEYS
@@ -43,26 +43,6 @@ def test_any_motion_comes_back(motion: mcz.Motion) -> None:
         all_valid = np.ones(one.values.shape, bool)
         left = all_valid if one.mask is None else one.mask
         np.testing.assert_array_equal(left, all_valid if other.mask is None else other.mask)
-
-
-def test_slices_like_an_array() -> None:
-    motion = smooth(50)
-    with mcz.open(written(motion, segment_frames=7)) as file:
-        values = file.clips["smooth"].values
-        assert values.shape == (50, 10)
-        assert len(values) == 50
-        for key in (
-            slice(None),
-            slice(10, 20),
-            slice(45, 99),
-            slice(3, 40, 5),
-            slice(None, None, -3),
-        ):
-            np.testing.assert_array_equal(values[key], motion.values[key])
-        np.testing.assert_array_equal(values[-1], motion.values[-1])
-        np.testing.assert_array_equal(np.asarray(values), motion.values)
-        with pytest.raises(IndexError):
-            values[50]
 
 
 def test_joints_by_name_and_index() -> None:
@@ -158,16 +138,6 @@ def test_output_limit() -> None:
         assert file.clips["smooth"].read((0, 12)).shape == (12, 10)
 
 
-def test_writing_replaces_only_by_force(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcz"
-    mcz.write(smooth(5), path)
-    with pytest.raises(mcz.OptionError, match="exists"):
-        mcz.write(smooth(6), path)
-    mcz.write(smooth(6), path, force=True)
-    assert mcz.read(path).n_frames == 6
-    assert [p.name for p in tmp_path.iterdir()] == ["a.mcz"]
-
-
 def test_failed_write_leaves_nothing(tmp_path: Path) -> None:
     path = tmp_path / "a.mcz"
     mcz.write(smooth(5), path)
@@ -202,20 +172,6 @@ def test_unit_and_rate_are_taken_not_guessed(tmp_path: Path) -> None:
     for arguments in ({"rate": 0}, {"rate": "fast"}, {"rate": float("inf")}, {"unit": "ell"}):
         with pytest.raises(mcz.OptionError):
             mcz.read(path, **arguments)
-
-
-def test_missing_file_is_one_plain_error(tmp_path: Path) -> None:
-    with pytest.raises(mcz.OptionError, match="No such file"):
-        mcz.open(tmp_path / "none.mcz")
-    with pytest.raises(mcz.SourceError, match="No such file"):
-        mcz.read(tmp_path / "none.bvh")
-
-
-def test_not_an_mcz_file(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcz"
-    path.write_bytes(b"HIERARCHY\nROOT hips\n" * 20)
-    with pytest.raises(mcz.FormatError, match="not an MCZ file"):
-        mcz.open(path)
 
 
 def test_skeleton_comes_back_to_the_bit() -> None:

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.container.chunks import read_payload
 from mcz.container.scan import scan
 from mcz.reading.report import info
+from tests.commands import run
 
 VECTORS = sorted((Path(mcz.__file__).parents[1] / "conformance/vectors/valid").rglob("*.mcz"))
 KINDS = {"skeletons": b"SKEL", "models": b"MODL", "quality": b"QUAL"}
@@ -55,9 +54,9 @@ def test_parts_and_ratio_of_the_samples(
         "walk.asf": ["walk.asf"],
     }.items():
         target = tmp_path / f"{name}.mcz"
-        assert run(cli, "mcz", ["encode", str(samples / name), "-o", str(target)]) == 0
+        assert run("encode", samples / name, "-o", target) == 0
         encoded = capsys.readouterr().out
-        assert run(cli, "mcz", ["info", str(target)]) == 0
+        assert run("info", target) == 0
         shown = capsys.readouterr().out
         check(target)
         size = target.stat().st_size
@@ -78,9 +77,9 @@ def test_a_small_file_has_no_ratio_without_its_skeleton(
     lines[at] = "Frames: 2\n"
     short = tmp_path / "short.bvh"
     short.write_text("".join(lines[: at + 4]))
-    assert run(cli, "mcz", ["encode", str(short), "--codec", "lossy", "--unit", "cm"]) == 0
+    assert run("encode", short, "--codec", "lossy", "--unit", "cm") == 0
     capsys.readouterr()
-    assert run(cli, "mcz", ["info", str(tmp_path / "short.mcz")]) == 0
+    assert run("info", tmp_path / "short.mcz") == 0
     out = capsys.readouterr().out
     true = short.stat().st_size / (tmp_path / "short.mcz").stat().st_size
     against_files = [float(text) for text in re.findall(r"([\d.]+) : 1, the files", out)]

@@ -11,12 +11,11 @@ from typing import Any
 import pytest
 
 import mcz
+from mcz import File, FormatError, OptionError
 from mcz.codecs import CODECS, by_name
 from mcz.container.writer import Writer
-from mcz.errors import FormatError, OptionError
 from mcz.queries import Query
 from mcz.reading.fields import FIELDS
-from mcz.reading.file import File
 from mcz.reading.report import info, part_problems
 from mcz.schema import parse_until
 from mcz.writing.clip_writer import write_clip

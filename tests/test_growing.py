@@ -96,13 +96,6 @@ def cut(folder: Path) -> Path:
     return folder
 
 
-def test_whole_clips_behind_the_last_foot_are_named(cut: Path) -> None:
-    before = (cut / "a.mcz").read_bytes()
-    with pytest.raises(mcz.FormatError, match="two; salvage keeps them, force drops them"):
-        mcz.append([cut / "three.bvh"], cut / "a.mcz")
-    assert (cut / "a.mcz").read_bytes() == before
-
-
 @pytest.mark.parametrize("keep", [True, False])
 def test_whole_clips_behind_the_last_foot(cut: Path, keep: bool) -> None:
     path = cut / "a.mcz"

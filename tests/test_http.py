@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from mcz import AccessError
 from mcz.container import http, http_connections
-from mcz.errors import AccessError
+from tests.commands import run
 from tests.motions import smooth
 from tests.web_server import Answering, Server, ranged, served
 
@@ -151,7 +150,7 @@ def test_a_failure_is_one_line_of_a_command(
     server: Server, capsys: pytest.CaptureFixture[str]
 ) -> None:
     server.wrong = status(500)
-    assert run(cli, "mcz", ["info", server.address]) == 1
+    assert run("info", server.address) == 1
     said = capsys.readouterr().err
     assert said.startswith(f"mcz: {server.address}: the server answers 500") and "\n" in said
 

@@ -11,12 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import MotionError, OptionError
+from mcz import Channel, Joint, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import points_and_markers_of, positions_of, reach
 from mcz.kinematics.inverse import solve_ik
 from mcz.kinematics.marker_motion import virtual_marker_names
 from mcz.kinematics.targets import Targets, unsolved_channels
-from mcz.motion import Channel, Joint, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk
 from tests.skeletons import skeletons, values_for
 from tools.papers.hou2016.ways_back import angle_errors

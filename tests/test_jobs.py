@@ -19,13 +19,12 @@ import pytest
 
 import mcz
 from mcz import jobs
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.editing import coded_parts
 from mcz.jobs.pool import Pool
 from mcz.reading import sharing
 from mcz.reading.report import validate
 from mcz.sample import write_samples
+from tests.commands import run
 from tests.worker_functions import dies, dies_once, fails, joined
 
 
@@ -179,7 +178,7 @@ def test_processes_give_the_same(folder: Path, tmp_path: Path) -> None:
     wanted = outcomes(mcz.pack(folder, one))
     assert outcomes(mcz.pack(folder, two, jobs=2)) == wanted
     assert two.read_bytes() == one.read_bytes()
-    assert run(cli, "mcz", ["verify", str(two), "--jobs", "2"]) == 0
+    assert run("verify", two, "--jobs", "2") == 0
     with pytest.raises(mcz.OptionError, match="jobs: 0, not at least 1"):
         mcz.verify(one, jobs=0)
 
@@ -314,6 +313,6 @@ def test_an_interrupt_leaves_nothing(
 
     monkeypatch.setattr(coded_parts, "join", interrupted)
     words = ["pack", str(folder), str(tmp_path / "all.mcz"), "--jobs", "2"]
-    assert run(cli, "mcz", words) == 130
+    assert run(*words) == 130
     assert list(tmp_path.iterdir()) == []
     assert capfd.readouterr().err.split() == ["mcz:", "interrupted"]

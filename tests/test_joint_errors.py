@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.errors import MotionError
+from mcz import MotionError
 from mcz.joint_errors import joint_errors
 from mcz.kinematics import origins_of
+from tests.commands import run
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +23,7 @@ def converted(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
     motion = mcz.convert(mcz.read(samples / "walk.amc", rate=120), "bvh")
     mcz.write(motion, path.with_suffix(".mcz"))
     code = ["decode", str(path.with_suffix(".mcz")), "--to", "bvh", "-o", str(path)]
-    assert run(cli, "mcz", code) == 0
+    assert run(*code) == 0
     return path
 
 
@@ -33,10 +32,10 @@ def test_an_amc_and_its_bvh_are_compared(
 ) -> None:
     amc = str(samples / "walk.amc")
     capsys.readouterr()
-    assert run(cli, "mcz", ["diff", amc, str(converted), "--unit", "cm"]) == 0
+    assert run("diff", amc, converted, "--unit", "cm") == 0
     text = capsys.readouterr().out
     assert "31 joints of the same name: mean " in text and "alone" not in text
-    assert run(cli, "mcz", ["diff", amc, str(converted), "--json"]) == 0
+    assert run("diff", amc, converted, "--json") == 0
     found = json.loads(capsys.readouterr().out)["clips"][0]["joints"]
     assert len(found["joints"]) == 31 and found["greatest"] < 1e-3
     assert found["greatest_cm"] is None and found["only_in_a"] == found["only_in_b"] == []
@@ -46,7 +45,7 @@ def test_names_that_one_has_alone_are_told(
     samples: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     amc, bvh = str(samples / "walk.amc"), str(samples / "walk.bvh")
-    assert run(cli, "mcz", ["diff", amc, bvh]) == 0
+    assert run("diff", amc, bvh) == 0
     text = capsys.readouterr().out
     assert "joints of the same name: mean" in text or "joint of the same name: mean" in text
     assert f"joints of {amc} alone: root, " in text
@@ -55,7 +54,7 @@ def test_names_that_one_has_alone_are_told(
 
 def test_like_skeletons_need_no_names(samples: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bvh = str(samples / "walk.bvh")
-    assert run(cli, "mcz", ["diff", bvh, bvh, "--json"]) == 0
+    assert run("diff", bvh, bvh, "--json") == 0
     assert json.loads(capsys.readouterr().out)["clips"][0]["joints"] is None
 
 

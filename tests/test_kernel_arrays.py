@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, Joint, Motion, Signal, Skeleton
 from tests.kernel_builds import MODES, sample
 
 Array = np.ndarray

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import MotionError, OptionError
+from mcz import Channel, Joint, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import (
     chain,
     depths,
@@ -24,7 +24,6 @@ from mcz.kinematics import (
 )
 from mcz.kinematics.sensitivity import sensitivities
 from mcz.kinematics.single import FramePositions
-from mcz.motion import Channel, Joint, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for
 

@@ -14,11 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz import codecs
+from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, codecs
 from mcz.angles import Unwrapper, turns, unwrap
 from mcz.codecs.contract import Encoded, Segment
-from mcz.errors import MotionError
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.writing.quality import LEFT_OUT, quality_entries
 from tests import overlap_codec
 from tests.motions import POSITIONS, motions, skeleton, smooth

@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import MotionError, OptionError
+from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import origins_of, points_of, reach
-from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.retargeting.sides import counterparts
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth

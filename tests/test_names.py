@@ -15,11 +15,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.errors import OptionError
-from mcz.motion import Exceptions
+from mcz import Exceptions, OptionError
 from mcz.numbers import Grid, GridKind
+from tests.commands import run
 from tests.motions import smooth
 
 
@@ -83,7 +81,7 @@ def test_all_commands_find_it(
         ["replace", archive, f"{out}2.mcz", "--clip=run", "--joint=0", f"--values={out}.csv"],
         ["diff", archive, archive, "--clip", "run"],
     ):
-        assert run(cli, "mcz", [str(a) for a in arguments]) == 0, capsys.readouterr().err
+        assert run(*arguments) == 0, capsys.readouterr().err
     assert mcz.read(archive, clip="run").name == "a/run"
     assert mcz.read(f"{out}2.mcz", clip="run").name == "a/run"
 

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mcz import schema
-from mcz.errors import FormatError, OptionError, SourceError
+from mcz import FormatError, OptionError, SourceError, schema
 from mcz.numbers import (
     GRID,
     Grid,
@@ -312,33 +311,6 @@ def test_around_powers_of_ten(power: int, steps: int, digits: int) -> None:
         value = math.nextafter(value, math.copysign(math.inf, steps))
     (found,), _ = Grid(GridKind.GENERAL, digits).ordinals(np.array([value]))
     assert found == by_steps(value, digits)
-
-
-TABLE = [  # grid, text, ordinal: the worked examples of SPEC.md, "Number grids"
-    (Grid(GridKind.FIXED, 4), "9.3722", 93722),
-    (Grid(GridKind.FIXED, 4), "-0.0000", -1),
-    (Grid(GridKind.FIXED, 4, GridFlag.NO_ZERO), "-.0333", -334),
-    (Grid(GridKind.FIXED, 0), "-7", -8),
-    (Grid(GridKind.TRIMMED, 4), "12.313", 123130),
-    (Grid(GridKind.TRIMMED, 4, GridFlag.POINT_ZERO), "-27.0", -270001),
-    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "0", 0),
-    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "1", 276300001),
-    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "17.8693", 277278694),
-    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "-3.39301e-014", -263939303),
-    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "1e-307", 1),
-    (Grid(GridKind.GENERAL, 6, GridFlag.POINT_ZERO), "24.0", 277340001),
-    (Grid(GridKind.GENERAL, 6, GridFlag.POINT_ZERO), "7e-09", 268800001),
-    (Grid(GridKind.TEXT64, 0, GridFlag.POINT_ZERO), "-0.0", -1),
-    (Grid(GridKind.TEXT64, 0, GridFlag.POINT_ZERO), "0.1", 0x3FB999999999999A),
-    (Grid(GridKind.TEXT64, 17), "0.10000000000000001", 0x3FB999999999999A),
-    (Grid(GridKind.TEXT64, 84), "0.10000000000000000555", 0x3FB999999999999A),
-    (Grid(GridKind.TEXT32), "0.1", 0x3DCCCCCD),
-]
-
-
-@pytest.mark.parametrize(("grid", "text", "ordinal"), TABLE, ids=str)
-def test_worked_examples(grid: Grid, text: str, ordinal: int) -> None:
-    assert check_printed(grid, [text]).tolist() == [ordinal]
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from tests.commands import run
 from tests.kinds import KINDS, Values, body_of, chunks_of, files, kept, values_of
 from tests.repair import flipped
 
@@ -95,7 +94,7 @@ def test_salvage_reads_all_that_repair_writes(
             ["repair", str(path), "-o", f"{out}-sound.mcz"],
         ):
             salvage = [] if arguments[0] == "repair" else ["--salvage"]
-            code = run(cli, "mcz", [*arguments, *salvage])
+            code = run(*arguments, *salvage)
             is_all = arguments[0] == "repair" and of == "SKEL"
             is_none = arguments[0] == "unpack" and of != "SKEL" and kind != "acclaim"
             assert code == (0 if is_all else 1 if is_none else 4), arguments

@@ -19,16 +19,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
+from mcz import MczError, Motion, MotionError, OptionError, plot
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.errors import MczError, MotionError, OptionError
 from mcz.joint_errors import joint_errors
-from mcz.motion import Motion
 from mcz.pictures.channel_charts import density
 from mcz.pictures.chart_pages import STYLE, ChartPage, Sheet
 from mcz.pictures.charts import MOST_POINTS, number, thinned
 from mcz.pictures.error_charts import errors_between
-from mcz.pictures.plotting import KINDS, plot
+from mcz.pictures.plotting import KINDS
 from mcz.reading.report import info, layout
 from mcz.reading.shares import byte_shares
 from tests.motions import motions, smooth

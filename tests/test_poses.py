@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 import mcz
+from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.kinematics import positions_of
 from mcz.kinematics.chain import Chain
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.poses.conversions import FORMS, continuous, from_matrices, to_matrices
 from tests.motions import smooth
 from tests.skeletons import skeletons, values_for
@@ -26,14 +26,6 @@ FORM_NAMES = st.sampled_from(sorted(FORMS))
 
 def moving(skeleton: Skeleton, n_frames: int = 7, rate: int | None = 100) -> Motion:
     return Motion(skeleton, (Signal(values_for(skeleton, n_frames)),), frame_rate=rate)
-
-
-@given(skeletons())
-def test_positions_are_those_of_the_chain(skeleton: Skeleton) -> None:
-    motion = moving(skeleton)
-    np.testing.assert_allclose(
-        mcz.positions(motion), positions_of(skeleton, motion.values), atol=1e-9
-    )
 
 
 @given(skeletons())

@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.container.locks import lock
 from mcz.writing.atomic import replacing
+from tests.commands import run
 from tests.motions import smooth
 
 
@@ -138,7 +137,7 @@ def test_a_reader_sees_the_last_end_while_another_process_appends(
                 assert file.grows
                 assert list(file.clips) == ["smooth"]
                 assert np.array_equal(file.only_clip().read(), smooth(400).values)
-        assert run(cli, "mcz", ["list", str(path)]) == 0
+        assert run("list", path) == 0
         assert "another process is appending" in capsys.readouterr().err
     with pytest.raises(mcz.TruncatedError):  # now nobody is at it
         mcz.open(path)

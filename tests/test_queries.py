@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz.errors import OptionError
+from mcz import OptionError
 from mcz.queries import Query, Value
 from mcz.queries.parser import parse
 from mcz.queries.tokens import WORDS

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.clock import has_times
 from mcz.conversion import converted_files
 from mcz.kinematics.points import origins_of
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.motion import POSITION_KINDS
 from mcz.tables.files import EXPORTS, table_of
+from tests.commands import run
 
 ROOT = Path(__file__).parents[1]
 REAL = [
@@ -226,12 +226,12 @@ def test_commands_say_what_is_left_out(
     archive, out = tmp_path / "walk.mcz", tmp_path / "out"
     mcz.encode(samples / "walk.c3d", archive)
     for words in (["-o", f"{out}.trc"], ["--to", "csv", "-o", f"{out}.csv"]):
-        assert run(cli, "mcz", ["decode", str(archive), *words]) == 0
+        assert run("decode", archive, *words) == 0
         assert "left out: signal residuals" in capsys.readouterr().err
     words = ["decode", str(archive), "--to", "csv", "-o", f"{out}2.csv", "--signal", "residuals"]
-    assert run(cli, "mcz", words) == 0 and "left out" not in capsys.readouterr().err
+    assert run(*words) == 0 and "left out" not in capsys.readouterr().err
     words = ["decode", str(archive), "-o", f"{out}.sto", "--json"]
-    assert run(cli, "mcz", words) == 0
+    assert run(*words) == 0
     assert json.loads(capsys.readouterr().out)["left_out"] == {
         "walk": ["left out: signal residuals"]
     }

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mcz import sample
+from mcz import compare, sample
 from mcz.codecs import CODECS
 from mcz.codecs.basis_models import name_of
 from mcz.container import limits, packets
@@ -17,7 +17,6 @@ from mcz.container.chunks import FLAGS_OF
 from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR
 from mcz.container.walk_with_losses import KNOWN
 from mcz.formats import FORMATS
-from mcz.metrics import compare
 from mcz.motion import CHANNEL_KINDS
 from mcz.transforms.wavelets import IDS, WAVELETS
 from tools import registry

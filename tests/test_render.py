@@ -16,11 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz import extras
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.errors import MczError, MotionError, OptionError
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, Joint, MczError, Motion, MotionError, OptionError, Signal, Skeleton, extras
 from mcz.pictures import libraries, tracks
 from mcz.pictures.bodies import MIDDLE, body_of, fitted
 from mcz.pictures.cameras import VIEWS, Viewport, axes_of, framed
@@ -28,6 +24,7 @@ from mcz.pictures.capsules import Shapes, capsules
 from mcz.pictures.rendering import drawn_frames
 from mcz.pictures.stages import stage_of
 from mcz.pictures.themes import THEMES, rgb
+from tests.commands import run
 from tests.motions import motions, smooth
 
 pytest.importorskip("matplotlib")
@@ -358,7 +355,7 @@ def test_a_camera_is_a_rotation() -> None:
 
 def test_the_command(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def call(*words: object) -> tuple[int, str, str]:
-        return int(run(cli, "mcz", ["render", *map(str, words)])), *capsys.readouterr()
+        return int(run("render", *map(str, words))), *capsys.readouterr()
 
     out = tmp_path / "a.png"
     words = (samples / "walk.amc", "-o", out, "--size", "200x100", "--view", "side")

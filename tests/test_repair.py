@@ -13,12 +13,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.container import payloads
 from mcz.container.chunks import HEADER
 from mcz.sample import write_samples
 from mcz.schema import build, parse
+from tests.commands import run
 from tests.formats.c3d_files import made
 from tests.formats.test_c3d_recording import integers, reals, with_analog
 from tests.kinds import Values, body_of, chunks_of, kept, values_of
@@ -152,15 +151,15 @@ def test_commands_say_what_is_whole(
     }
     out.mkdir()
     for name, arguments in asked.items():
-        assert run(cli, "mcz", arguments) == 1, name
+        assert run(*arguments) == 1, name
         assert "--salvage" in capsys.readouterr().err, name
-        assert run(cli, "mcz", [*arguments, "--salvage"]) in (0, 4), name
+        assert run(*arguments, "--salvage") in (0, 4), name
         capsys.readouterr()
-    assert run(cli, "mcz", ["repair", str(path), "-o", str(out / "r.mcz"), "--json"]) == 4
+    assert run("repair", path, "-o", out / "r.mcz", "--json") == 4
     shown = json.loads(capsys.readouterr().out)
     assert shown["clips"]
     assert shown["lost"]
-    assert run(cli, "mcz", ["verify", str(out / "r.mcz")]) == 0
+    assert run("verify", out / "r.mcz") == 0
 
 
 def test_unpack_writes_no_damaged_file(archive: bytes, tmp_path: Path) -> None:
@@ -193,7 +192,7 @@ def test_a_lost_template_costs_no_value(tmp_path: Path) -> None:
         assert "lost" in clip.metadata["source-note"]
         assert not any(c.unit for c in clip.signals[-1].channels or ())
     (tmp_path / "d.mcz").write_bytes(flipped(data, body_of(*chunk), 4))
-    assert run(cli, "mcz", ["repair", str(tmp_path / "d.mcz"), "-o", str(tmp_path / "r.mcz")]) == 4
+    assert run("repair", tmp_path / "d.mcz", "-o", tmp_path / "r.mcz") == 4
     with mcz.open(tmp_path / "d.mcz", salvage=True) as file:
         assert file.clips["force"].read(signal="analog").shape == (120, 2)
         assert any("as they were stored" in line for line in file.damage)
@@ -379,5 +378,5 @@ def test_extracts_of_damaged_files_end_with_4_or_1(samples: Path, tmp_path: Path
         for more in ([], ["--frames", "0:10"]):
             out = tmp_path / f"{name}{len(more)}.mcz"
             arguments = ["extract", str(tmp_path / "d.mcz"), str(out), "--clip", name, *more]
-            assert run(cli, "mcz", [*arguments, "--salvage"]) == code
+            assert run(*arguments, "--salvage") == code
             assert out.exists() == (code == 4)

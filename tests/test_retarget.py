@@ -11,10 +11,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import MotionError, OptionError
+from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import origins_of, reach, shell_points_of
 from mcz.kinematics.feet import feet_of
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.retargeting.joint_names import SKELETONS, SMPL_BODY
 from mcz.retargeting.rest_poses import _least_turn
 from mcz.retargeting.sizes import size_ratio

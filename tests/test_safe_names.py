@@ -12,12 +12,11 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from mcz import OptionError
 from mcz.editing import safe_names, unpacking
 from mcz.editing.safe_names import HIDDEN, PortableNames, fault_of, folded, notes_on
 from mcz.editing.unpacking import NAMES
-from mcz.errors import OptionError
+from tests.commands import run
 from tests.motions import smooth
 
 
@@ -132,7 +131,7 @@ def test_exported_files_have_names_that_every_system_can_hold(tmp_path: Path, na
     (tmp_path / "own").mkdir()
     for target in ("csv", "npz", "bvh"):
         arguments = ["decode", str(tmp_path / "a.mcz"), "--to", target, "-o", str(tmp_path / "own")]
-        assert run(cli, "mcz", arguments) == 0
+        assert run(*arguments) == 0
     paths = [*(tmp_path / "out").rglob("*"), *(tmp_path / "own").iterdir()]
     assert len(paths) >= 4
     assert not any(fault_of(path.name) for path in paths)
@@ -218,11 +217,11 @@ def test_no_cell_of_csv_is_a_formula(
     motion = replace(motion, skeleton=replace(motion.skeleton, joints=joints), name=name)
     mcz.write(replace(motion, metadata={"title": name}), path)
     table = tmp_path / "t.csv"
-    assert run(cli, "mcz", ["decode", str(path), "--to", "csv", "-o", str(table)]) == 0
+    assert run("decode", path, "--to", "csv", "-o", table) == 0
     listed = tmp_path / "l.csv"
     capsys.readouterr()
     columns = ["--csv", "--columns", "name,title"]
-    assert run(cli, "mcz", ["list", str(path), *columns]) == 0
+    assert run("list", path, *columns) == 0
     listed.write_text(capsys.readouterr().out, newline="")
     for file in (table, listed):
         rows = list(csv.reader(io.StringIO(file.read_text(), newline="")))
@@ -230,14 +229,14 @@ def test_no_cell_of_csv_is_a_formula(
         assert any("calc" in cell for cell in cells)
         assert not any(cell.lstrip().startswith(tuple("=+-@\t\r\uff1d")) for cell in cells)
     if sign == sign.strip():  # blanks around a name of a table are not part of it
-        assert run(cli, "mcz", ["meta", str(path), "--from", str(listed)]) == 0
+        assert run("meta", path, "--from", listed) == 0
     with mcz.open(path) as file_:
         assert file_.only_clip().metadata["title"] == name
     given = tmp_path / "j.csv"
     chosen = ["--joints", "0", "--to", "csv", "-o", str(given)]
-    assert run(cli, "mcz", ["decode", str(path), *chosen]) == 0
+    assert run("decode", path, *chosen) == 0
     arguments = ["--in-place", "--joint", "0", "--values", str(given)]
-    assert run(cli, "mcz", ["replace", str(path), *arguments]) == 0
+    assert run("replace", path, *arguments) == 0
 
 
 def _is_number(cell: str) -> bool:

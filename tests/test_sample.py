@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from mcz.motion import Motion
+from mcz import Motion
 from mcz.sample import UNIT_CM, acclaim_walk, bvh_walk
 
 # A change here changes what every newcomer sees first: make it on purpose.

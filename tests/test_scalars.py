@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.errors import OptionError
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, Joint, Motion, OptionError, Signal, Skeleton
+from tests.commands import run
 
 NAMES = ("x", "y", "z", "base_qx", "base_qy", "base_qz", "base_qw", "hip", "knee")
 
@@ -115,7 +113,7 @@ def test_the_greatest_error_of_scalars_is_said(
     (tmp_path / "a.csv").write_text("".join(f"{a:.6f},{b:.6f}\n" for a, b in slope.tolist()))
     source, path = str(tmp_path / "a.csv"), str(tmp_path / "a.mcz")
     options = ["--rate", "30", "--codec", "posewave", "--param", "step=0.001", "-o", path]
-    assert run(cli, "mcz", ["encode", source, *options]) == 0
+    assert run("encode", source, *options) == 0
     said = capsys.readouterr().out
     with mcz.open(path) as file:
         clip = file.only_clip()

@@ -18,13 +18,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.conversion.scenes import SceneFile
-from mcz.errors import MotionError, OptionError
+from mcz import Channel, Joint, Motion, MotionError, OptionError, SceneFile, Signal, Skeleton
 from mcz.kinematics import origins_of, point_set, positions
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from tests.commands import run
 from tests.glb import Glb
 from tests.skeletons import skeletons, values_for
 
@@ -238,7 +235,7 @@ def call(
     monkeypatch.chdir(tmp_path)
 
     def call(*words: str) -> tuple[int, str, str]:
-        code = int(run(cli, "mcz", list(words)))
+        code = int(run(*words))
         return code, *capsys.readouterr()
 
     call("sample", ".")

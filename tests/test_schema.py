@@ -13,7 +13,7 @@ from construct import If, Int8ul, this
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mcz.errors import FormatError, LimitError, MczError, TruncatedError
+from mcz import FormatError, LimitError, MczError, TruncatedError
 from mcz.schema import (
     UVARINT,
     Checked,

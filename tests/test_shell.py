@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import OptionError
+from mcz import Channel, Joint, Motion, OptionError, Signal, Skeleton
 from mcz.kinematics import (
     SHELL_CM,
     origins_of,
@@ -20,7 +20,6 @@ from mcz.kinematics import (
     shell_points_of,
     virtual_markers_of,
 )
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk
 from tests.motions import motions, smooth
 from tests.test_metrics import hinge, markers

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz import FormatError, MczError
 from mcz.container import payloads
 from mcz.container.limits import BASE
 from mcz.container.packed import pack_skeleton, parse_skel, smallest, unpacked, words
 from mcz.container.skeletons import build_skeleton
-from mcz.errors import FormatError, MczError
 from mcz.schema import deflate, inflate
 from tests.motions import skeleton
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.errors import SkeletonWarning, SourceError
+from mcz import SkeletonWarning, SourceError
 from mcz.live.text_writer import encode_live
 from mcz.writing.entry import Terms
 from tests.conftest import Call

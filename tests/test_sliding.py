@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import MotionError
-from mcz.motion import Signal
+from mcz import MotionError, Signal
 from tests.test_contacts import markers, steps
 
 SHIFTS = st.lists(st.integers(-1000, 1000), min_size=3, max_size=3)

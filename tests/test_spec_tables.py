@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import zlib
 from itertools import product, takewhile
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from mcz.codecs.online import kernels as online_kernels
 from mcz.codecs.posewave import header as posewave
 from mcz.coding import logistic, mixing, residuals, space_kernels
 from mcz.coding.ordinals import kernels as lossless_kernels
-from mcz.container import chunks
 from mcz.formats import FORMATS, amc, c3d_restore, trc
 from mcz.formats.c3d_layout import Kind
 from mcz.formats.layout import Template
@@ -29,7 +27,6 @@ from mcz.transforms.wavelets import MAX_LEVELS
 from tests.test_spec import ROOT, SPEC, rows_under
 
 WORDS = " ".join(SPEC.split())
-SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "4 bytes": 4, "8 bytes": 8}
 
 
 def section(heading: str) -> str:
@@ -44,44 +41,6 @@ def words_of(heading: str) -> str:
 def table_after(text: str, head: str) -> list[list[str]]:
     rows = list(takewhile(bool, text.split(head, 1)[1].splitlines()[2:]))
     return [[c.strip() for c in row.strip("|").split("|")] for row in rows]
-
-
-def fields_of(rows: list[list[str]], data: bytes, payload: int = 0) -> dict[str, bytes]:
-    """``data`` cut into the fields of a table; ``payload`` is the size of a field of bytes."""
-    found, at = {}, 0
-    for name, kind, _ in rows:
-        size = SIZES.get(kind, payload)
-        found[name] = data[at : at + size]
-        at += size
-    assert at == len(data)
-    return found
-
-
-def test_chunk() -> None:
-    data = chunks.build_chunk(b"DATA", b"abc", 3)
-    found = fields_of(rows_under("Chunks"), data, payload=3)
-    assert found["type"] == b"DATA"
-    assert found["flags"] == bytes((chunks.ANCILLARY | chunks.SAFE_TO_COPY,)) == b"\3"
-    assert found["reserved"] == b"\0"
-    assert found["length"] == (3).to_bytes(8, "little")
-    assert found["payload"] == b"abc"
-    others = data[:6] + data[8:16]
-    assert found["header_check"] == (zlib.crc32(others) & 0xFFFF).to_bytes(2, "little")
-    assert found["crc"] == zlib.crc32(data[:-4]).to_bytes(4, "little")
-
-
-def test_foot() -> None:
-    rows = rows_under("FOOT")
-    data = chunks.build_foot(0x1234, 0x5678)
-    found = fields_of(rows, data)
-    assert [int.from_bytes(found[name], "little") for name in ("index_offset", "index_length")] == [
-        0x1234,
-        0x5678,
-    ]
-    assert found["flags"] == bytes(4)
-    assert found["crc"] == zlib.crc32(data[:4] + data[8:]).to_bytes(4, "little")
-    assert f"`{found['end_magic'].hex(' ').upper()}`" == rows[-1][2]
-    assert f"`{chunks.SIGNATURE.hex(' ').upper()}`" in section("Chunks")
 
 
 def test_groups_and_resolutions_of_codecs() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from tests.test_spec import SPEC
 from tools import spec_trace

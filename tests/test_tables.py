@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 
 import mcz
+from mcz import Channel, Motion, Signal, Skeleton
 from mcz.cli.common import Exit, run
-from mcz.cli.main import cli
-from mcz.motion import Channel, Motion, Signal, Skeleton
 from tests.motions import smooth
 from tests.skeletons import skeletons, values_for
 
@@ -88,7 +87,7 @@ def test_decode_writes_the_same_npz(samples: Path, tmp_path: Path) -> None:
     mcz.to_npz(motion, tmp_path / "one.npz")
     mcz.write(motion, tmp_path / "walk.mcz")
     words = ["decode", str(tmp_path / "walk.mcz"), "-o", str(tmp_path / "two.npz")]
-    assert run(cli, "mcz", words) == Exit.FINE
+    assert run(*words) == Exit.FINE
     one, two = read(tmp_path / "one.npz"), read(tmp_path / "two.npz")
     assert one.keys() == two.keys()
     for name, array in one.items():
@@ -199,7 +198,7 @@ def test_export(archive: Path, tmp_path: Path, to: str) -> None:
 
 def test_the_command(archive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def ran(*words: str) -> tuple[int, str]:
-        code = run(cli, "mcz", ["export", str(archive), str(tmp_path), *words])
+        code = run("export", archive, tmp_path, *words)
         return int(code), "".join(capsys.readouterr())
 
     code, said = ran("--to", "npz")

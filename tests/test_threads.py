@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz import ChecksumError, OptionError
 from mcz.codecs import CODECS
 from mcz.codecs.ahead import Ahead
 from mcz.codecs.contract import Layout
 from mcz.codecs.segments import Sizing, guessing
-from mcz.errors import ChecksumError, OptionError
 from mcz.threads import in_force, in_order, limited
 from tests.motions import smooth
 

@@ -13,13 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import mcz
+from mcz import Motion, MotionError, OptionError
 from mcz.bench.cases import Case
 from mcz.bench.tables import Table
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.codecs.basis_models import parse_bases
-from mcz.errors import MotionError, OptionError
-from mcz.motion import Motion
 from mcz.training import (
     Recipe,
     TrainingSet,
@@ -39,6 +36,7 @@ from mcz.transforms.lsdt import (
     settled,
     start_basis,
 )
+from tests.commands import run
 from tools.papers.curves import bases, references
 from tools.papers.hou2016 import training as study
 from tools.papers.hou2016.spatial import measured_convergence, measured_distortions
@@ -325,7 +323,7 @@ def test_train(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     options = ["--iterations", "5", "--growth", "1", "--P", "4", "--mirror", "--headings", "2"]
     clip = str(samples / "walk.bvh")
     call = ["train", clip, clip, "-o", str(out), "--unit", "cm", *options]
-    assert run(cli, "mcz", [*call, "--json"]) == 0
+    assert run(*call, "--json") == 0
     document = json.loads(capsys.readouterr().out)
     assert document["output"] == str(out)
     assert document["bytes"] == out.stat().st_size
@@ -339,8 +337,8 @@ def test_train(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     for basis, learned in zip(parse_bases(out.read_bytes()), trained.learned, strict=True):
         assert np.abs(basis.vectors - learned.basis).max() <= 2.0**-16
 
-    assert run(cli, "mcz", call) == 2  # exists
-    assert run(cli, "mcz", [*call, "--force"]) == 0
+    assert run(*call) == 2  # exists
+    assert run(*call, "--force") == 0
     assert "38 points" in capsys.readouterr().out
 
 
@@ -365,7 +363,7 @@ def test_train_refuses(
     words: list[str],
 ) -> None:
     monkeypatch.chdir(samples)
-    assert run(cli, "mcz", ["train", *arguments, "-o", str(tmp_path / "out")]) == code
+    assert run("train", *arguments, "-o", tmp_path / "out") == code
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert all(word in said for word in words), said

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.errors import MotionError, OptionError
+from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import origins_of
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 
 BVH = replace(bvh_walk(), skeleton=replace(bvh_walk().skeleton, unit_cm=1.0, up_axis="z"))

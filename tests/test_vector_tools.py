@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from conformance import run
+from mcz import MczError
 from mcz.cli import conformance
 from mcz.codecs import CODECS
-from mcz.errors import MczError
 from tools import make_vectors
 from tools.vectors import faults, requirements
 from tools.vectors.build.files import Vector, arrays

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import mcz
+from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.angles import Unwrapper, unwrap
 from mcz.conversion import converted_files
 from mcz.joint_errors import joint_errors
@@ -20,7 +21,6 @@ from mcz.kinematics.rotation_vectors import (
     spins_of_vectors,
     vectors_of_quaternions,
 )
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import acclaim_walk
 from tests.bodies import turned_by
 

@@ -12,10 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
+from mcz import ChecksumError, Signal
 from mcz.container.runs import MOST_BYTES, Run, Runs
 from mcz.container.segments import FRESH
-from mcz.errors import ChecksumError
-from mcz.motion import Signal
 from tests.motions import smooth
 
 LENGTH = 90

@@ -6,7 +6,7 @@ import os
 import signal
 from pathlib import Path
 
-from mcz.errors import TruncatedError
+from mcz import TruncatedError
 
 
 def joined(state: str, item: int) -> tuple[str, int]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.formats import c3d
+from tests.commands import run
 from tests.formats.c3d_files import INTEL, made, real
 from tests.formats.test_c3d_outputs import listed
 from tests.formats.test_c3d_recording import integers, reals, with_analog
@@ -54,7 +52,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = int(run(cli, "mcz", [str(a) for a in arguments]))
+    code = int(run(*arguments))
     captured = capsys.readouterr()
     return code, captured.out, captured.err
 
@@ -165,14 +163,6 @@ def test_info_tells_what_the_file_says(folder: Path, capsys: pytest.CaptureFixtu
     assert said["points"][1]["groups"] == ["ANGLES"]
     signals = [(s["signal"], s["channels"], s["samples_per_frame"]) for s in clip["codecs"]]
     assert signals[-1] == ("analog", 2, 2)
-
-
-def test_info_of_other_files_has_no_recording(
-    samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    mcz.encode(samples / "walk.bvh", tmp_path / "walk.mcz")
-    code, text, _ = call(capsys, "info", tmp_path / "walk.mcz", "--json")
-    assert code == 0 and json.loads(text)["clips"][0]["recording"] is None
 
 
 def test_joints_alone_leave_words(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -309,24 +299,3 @@ def test_diff_names_what_has_changed(folder: Path, capsys: pytest.CaptureFixture
     (folder / "header.c3d").write_bytes(header)
     shown = lines_in(call(capsys, "diff", folder / "gait.c3d", folder / "header.c3d")[1])
     assert shown == ["header or layout of the files: not the same"]
-
-
-def test_diff_of_other_formats(
-    folder: Path, samples: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Rate, unit, axis, first frame, signals and metadata are compared in every format."""
-    motion = mcz.read(samples / "walk.bvh", unit="cm", up="y")
-    mcz.write(motion, folder / "a.mcz")
-    changed = replace(
-        motion,
-        frame_rate=motion.frame_rate * 2,
-        frame_numbers=np.arange(7, 247),
-        metadata={"subject": "05"},
-        source=None,
-    )
-    mcz.write(changed, folder / "b.mcz")
-    assert lines_in(call(capsys, "diff", folder / "a.mcz", folder / "b.mcz")[1]) == [
-        "first frame: 1 in A, 7 in B",
-        "frame rate: 120 in A, 240 in B",
-        "metadata: 0 in A, 1 in B; only in B: subject",
-    ]

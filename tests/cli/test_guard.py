@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
+from mcz import OptionError
 from mcz.cli.info import command as info_command
 from mcz.cli.main import cli
-from mcz.errors import OptionError
+from tests.commands import run
 from tests.conftest import Call
 
 ROOT = Path(__file__).parents[2]
@@ -181,58 +181,6 @@ def test_a_device_is_nobody_s_input(folder: Path, call: Call) -> None:
 # What the suffix says ------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("suffix", "start"),
-    [("bvh", b"HIERARCHY"), ("BVH", b"HIERARCHY"), ("csv", b"frame,time,root.tx"), ("npz", b"PK")],
-)
-def test_a_suffix_converts(folder: Path, call: Call, suffix: str, start: bytes) -> None:
-    call("encode", folder / "walk.amc", "--rate", 120)
-    out = folder / f"x.{suffix}"
-    assert call("decode", folder / "walk.mcz", "-o", out)[0] == 0
-    assert out.read_bytes().startswith(start)
-
-
-def test_its_own_suffix_and_none_are_the_source(folder: Path, call: Call) -> None:
-    call("encode", folder / "walk.amc")
-    for name in ("x.amc", "x.AMC", "x"):
-        assert call("decode", folder / "walk.mcz", "-o", folder / name)[0] == 0
-        assert (folder / name).read_bytes() == (folder / "walk.amc").read_bytes()
-
-
-def test_to_wins(folder: Path, call: Call) -> None:
-    call("encode", folder / "walk.amc")
-    assert call("decode", folder / "walk.mcz", "--to", "csv", "-o", folder / "x.bvh")[0] == 0
-    assert (folder / "x.bvh").read_bytes().startswith(b"frame,")
-
-
-@pytest.mark.parametrize("suffix", ["asf", "mcz", "tsv", "fbx", "gltf", "usd"])
-def test_what_cannot_be_written_is_refused(folder: Path, call: Call, suffix: str) -> None:
-    call("encode", folder / "walk.amc")
-    out = folder / f"x.{suffix}"
-    code, _, errors = call("decode", folder / "walk.mcz", "-o", out)
-    assert code == 2
-    assert f"a clip cannot be written as .{suffix}; " in errors
-    assert not out.exists()
-
-
-def test_a_rate_that_is_needed_is_asked_for(folder: Path, call: Call) -> None:
-    call("encode", folder / "walk.amc")  # it does not say its rate
-    code, _, errors = call("decode", folder / "walk.mcz", "-o", folder / "x.bvh")
-    assert code != 0
-    assert "rate" in errors
-    assert not (folder / "x.bvh").exists()
-    assert call("decode", folder / "walk.mcz", "-o", folder / "x.bvh", "--rate", 120)[0] == 0
-
-
-def test_joints_of_a_table(folder: Path, call: Call) -> None:
-    call("encode", folder / "walk.bvh")
-    words = ("decode", folder / "walk.mcz", "--joints", "Head", "-o")
-    assert call(*words, folder / "x.csv")[0] == 0
-    assert (folder / "x.csv").read_text().startswith("frame,time,Head.rz")
-    code, _, errors = call(*words, folder / "x.bvh")
-    assert (code, "--joints needs" in errors) == (2, True)
-
-
 def test_what_is_kept_has_one_format(folder: Path, call: Call) -> None:
     call("encode", folder / "walk.asf")
     code, _, errors = call("decode", folder / "walk.mcz", "-o", folder / "x.bvh")
@@ -261,14 +209,6 @@ def test_two_outputs_of_one_name(folder: Path, call: Call) -> None:
     words = ("decode", folder / "walk.mcz", "--with-skeleton", "--force", "-o")
     code, _, errors = call(*words, folder / "walk.asf", "--to", "csv")
     assert (code, "2 outputs have this name" in errors) == (2, True)
-
-
-def test_a_slash_is_a_folder(folder: Path, call: Call) -> None:
-    call("encode", folder / "walk.bvh")
-    assert call("decode", folder / "walk.mcz", "-o", f"{folder}/deep/p/")[0] == 0
-    assert (folder / "deep/p/walk.bvh").read_bytes() == (folder / "walk.bvh").read_bytes()
-    assert call("encode", folder / "walk.bvh", "-o", f"{folder}/q/")[0] == 0
-    assert (folder / "q/walk.mcz").read_bytes() == (folder / "walk.mcz").read_bytes()
 
 
 # Options given twice -------------------------------------------------------------
@@ -437,11 +377,6 @@ def test_info_of_many_clips_passes_it_on(folder: Path, call: Call) -> None:
     assert "skeleton-note  ASF of the name of the take: walk" in shown
     call("pack", folder, folder / "all.mcz", "--keep-all", "--force")
     assert "\\n" not in call("info", folder / "all.mcz")[1]
-
-
-def test_an_amc_without_any_asf_is_told(folder: Path, call: Call) -> None:
-    (folder / "walk.asf").unlink()
-    assert "no ASF: a flat list of bones" in call("encode", folder / "walk.amc")[2]
 
 
 def test_list_says_what_a_name_restores(folder: Path, call: Call) -> None:

@@ -18,12 +18,10 @@ import numpy as np
 import pytest
 
 import mcz
+from mcz import AccessError, ExistsError, Signal
 from mcz.cli.common import Exit, code_of, run
-from mcz.cli.main import cli
 from mcz.codecs import by_name
 from mcz.container.writer import Writer
-from mcz.errors import AccessError, ExistsError
-from mcz.motion import Signal
 from mcz.writing.clip_writer import write_clip
 from tests.motions import smooth
 
@@ -43,7 +41,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = int(run(cli, "mcz", [str(a) for a in arguments]))
+    code = int(run(*arguments))
     captured = capsys.readouterr()
     return code, captured.out, captured.err
 
@@ -150,15 +148,15 @@ def test_pipes_and_devices_are_written_in_place(folder: Path) -> None:
     reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()))
     reader.start()
     arguments = ["decode", str(folder / "a.mcz"), "-o", str(pipe), "--force"]
-    assert run(cli, "mcz", arguments) == 0
+    assert run(*arguments) == 0
     reader.join(30)
     assert got == [BVH.encode()]
     assert stat.S_ISFIFO(pipe.stat().st_mode)
     encode = ["encode", str(folder / "a.bvh"), "-o", str(pipe), "--force", "--codec", "raw"]
-    assert run(cli, "mcz", [*encode, "--json"]) == 2
+    assert run(*encode, "--json") == 2
     reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()))
     reader.start()
-    assert run(cli, "mcz", encode) == 0
+    assert run(*encode) == 0
     reader.join(30)
     assert got[1] == (folder / "a.mcz").read_bytes()
 

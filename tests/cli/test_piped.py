@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import io
 import os
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,9 +13,9 @@ import numpy as np
 import pytest
 
 import mcz
+from mcz import live_frames
 from mcz.container.walk_arriving import ArrivingWalker
-from mcz.formats import FORMATS, likely_formats
-from mcz.live.strict_reader import live_frames
+from mcz.formats import FORMATS
 from mcz.live.text_writer import encode_live
 from mcz.writing.entry import Terms
 
@@ -194,21 +192,6 @@ def test_a_source_that_dies_in_a_frame_leaves_no_end(tmp_path: Path, asf: Path) 
         assert kept(out) == whole
 
 
-def test_an_interrupt_ends_a_recording_well(tmp_path: Path) -> None:
-    out = tmp_path / "out.mcz"
-    piped = Piped(*STEP, "-o", out)
-    piped.say(HEADER + b"".join(LINES))
-    while not out.exists() or b"DATA" not in out.read_bytes():  # a frame is there
-        time.sleep(0.01)
-    piped.process.send_signal(signal.SIGINT)
-    assert piped.process.wait() == 130
-    piped.stdin.close()
-    piped.stdout.close()
-    assert mcz.verify(out) == []
-    with mcz.open(out) as file:
-        assert file.clips["live"].n_frames <= 3
-
-
 def test_codecs_that_are_not_live_read_all(tmp_path: Path, asf: Path) -> None:
     data = HEADER + b"".join(LINES)
     out = tmp_path / "out.mcz"
@@ -278,10 +261,6 @@ def test_bad_bvh(data: bytes, match: str) -> None:
         arrived("bvh", data)
 
 
-def test_a_bvh_of_no_frames() -> None:
-    assert arrived("bvh", HEADER).shape == (0, 4)
-
-
 @pytest.mark.parametrize(
     ("data", "match"),
     [
@@ -347,15 +326,6 @@ def test_real_clips_live(data: Path) -> None:
         np.testing.assert_array_equal(arrived("bvh", path.read_bytes()), mcz.read(path).values)
 
 
-def test_formats_are_known_by_their_looks(asf: Path) -> None:
-    assert likely_formats(HEADER) == ("bvh",)
-    assert likely_formats(b"".join(AMC)) == ("amc",)
-    assert likely_formats(ASF) == ("asf",)
-    assert likely_formats(b"\x02\x50" + bytes(510)) == ("c3d",)
-    assert likely_formats(b"P\x50PP") == ()
-    assert likely_formats(b"") == ()
-
-
 def test_nothing_is_kept_that_was_used() -> None:
     out = io.BytesIO()
     encode_live(
@@ -367,16 +337,6 @@ def test_nothing_is_kept_that_was_used() -> None:
             assert follower.clip is not None
             assert follower.clip.segments == []
     assert len(follower.found.chunks) <= 1
-
-
-def test_what_is_refused_at_once_leaves_no_file(tmp_path: Path) -> None:
-    """Virtual markers need a length unit, and BVH says none."""
-    target = tmp_path / "walk.mcz"
-    marked = ("--param", "virtual_markers=true")
-    data = HEADER + b"".join(LINES)
-    code, _, errors = run("encode", "-", *STEP, *marked, "-o", target, data=data)
-    assert code == 2 and "length unit is unknown" in errors
-    assert not target.exists()
 
 
 def test_frames_that_did_not_come_are_remarked(tmp_path: Path) -> None:

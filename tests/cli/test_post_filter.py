@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.motion import Motion
+from mcz import Motion
+from tests.commands import run
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = run(cli, "mcz", [str(argument) for argument in arguments])
+    code = run(*arguments)
     captured = capsys.readouterr()
     return int(code), captured.out, captured.err
 

@@ -11,18 +11,16 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.codecs import by_name
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
-from mcz.errors import MotionError, OptionError
 from mcz.kinematics import point_names, points_and_markers_of
 from mcz.kinematics.marker_motion import NOTE
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from mcz.writing.clip_writer import write_clip
 from mcz.writing.positions import as_domain
+from tests.commands import run
 
 
 def write_positions(path: Path, motion: Motion, *, virtual_markers: bool = False) -> Path:
@@ -43,7 +41,7 @@ def walk(samples: Path) -> Motion:
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = run(cli, "mcz", [str(argument) for argument in arguments])
+    code = run(*arguments)
     captured = capsys.readouterr()
     return int(code), captured.out, captured.err
 

@@ -11,16 +11,14 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Thread
 
 import numpy as np
 import pytest
 
 import mcz
+from mcz import live_frames
 from mcz.cli import common, tcp
-from mcz.cli.main import cli
 from mcz.cli.rows import Rows
-from mcz.live.strict_reader import live_frames
 
 ROOT = Path(mcz.__file__).parent.parent
 NAMES = b"a,b\n"
@@ -47,7 +45,7 @@ def run(*arguments: str | Path, data: bytes = b"") -> tuple[int, bytes, str]:
     streams = [io.TextIOWrapper(io.BytesIO(part), "utf-8") for part in (data, b"", b"")]
     sys.stdin, sys.stdout, sys.stderr = streams
     try:
-        code = common.run(cli, "mcz", ["stream", *map(str, arguments)])
+        code = common.run("stream", *map(str, arguments))
         for stream in streams[1:]:
             stream.flush()
     finally:
@@ -138,26 +136,6 @@ def test_each_row_is_printed_before_the_next_frame_is_read() -> None:
     assert "10 frames decoded, 0 concealed, 0 missing" in errors
 
 
-def test_both_ends_of_a_pipe() -> None:
-    with Started("encode", *CODER) as first, Started("decode") as second:
-
-        def pump() -> None:
-            while data := first.stdout.read1(10**6):
-                second.say(data)
-
-        pumping = Thread(target=pump)
-        pumping.start()
-        for number, row in enumerate(ROWS):
-            first.say((NAMES if not number else b"") + line(row))
-            if not number:
-                second.stdout.readline()
-            found = second.stdout.readline().split(b",")
-            assert int(found[0]) == number
-            np.testing.assert_allclose(list(map(float, found[1:])), row, atol=0.02)
-        first.stdin.close()
-        pumping.join()
-
-
 def test_a_binary_stream_there_and_back() -> None:
     rows = ROWS.copy()
     rows[3, 1] = np.nan
@@ -184,7 +162,7 @@ def test_what_is_printed_can_be_read_again(tmp_path: Path) -> None:
     path.write_bytes(encoded(data=NAMES + b"".join(map(line, rows))))
     plain = list(live_frames(io.BytesIO(path.read_bytes())))
     stored = tmp_path / "a.csv"
-    common.run(cli, "mcz", ["decode", str(path), "--to", "csv", "-o", str(stored)])
+    common.run("decode", path, "--to", "csv", "-o", stored)
     for printed in (
         run("decode", path)[1],
         run("decode", "--states", path)[1],

@@ -10,7 +10,6 @@ import pytest
 
 from mcz.cli import tcp
 from mcz.cli.common import Failure, run
-from mcz.cli.main import cli
 
 TOKEN = "s3cret-of-the-stage"
 
@@ -105,7 +104,7 @@ def test_what_is_open_to_others_is_said(
 ) -> None:
     from tests.cli.test_stream import CODER
 
-    run(cli, "mcz", ["stream", "encode", *CODER, "--listen", where, *token])
+    run("stream", "encode", *CODER, "--listen", where, *token)
     error = capsys.readouterr().err
     assert "listening on" in error
     assert (said in error) if said else ("everyone" not in error)

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mcz.errors import MotionError, SourceError
+from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.formats import amc, asf
 from mcz.formats.bones import derive
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from tests.formats.text_files import AMC, ASF
 

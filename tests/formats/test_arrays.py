@@ -19,13 +19,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from mcz import MczError, MotionError, OptionError, SourceError
 from mcz.editing.folders import motion_files
-from mcz.errors import MczError, MotionError, OptionError, SourceError
 from mcz.formats import FORMATS, likely_formats
 from mcz.formats.arrays.kinds import KINDS
 from mcz.numbers import GridKind
+from tests.commands import run
 from tests.formats.saved_arrays import arrays, saved
 from tools.vectors.build.array_files import Member, floats, npy, npz
 
@@ -523,22 +522,22 @@ def test_commands_say_what_is_read_and_what_is_kept(
         Member("steps.npy", npy(np.arange(9).astype(">i4"))),
     ]
     Path(path).write_bytes(npz([*members, deflated]))
-    assert run(cli, "mcz", ["encode", path, "--arrays", "positions", "--unit", "cm"]) == 0
+    assert run("encode", path, "--arrays", "positions", "--unit", "cm") == 0
     assert "old is deflated, and stays so" in capsys.readouterr().err
-    assert run(cli, "mcz", ["decode", held, "-o", again]) == 0
+    assert run("decode", held, "-o", again) == 0
     assert Path(again).read_bytes() == Path(path).read_bytes()
     capsys.readouterr()
     for file in (held, path):
-        assert run(cli, "mcz", ["info", file]) == 0
+        assert run("info", file) == 0
         said = capsys.readouterr().out
         assert "  array      points: 12 columns of <f8, by columns, in motion\n" in said
         assert "  array      steps: 1 column of >i4, in steps\n" in said
         assert "  kept       as bytes: betas, old\n" in said
-    assert run(cli, "mcz", ["info", "--json", held]) == 0
+    assert run("info", "--json", held) == 0
     (clip,) = json.loads(capsys.readouterr().out)["clips"]
     assert clip["arrays"][3] == {
         "name": "old", "type": None, "order": None, "columns": None, "signal": None
     }  # fmt: skip
     assert [array["name"] for array in clip["arrays"]] == ["points", "betas", "steps", "old"]
-    assert run(cli, "mcz", ["encode", path, "--arrays", "quaternions-wxyz", "--force"]) == 1
+    assert run("encode", path, "--arrays", "quaternions-wxyz", "--force") == 1
     assert "4 numbers a joint, but there are 3" in capsys.readouterr().err

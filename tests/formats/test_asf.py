@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz.errors import MotionError, SourceError
+from mcz import Channel, Joint, MotionError, Skeleton, SourceError
 from mcz.formats import asf
-from mcz.motion import Channel, Joint, Skeleton
 from tests.formats.text_files import ASF_OF_ALL_KINDS
 
 

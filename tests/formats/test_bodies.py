@@ -11,10 +11,16 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.errors import AccessError, OptionError, SourceError
-from mcz.formats.body_models import offsets_from_positions, offsets_of_model
+from mcz import (
+    AccessError,
+    Motion,
+    OptionError,
+    Signal,
+    SourceError,
+    offsets_from_positions,
+    offsets_of_model,
+)
 from mcz.formats.body_trees import TURNS, skeleton_of, tree
-from mcz.motion import Motion, Signal
 
 RANDOM = np.random.default_rng(3)
 

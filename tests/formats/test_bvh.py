@@ -14,11 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.container.limits import ARCHIVE, BASE
-from mcz.errors import MotionError, SourceError
 from mcz.formats import amc, asf, bvh, hierarchy, likely_formats, limits
 from mcz.formats.notes import join_notes
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from tests.formats.text_files import BVH, bvh_texts
 

@@ -12,9 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz.errors import FormatError, MotionError, SourceError
+from mcz import Channel, FormatError, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.formats import c3d
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, c3d_files, made, real_of, word
 

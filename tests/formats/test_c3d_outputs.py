@@ -12,10 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import FormatError, MotionError
+from mcz import Channel, FormatError, Joint, Motion, MotionError, Signal, Skeleton
 from mcz.formats import FORMATS, c3d
 from mcz.formats.c3d_outputs import Split, split_of
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made
 
 ORDERS = (INTEL, DEC, SGI)

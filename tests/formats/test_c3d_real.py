@@ -16,10 +16,9 @@ import pytest
 from numpy.typing import NDArray
 
 import mcz
-from mcz.errors import SourceError
+from mcz import Motion, SourceError
 from mcz.formats import c3d
 from mcz.formats.c3d_layout import parse_layout
-from mcz.motion import Motion
 from tests.formats.c3d_files import DEC, SGI, real_of
 
 DATA = Path(os.environ.get("MCZ_DATA", "no-data"))

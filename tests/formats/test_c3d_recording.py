@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import MotionError, OptionError
+from mcz import Motion, MotionError, OptionError, Signal
 from mcz.formats import c3d
-from mcz.motion import Motion, Signal
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made, real, word
 
 ORDERS = (INTEL, DEC, SGI)

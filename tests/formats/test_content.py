@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
-from mcz.errors import SourceError
+from mcz import SourceError
 from mcz.formats import FORMATS, format_of, likely_formats
 from tests.cli.test_ways_out import CLIPS, source_files
+from tests.commands import run
 
 SUFFIXES = sorted({suffix for known in FORMATS.values() for suffix in known.suffixes})
 
@@ -46,10 +45,10 @@ def test_every_way_in(tmp_path: Path, samples: Path, capsys: pytest.CaptureFixtu
     path.write_bytes((samples / "walk.bvh").read_bytes())
     motion = mcz.read(path)
     assert motion.source is not None and motion.source.format == "bvh"
-    assert run(cli, "mcz", ["info", str(path)]) == 0
+    assert run("info", path) == 0
     assert "its content is BVH, though its suffix is .c3d" in capsys.readouterr().out
-    assert run(cli, "mcz", ["diff", str(path), str(samples / "walk.bvh")]) == 0
-    assert run(cli, "mcz", ["pack", str(tmp_path), str(tmp_path / "p.mcz")]) == 0
+    assert run("diff", path, samples / "walk.bvh") == 0
+    assert run("pack", tmp_path, tmp_path / "p.mcz") == 0
     assert "its content is BVH, though its suffix is .c3d" in capsys.readouterr().err
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "walk.bvh").write_bytes((samples / "walk.asf").read_bytes())

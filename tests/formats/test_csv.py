@@ -11,13 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import FormatError, MotionError, SourceError
+from mcz import FormatError, Motion, MotionError, SourceError
 from mcz.formats import FORMATS, likely_formats
 from mcz.formats.csv_files import is_motion, kind_of
 from mcz.formats.csv_text import cells_of
 from mcz.formats.notes import RowNotes
 from mcz.formats.table_notes import join_table_notes, table_notes
-from mcz.motion import Motion
 from mcz.sample import bvh_walk
 from tests.formats.csv_files import column_files, motive_files, vicon_files
 from tools.vectors.build.table_files import COLUMNS, DEVICES, EULER, MOTIVE, ODD_SECTIONS, VICON

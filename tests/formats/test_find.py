@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mcz.errors import SourceError
+from mcz import SourceError
 from mcz.formats import format_of
 from mcz.formats.find import NUMBER, SUBJECT, TAKE, skeletons_around
 

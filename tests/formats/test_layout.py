@@ -9,7 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz.errors import FormatError, LimitError, MczError, MotionError
+from mcz import (
+    Channel,
+    Exceptions,
+    FormatError,
+    Joint,
+    LimitError,
+    MczError,
+    Motion,
+    MotionError,
+    Signal,
+    Skeleton,
+    Source,
+)
 from mcz.formats import bvh
 from mcz.formats.layout import (
     FRAME_NUMBER,
@@ -23,7 +35,6 @@ from mcz.formats.layout import (
 )
 from mcz.formats.notes import RowNotes, join_notes
 from mcz.formats.restore import restore
-from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid, GridKind
 from tools.records import built
 

@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.errors import SkeletonWarning, SourceError
+from mcz import Motion, Skeleton, SkeletonWarning, SourceError
 from mcz.formats import FORMATS, format_of
 from mcz.formats.csv_files import is_motion
-from mcz.motion import Motion, Skeleton
 
 DATA = Path(os.environ.get("MCZ_DATA", "no-data"))
 pytestmark = [

@@ -15,11 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import FormatError, LimitError, MotionError, SourceError
+from mcz import FormatError, LimitError, Motion, MotionError, SourceError
 from mcz.formats import FORMATS
 from mcz.formats.table_layout import PHRASES, fill, with_phrases
 from mcz.formats.times import find_clock, rate_of_times, stated_rate
-from mcz.motion import Motion
 from mcz.numbers import GridKind, scan
 from mcz.sample import bvh_walk, marker_walk
 from tests.formats.tab_files import NUMBERS, trc_files

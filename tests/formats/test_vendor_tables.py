@@ -13,12 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import SourceError
+from mcz import Motion, SourceError
 from mcz.formats import FORMATS
 from mcz.formats.csv_files import is_motion
 from mcz.formats.csv_text import first_row
 from mcz.formats.table_rows import lines_from
-from mcz.motion import Motion
 from tests.formats.csv_files import column_files, motive_files, vicon_files
 from tools.vectors.build.table_files import COLUMNS, DEVICES, MOTIVE, VICON
 

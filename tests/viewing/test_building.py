@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.errors import AccessError
+from mcz import AccessError
 from mcz.viewing import building
 from mcz.viewing.building import built
 

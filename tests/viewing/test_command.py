@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 import pytest
 
 import mcz
-from mcz.errors import AccessError, OptionError
+from mcz import AccessError, OptionError
 from mcz.viewing import browser, showing
 from mcz.viewing.visitors import Visitors
 from tests.conftest import Call

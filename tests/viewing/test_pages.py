@@ -16,12 +16,11 @@ import pytest
 
 import mcz
 from mcz.annexes import annex_bytes
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.codecs import CODECS
 from mcz.viewing.embedding import element
 from mcz.viewing.page import page
 from mcz.viewing.tables import TABLES, tables_for
+from tests.commands import run
 from tests.motions import smooth
 
 ROOT = Path(mcz.__file__).parents[1]
@@ -31,7 +30,7 @@ Call = Callable[..., tuple[int, str, str]]
 @pytest.fixture
 def call(capsys: pytest.CaptureFixture[str]) -> Call:
     def call(*arguments: object) -> tuple[int, str, str]:
-        code = int(run(cli, "mcz", ["view", *map(str, arguments)]))
+        code = int(run("view", *map(str, arguments)))
         return code, *capsys.readouterr()
 
     return call

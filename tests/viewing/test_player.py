@@ -17,8 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import FormatError
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, FormatError, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from mcz.viewing import drawn as drawn_module
 from mcz.viewing.drawn import lines_of

@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz import AccessError, FormatError, OptionError
 from mcz.annexes import annex_bytes
-from mcz.errors import AccessError, FormatError, OptionError
 from mcz.viewing import shelf as shelf_module
 from mcz.viewing.page import Page, page
 from mcz.viewing.requests import Refused, range_of
@@ -448,10 +448,9 @@ def test_diff_is_that_of_the_command(
     server: Server, folder: Path, samples: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from mcz.cli.common import run
-    from mcz.cli.main import cli
 
     words = ["diff", str(folder / "walk.mcz"), str(folder / "walk.mcz"), "--by-joint", "--json"]
-    assert run(cli, "mcz", [*words, "--unit", "cm"]) == 0
+    assert run(*words, "--unit", "cm") == 0
     printed = json.loads(capsys.readouterr().out)
     asked = {"a": {"url": "files/0"}, "b": {"url": "files/0"}}
     assert post(server, "diff", asked).json["clips"] == printed["clips"]

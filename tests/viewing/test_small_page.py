@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.errors import AccessError
+from mcz import AccessError
 from mcz.viewing import building, page
 from mcz.viewing.server import Server
 from mcz.viewing.shelf import Shelf, put
