@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 import signal
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from mcz.cli.common import run
-from mcz.cli.main import cli
-
-Call = Callable[..., tuple[int, str, str]]  # a command: its exit code and what it printed
+from tests.commands import Call, Result, run
 
 # No deadlines: the first call of a compiled function takes seconds, later ones microseconds.
 settings.register_profile("dev", max_examples=30, deadline=None)
@@ -74,11 +72,13 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
+def folder(samples: Path, tmp_path: Path) -> Path:
+    """A folder of one's own with the sample files."""
+    shutil.copytree(samples, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+@pytest.fixture
 def call(capsys: pytest.CaptureFixture[str]) -> Call:
     """``mcz`` with these arguments, in this process."""
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = run(cli, "mcz", [str(argument) for argument in arguments])
-        return int(code), *capsys.readouterr()
-
-    return call
+    return lambda *arguments: Result(run(*arguments), *capsys.readouterr())

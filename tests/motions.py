@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 
+import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 
@@ -36,6 +39,19 @@ def smooth(n_frames: int = 50, **changes) -> Motion:
     signal = Signal(values, (Grid(GridKind.FIXED, 4),) * 10)
     arguments = {"frame_rate": Fraction(120), "name": "smooth"} | changes
     return Motion(skeleton(), (signal,), **arguments)
+
+
+def written(motion: Motion, **params: Any) -> bytes:
+    """The file that ``mcz.write`` makes."""
+    out = io.BytesIO()
+    mcz.write(motion, out, **params)
+    return out.getvalue()
+
+
+def stored(motion: Motion, **params: Any) -> Motion:
+    """``motion`` after a file."""
+    with mcz.open(written(motion, **params)) as file:
+        return file.only_clip().motion()
 
 
 @st.composite

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.bags.manifests import manifest_text, read_manifest, read_tags, tags_text
-from tests.conftest import Call
+from tests.commands import Call
 from tests.motions import smooth
 
 bagit = pytest.importorskip("bagit")

@@ -18,7 +18,7 @@ import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton, left_out
 from mcz.formats import FORMATS
 from mcz.sample import bvh_walk
-from tests.conftest import Call
+from tests.commands import Call
 from tests.glb import Glb
 
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)

@@ -20,13 +20,7 @@ from mcz.container.value_hash import canonical
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import info
 from mcz.writing.names import METADATA_KEYS
-from tests.motions import motions, skeleton, smooth
-
-
-def written(motion: mcz.Motion, **params: object) -> bytes:
-    out = io.BytesIO()
-    mcz.write(motion, out, **params)
-    return out.getvalue()
+from tests.motions import motions, skeleton, smooth, written
 
 
 @given(motions())

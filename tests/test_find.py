@@ -20,7 +20,7 @@ from mcz.reading.report import info, part_problems
 from mcz.schema import parse_until
 from mcz.writing.clip_writer import write_clip
 from tests import live_codec
-from tests.conftest import Call
+from tests.commands import Call
 from tests.motions import skeleton, smooth
 
 CLIPS = (

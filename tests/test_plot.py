@@ -20,8 +20,6 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import MczError, Motion, MotionError, OptionError, plot
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.joint_errors import joint_errors
 from mcz.pictures.channel_charts import density
 from mcz.pictures.chart_pages import STYLE, ChartPage, Sheet
@@ -30,6 +28,7 @@ from mcz.pictures.error_charts import errors_between
 from mcz.pictures.plotting import KINDS
 from mcz.reading.report import info, layout
 from mcz.reading.shares import byte_shares
+from tests.commands import run
 from tests.motions import motions, smooth
 from tests.test_render import HOSTILE
 
@@ -347,7 +346,7 @@ def test_the_command(
     samples: Path, lossy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def call(*words: object) -> tuple[int, str, str]:
-        return int(run(cli, "mcz", list(map(str, words)))), *capsys.readouterr()
+        return run(*words), *capsys.readouterr()
 
     out = ("-o", tmp_path / "a.png", "--size", "360x240", "--force")
     code, printed, _ = call("plot", samples / "walk.bvh", lossy, "--unit", "cm", *out, "--json")

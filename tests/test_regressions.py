@@ -35,7 +35,7 @@ from mcz.transforms import dwt
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import write_clip
 from tests.commands import run
-from tests.motions import smooth
+from tests.motions import smooth, written
 from tests.repair import with_index_content
 from tools.fuzz.repair import joined, pieces_of, with_payload
 from tools.records import built
@@ -44,12 +44,6 @@ BVH = (
     "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 3\n"
     "Frame Time: 0.01\n1.25\n1.23456789e-01\n2.50\n"
 )
-
-
-def written(motion: mcz.Motion, **params: object) -> bytes:
-    out = io.BytesIO()
-    mcz.write(motion, out, **params)
-    return out.getvalue()
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import mcz
 from mcz import SkeletonWarning, SourceError
 from mcz.live.text_writer import encode_live
 from mcz.writing.entry import Terms
-from tests.conftest import Call
+from tests.commands import Call
 
 ASF = b""":name small
 :units

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from mcz.kinematics import origins_of, shell_points_of
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.scaling import Scaling
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
-from tests.motions import POSITIONS, ROTATIONS, smooth
+from tests.motions import POSITIONS, ROTATIONS, smooth, stored
 from tests.skeletons import skeletons, values_for
 
 WALKS = {"amc": acclaim_walk(), "bvh": bvh_walk(), "c3d": marker_walk()}
@@ -43,14 +42,6 @@ def apart(before: Motion, after: Motion) -> float:
     unknown = np.isnan(before.values).any()
     assert unknown or not any(np.isnan(step).any() for step in steps)
     return max(float(np.nanmax(np.abs(step), initial=0.0)) for step in steps)
-
-
-def stored(motion: Motion) -> Motion:
-    """``motion`` after a file."""
-    stream = io.BytesIO()
-    mcz.write(motion, stream)
-    with mcz.open(stream.getvalue()) as file:
-        return file.only_clip(motion.name).motion()
 
 
 def test_what_a_skeleton_says() -> None:

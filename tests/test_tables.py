@@ -12,7 +12,8 @@ from hypothesis import given
 
 import mcz
 from mcz import Channel, Motion, Signal, Skeleton
-from mcz.cli.common import Exit, run
+from mcz.cli.common import Exit
+from tests.commands import run
 from tests.motions import smooth
 from tests.skeletons import skeletons, values_for
 

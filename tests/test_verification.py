@@ -24,7 +24,7 @@ from mcz.container.locks import lock
 from mcz.container.source import open_source
 from mcz.errors import UnsupportedError
 from tests import live_codec
-from tests.conftest import Call
+from tests.commands import Call
 from tests.motions import skeleton, smooth
 
 DATE = "2026-11-24"

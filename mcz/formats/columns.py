@@ -29,7 +29,7 @@ from mcz.formats.table_rows import TableRows, lines_from, read_table, without_ze
 from mcz.formats.table_signals import read_columns, read_text, table_metadata, text_note
 from mcz.formats.table_source import names_in, section_of, table_source
 from mcz.formats.table_times import Times, read_times
-from mcz.formats.text_source import check_text, text_encoding, text_start
+from mcz.formats.text_source import text_encoding, text_start
 from mcz.motion import Channel, Joint, Motion, Skeleton
 
 MAX_COLUMNS = 2**18  # of a table; no skeleton is stored with more joints
@@ -72,7 +72,6 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     A frame rate is stated where there is a column of uniform times. Raises SourceError, with the
     number of the line.
     """
-    check_text(data)
     encoding = text_encoding(data)
     head = _head(data, encoding)
     called = (k for k, n in enumerate(head.names[:8]) if TIME.fullmatch(n.strip()))

@@ -24,7 +24,7 @@ from mcz.formats.motive import HEAD, read_motive
 from mcz.formats.rows import line_of
 from mcz.formats.table_restore import restore_table
 from mcz.formats.table_rows import lines_from
-from mcz.formats.text_source import BOM
+from mcz.formats.text_source import BOM, check_text
 from mcz.formats.vicon import AXIS, read_vicon
 from mcz.motion import Motion
 
@@ -78,6 +78,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the number of the line.
     """
+    check_text(data)
     _check_line_ends(data)
     reader = {"motive": read_motive, "vicon": read_vicon}.get(kind_of(data) or "", read_columns_of)
     return reader(data, name)

@@ -18,7 +18,7 @@ from mcz.formats.table_rows import begins_with_number, lines_from, read_table, w
 from mcz.formats.table_signals import read_columns, read_text, table_metadata, text_note
 from mcz.formats.table_source import named_count, names_in, section_of, table_source
 from mcz.formats.table_times import Times, read_times
-from mcz.formats.text_source import BOM, check_text, text_encoding
+from mcz.formats.text_source import BOM, text_encoding
 from mcz.formats.times import stated_rate
 from mcz.motion import Channel, Joint, Motion, Skeleton
 
@@ -76,7 +76,6 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the number of the line.
     """
-    check_text(data)
     encoding = text_encoding(data)
     head = _head(data, encoding)
     objects = _objects(head)

@@ -28,7 +28,7 @@ from mcz.formats.table_rows import (
 )
 from mcz.formats.table_signals import TEXT, read_columns, read_text, table_metadata, text_note
 from mcz.formats.table_source import names_in, section_of, table_source
-from mcz.formats.text_source import check_text, text_encoding
+from mcz.formats.text_source import text_encoding
 from mcz.formats.times import stated_rate
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import scan
@@ -86,7 +86,6 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the number of the line, also where sections differ in their frames.
     """
-    check_text(data)
     encoding = text_encoding(data)
     parts = _parts(data, encoding)
     found = [_read(data, part) for part in parts]

@@ -13,7 +13,7 @@ import pytest
 
 import mcz
 from mcz.formats import c3d
-from tests.commands import run
+from tests.commands import Call
 from tests.formats.c3d_files import INTEL, made, real
 from tests.formats.test_c3d_outputs import listed
 from tests.formats.test_c3d_recording import integers, reals, with_analog
@@ -51,58 +51,52 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = int(run(*arguments))
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
 def rows_of(path: Path) -> tuple[list[str], np.ndarray[Any, Any]]:
     head, *rows = csv.reader(path.read_text().splitlines())
     return head, np.array([[float(cell or "nan") for cell in row] for row in rows])
 
 
-def test_other_signals_as_csv(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_signals_as_csv(folder: Path, call: Call) -> None:
     motion = c3d.read((folder / "gait.c3d").read_bytes(), "gait")
     outputs, analog = motion.signals[2:]
     to = ("--to", "csv", "--force", "-o", folder / "x.csv")
-    assert call(capsys, "decode", folder / "gait.mcz", "--signal", "analog", *to)[0] == 0
+    assert call("decode", folder / "gait.mcz", "--signal", "analog", *to)[0] == 0
     head, rows = rows_of(folder / "x.csv")
     assert head == ["frame", "time", "Fx [N]", r"EMG\x1b[2J"]  # escaped
     assert rows[:, 0].tolist() == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6]
     np.testing.assert_allclose(rows[:, 1], mcz.times(motion, signal="analog"), atol=1e-9)
     assert np.array_equal(rows[:, 2:], (analog.stored - [1000, 0]) * [0.5, 2.0])
     part = ("--signal", "analog", "--stored", "--frames", "2:4")
-    assert call(capsys, "decode", folder / "gait.mcz", *part, *to)[0] == 0
+    assert call("decode", folder / "gait.mcz", *part, *to)[0] == 0
     head, rows = rows_of(folder / "x.csv")
     assert head[2] == "Fx" and np.array_equal(rows[:, 2:], analog.stored[4:8])
-    assert call(capsys, "decode", folder / "gait.mcz", "--signal", "outputs", *to)[0] == 0
+    assert call("decode", folder / "gait.mcz", "--signal", "outputs", *to)[0] == 0
     head, rows = rows_of(folder / "x.csv")
     assert head == ["frame", "time", "p1 x [deg]", "p1 y [deg]", "p1 z [deg]"]
     assert np.array_equal(rows[:, 2:], outputs.masked(), equal_nan=True)
 
 
-def test_events_as_tables(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_events_as_tables(folder: Path, call: Call) -> None:
     clip = folder / "gait.mcz"
     with mcz.open(clip) as file:
         found = file.only_clip().recording
     assert found is not None
     to = ("--signal", "events", "--force", "-o")
-    assert call(capsys, "decode", clip, *to, folder / "x.csv")[0] == 0
+    assert call("decode", clip, *to, folder / "x.csv")[0] == 0
     head, *rows = csv.reader((folder / "x.csv").read_text().splitlines())
     assert head == ["time", "label", "context", "subject", "description"]
     assert [float(row[0]) for row in rows] == [event.time for event in found.events]
-    assert call(capsys, "decode", clip, *to, folder / "x.npz")[0] == 0
+    assert call("decode", clip, *to, folder / "x.npz")[0] == 0
     with np.load(folder / "x.npz") as arrays:
         assert arrays["times"].tolist() == [event.time for event in found.events]
         assert arrays["label"].tolist() == [event.label for event in found.events]
-    assert call(capsys, "decode", clip, "--stored", *to, folder / "x.csv")[0] == 2
+    assert call("decode", clip, "--stored", *to, folder / "x.csv")[0] == 2
 
 
-def test_other_signals_as_npz(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_signals_as_npz(folder: Path, call: Call) -> None:
     target = folder / "x.npz"
     options = ("--to", "npz", "--signal", "analog", "-o", target)
-    assert call(capsys, "decode", folder / "gait.mcz", *options)[0] == 0
+    assert call("decode", folder / "gait.mcz", *options)[0] == 0
     with np.load(target) as arrays, mcz.open(folder / "gait.mcz") as file:
         assert np.array_equal(arrays["values"], file.clips["gait"].read(signal="analog"))
         assert arrays["units"].tolist() == ["N", ""]
@@ -121,14 +115,14 @@ def test_other_signals_as_npz(folder: Path, capsys: pytest.CaptureFixture[str]) 
     ],
 )
 def test_what_does_not_go_together(
-    folder: Path, capsys: pytest.CaptureFixture[str], options: list[str], message: str
+    folder: Path, call: Call, options: list[str], message: str
 ) -> None:
-    code, out, err = call(capsys, "decode", folder / "gait.mcz", *options)
+    code, out, err = call("decode", folder / "gait.mcz", *options)
     assert code in (1, 2) and not out and message in err and err.count("\n") == 1
 
 
-def test_info_tells_what_the_file_says(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, text, _ = call(capsys, "info", folder / "gait.mcz")
+def test_info_tells_what_the_file_says(folder: Path, call: Call) -> None:
+    code, text, _ = call("info", folder / "gait.mcz")
     assert code == 0 and "\x1b" not in text
     for words in (
         "z up",
@@ -139,7 +133,7 @@ def test_info_tells_what_the_file_says(folder: Path, capsys: pytest.CaptureFixtu
         "p1      deg   angles",
     ):
         assert words in text, text
-    code, text, _ = call(capsys, "info", folder / "gait.mcz", "--json")
+    code, text, _ = call("info", folder / "gait.mcz", "--json")
     clip = json.loads(text)["clips"][0]
     said = clip["recording"]
     assert said["up_axis"] == "z" and said["y_screen"] == "+Z" and said["first_frame"] == 1
@@ -165,10 +159,10 @@ def test_info_tells_what_the_file_says(folder: Path, capsys: pytest.CaptureFixtu
     assert signals[-1] == ("analog", 2, 2)
 
 
-def test_joints_alone_leave_words(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_joints_alone_leave_words(folder: Path, call: Call) -> None:
     """The source says what words mean, and a cut of joints has none."""
     target = folder / "cut.mcz"
-    code, _, err = call(capsys, "extract", folder / "gait.mcz", target, "--joints", "p0")
+    code, _, err = call("extract", folder / "gait.mcz", target, "--joints", "p0")
     assert code == 0 and "what the words of its signal analog mean" in err
     with mcz.open(target) as file, mcz.open(folder / "gait.mcz") as whole:
         clip = file.clips["gait"]
@@ -180,9 +174,9 @@ def test_joints_alone_leave_words(folder: Path, capsys: pytest.CaptureFixture[st
     assert not mcz.verify(target)
 
 
-def test_a_range_of_frames_keeps_units(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_range_of_frames_keeps_units(folder: Path, call: Call) -> None:
     target = folder / "cut.mcz"
-    assert call(capsys, "extract", folder / "gait.mcz", target, "--frames", "2:5")[0] == 0
+    assert call("extract", folder / "gait.mcz", target, "--frames", "2:5")[0] == 0
     with mcz.open(target) as file, mcz.open(folder / "gait.mcz") as whole:
         cut = file.clips["gait"].read(signal="analog")
         assert np.array_equal(cut, whole.clips["gait"].read(signal="analog")[4:10])
@@ -190,15 +184,13 @@ def test_a_range_of_frames_keeps_units(folder: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize("name", ["walk.bvh", "walk.amc", "walk.c3d"])
-def test_up_is_what_the_caller_says(
-    samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
+def test_up_is_what_the_caller_says(samples: Path, tmp_path: Path, call: Call, name: str) -> None:
     for path in samples.iterdir():
         shutil.copy(path, tmp_path)
     said = {"walk.bvh": "", "walk.amc": "", "walk.c3d": "z"}[name]
     plain, target = tmp_path / "plain.mcz", tmp_path / "walk.mcz"
-    assert call(capsys, "encode", tmp_path / name, "-o", plain)[0] == 0
-    assert call(capsys, "encode", tmp_path / name, "-o", target, "--up", "y")[0] == 0
+    assert call("encode", tmp_path / name, "-o", plain)[0] == 0
+    assert call("encode", tmp_path / name, "-o", target, "--up", "y")[0] == 0
     with mcz.open(plain) as file:
         assert file.clips["walk"].skeleton.up_axis == said
     with mcz.open(target) as file:
@@ -210,34 +202,30 @@ def test_up_is_what_the_caller_says(
     assert mcz.read(tmp_path / name, up="x").skeleton.up_axis == "x"
 
 
-def test_an_asf_stays_as_it_is(
-    samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_asf_stays_as_it_is(samples: Path, tmp_path: Path, call: Call) -> None:
     for path in samples.iterdir():
         shutil.copy(path, tmp_path)
     asf = (tmp_path / "walk.asf").read_bytes()
     options = ("-o", tmp_path / "s.mcz", "--up", "y")
-    code, _, err = call(capsys, "encode", tmp_path / "walk.asf", *options)
+    code, _, err = call("encode", tmp_path / "walk.asf", *options)
     assert code == 2 and "say the up axis of its AMC" in err
     target = tmp_path / "walk.mcz"
-    assert call(capsys, "encode", tmp_path / "walk.amc", "-o", target, "--up", "y")[0] == 0
+    assert call("encode", tmp_path / "walk.amc", "-o", target, "--up", "y")[0] == 0
     out = tmp_path / "out"
     out.mkdir()
-    assert call(capsys, "decode", target, "-o", out, "--with-skeleton")[0] == 0
+    assert call("decode", target, "-o", out, "--with-skeleton")[0] == 0
     assert (out / "walk.asf").read_bytes() == asf
-    assert call(capsys, "pack", tmp_path, tmp_path.parent / "all.mcz", "--up", "x")[0] == 0
+    assert call("pack", tmp_path, tmp_path.parent / "all.mcz", "--up", "x")[0] == 0
     with mcz.open(tmp_path.parent / "all.mcz") as file:
         assert {clip.skeleton.up_axis for clip in file.clips.values()} == {"x"}
 
 
-def test_up_of_what_is_converted(
-    samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_up_of_what_is_converted(samples: Path, tmp_path: Path, call: Call) -> None:
     mcz.encode(samples / "walk.bvh", tmp_path / "walk.mcz", unit="cm")
     for options, up in (((), ""), (("--up", "y"), "y")):
         target = tmp_path / "points.c3d"
         to = ("--to", "c3d", "-o", target, "--force", *options)
-        assert call(capsys, "decode", tmp_path / "walk.mcz", *to)[0] == 0
+        assert call("decode", tmp_path / "walk.mcz", *to)[0] == 0
         assert c3d.read(target.read_bytes(), "points").skeleton.up_axis == up
 
 
@@ -247,13 +235,11 @@ def lines_in(text: str) -> list[str]:
     ]
 
 
-def test_diff_names_what_is_beside_the_numbers(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_diff_names_what_is_beside_the_numbers(folder: Path, call: Call) -> None:
     """A plain C3D of the same numbers has lost events, platforms and groups, which is said."""
     gait, plain = folder / "gait.c3d", folder / "plain.c3d"
-    assert call(capsys, "decode", folder / "gait.mcz", "--to", "c3d", "-o", plain)[0] == 0
-    code, text, _ = call(capsys, "diff", gait, plain)
+    assert call("decode", folder / "gait.mcz", "--to", "c3d", "-o", plain)[0] == 0
+    code, text, _ = call("diff", gait, plain)
     assert code == 0
     shown = lines_in(text)
     assert shown[:2] == [
@@ -261,7 +247,7 @@ def test_diff_names_what_is_beside_the_numbers(
         "force platforms: 1 in A, 0 in B; only in A: platform 1",
     ]
     assert shown[2].startswith("groups of parameters: ") and "EVENT" in shown[2]
-    code, text, _ = call(capsys, "diff", gait, plain, "--json")
+    code, text, _ = call("diff", gait, plain, "--json")
     found = {each["what"]: each for each in json.loads(text)["clips"][0]["differences"]}
     assert found["events"] == {
         "what": "events",
@@ -272,30 +258,30 @@ def test_diff_names_what_is_beside_the_numbers(
         "changed": [],
     }
     assert "EVENT" in found["groups of parameters"]["only_in_a"]
-    code, text, _ = call(capsys, "diff", plain, gait)
+    code, text, _ = call("diff", plain, gait)
     assert lines_in(text)[0].endswith("only in B: Left Foot Strike at 0.25 s")
 
 
-def test_diff_of_the_same_names_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diff_of_the_same_names_nothing(folder: Path, call: Call) -> None:
     shutil.copy(folder / "gait.c3d", folder / "copy.c3d")
     for other in ("copy.c3d", "gait.mcz"):
-        code, text, _ = call(capsys, "diff", folder / "gait.c3d", folder / other)
+        code, text, _ = call("diff", folder / "gait.c3d", folder / other)
         assert code == 0 and lines_in(text) == []
     cut = ["--frames", "2:5"]
-    assert call(capsys, "decode", folder / "gait.mcz", *cut, "-o", folder / "cut.c3d")[0] == 0
+    assert call("decode", folder / "gait.mcz", *cut, "-o", folder / "cut.c3d")[0] == 0
     mcz.encode(folder / "cut.c3d", folder / "cut.mcz")
-    assert lines_in(call(capsys, "diff", folder / "cut.c3d", folder / "cut.mcz")[1]) == []
+    assert lines_in(call("diff", folder / "cut.c3d", folder / "cut.mcz")[1]) == []
 
 
-def test_diff_names_what_has_changed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diff_names_what_has_changed(folder: Path, call: Call) -> None:
     """Bytes of a text of the parameters, and of the header: numbers alike, named all the same."""
     data = (folder / "gait.c3d").read_bytes()
     (folder / "right.c3d").write_bytes(data.replace(b"force to the right", b"force to the wrong"))
-    shown = lines_in(call(capsys, "diff", folder / "gait.c3d", folder / "right.c3d")[1])
+    shown = lines_in(call("diff", folder / "gait.c3d", folder / "right.c3d")[1])
     n = shown[0].split()[1]
     assert shown == [f"parameters: {n} in A, {n} in B; changed: ANALOG:DESCRIPTIONS"]
     header = bytearray(data)
     header[200] ^= 1  # which nobody reads
     (folder / "header.c3d").write_bytes(header)
-    shown = lines_in(call(capsys, "diff", folder / "gait.c3d", folder / "header.c3d")[1])
+    shown = lines_in(call("diff", folder / "gait.c3d", folder / "header.c3d")[1])
     assert shown == ["header or layout of the files: not the same"]

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import json
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +16,9 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.info import command as info_command
-from mcz.cli.main import COMMANDS, cli
+from mcz.cli.main import COMMANDS
 from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR
+from tests.commands import Call, fails
 
 VERSION = f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
 
@@ -44,54 +41,12 @@ CLIP_KEYS = {
 }
 
 
-@dataclass(frozen=True)
-class Result:
-    code: int
-    out: str
-    err: str
-
-    @property
-    def document(self) -> Any:
-        assert self.code == 0, self.err
-        return json.loads(self.out)
-
-
-Call = Callable[..., Result]
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> Result:
-        code = run(cli, "mcz", [str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return Result(int(code), captured.out, captured.err)
-
-    return call
-
-
-@pytest.fixture
-def folder(samples: Path, tmp_path: Path) -> Path:
-    """A folder of one's own with the sample files."""
-    for path in samples.iterdir():
-        shutil.copy(path, tmp_path)
-    return tmp_path
-
-
 @pytest.fixture
 def walk(folder: Path, call: Call) -> Path:
     """walk.mcz, made of walk.bvh."""
     result = call("encode", folder / "walk.bvh")
     assert result.code == 0, result.err
     return folder / "walk.mcz"
-
-
-def fails(result: Result, code: int, *words: str) -> None:
-    """The command ended with ``code``, one line on stderr that has ``words``, none on stdout."""
-    assert (result.code, result.out) == (code, ""), result
-    assert result.err.startswith("mcz: ")
-    assert result.err.count("\n") == 1
-    for word in words:
-        assert word in result.err
 
 
 def digest(path: Path) -> str:

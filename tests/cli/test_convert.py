@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import json
-import shutil
 from itertools import permutations
 from pathlib import Path
 
 import pytest
 
 import mcz
-from tests.conftest import Call
+from tests.commands import Call
 
 UNITS = ["--unit", "cm"]
-
-
-@pytest.fixture
-def folder(samples: Path, tmp_path: Path) -> Path:
-    for path in samples.iterdir():
-        shutil.copy(path, tmp_path)
-    return tmp_path
 
 
 TO_OTHERS = (".csv", ".npz", ".trc", ".sto", ".mot", ".glb", ".usda", ".c3d")

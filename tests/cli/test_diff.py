@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -16,15 +15,8 @@ import mcz
 from mcz import codecs
 from mcz.cli.figures import figure_lines
 from tests import overlap_codec
-from tests.conftest import Call
+from tests.commands import Call, fails
 from tests.test_contacts import markers
-
-
-@pytest.fixture
-def folder(samples: Path, tmp_path: Path) -> Path:
-    for path in samples.iterdir():
-        shutil.copy(path, tmp_path)
-    return tmp_path
 
 
 @pytest.fixture
@@ -38,29 +30,16 @@ def moved(folder: Path) -> Path:
     return folder / "moved.mcz"
 
 
-def document(result: tuple[int, str, str]) -> Any:
-    assert result[0] == 0, result
-    return json.loads(result[1])
-
-
-def fails(result: tuple[int, str, str], code: int, *words: str) -> None:
-    assert (result[0], result[1]) == (code, ""), result
-    assert result[2].startswith("mcz: ")
-    assert result[2].count("\n") == 1
-    for word in words:
-        assert word in result[2]
-
-
 @pytest.mark.parametrize("name", ["walk.amc", "walk.bvh", "walk.c3d"])
 def test_a_file_and_its_mcz_are_equal(folder: Path, call: Call, name: str) -> None:
     assert call("encode", folder / name, "-o", folder / "x.mcz")[0] == 0
-    shown = document(call("diff", folder / name, folder / "x.mcz", "--json"))
+    shown = call("diff", folder / name, folder / "x.mcz", "--json").document
     (clip,) = shown["clips"]
     assert (clip["mse"], clip["mse_raw"], clip["max_position_error"]) == (0, 0, 0)
     assert (clip["mismatched_values"], clip["mismatched_points"]) == (0, 0)
     assert clip["ratios_a"] is None
     assert set(clip["ratios_b"]) == {"cr_source", "cr_float32", "cr_40B"}
-    info = document(call("info", folder / "x.mcz", "--json"))["clips"][0]
+    info = call("info", folder / "x.mcz", "--json").document["clips"][0]
     assert clip["ratios_b"] == {key: info[key] for key in clip["ratios_b"]}
     if name == "walk.c3d":
         assert [key for key in clip if key.startswith("signal.")]
@@ -79,11 +58,11 @@ def test_figures_are_printed_with_their_units(folder: Path, moved: Path, call: C
 
 
 def test_unit_is_for_files_that_say_none(folder: Path, moved: Path, call: Call) -> None:
-    clip = document(call("diff", folder / "walk.bvh", moved, "--json"))["clips"][0]
+    clip = call("diff", folder / "walk.bvh", moved, "--json").document["clips"][0]
     assert clip["max_position_error"] == pytest.approx(5)
     assert clip["max_position_error_cm"] is clip["virtual_marker_max_cm"] is None
     assert any("unit" in note for note in clip["notes"])
-    shown = document(call("diff", moved, folder / "walk.bvh", "--unit", "m", "--json"))
+    shown = call("diff", moved, folder / "walk.bvh", "--unit", "m", "--json").document
     clip = shown["clips"][0]
     assert clip["unit_cm"] == 1  # moved.mcz says cm
     assert clip["max_position_error_cm"] > 100
@@ -92,9 +71,9 @@ def test_unit_is_for_files_that_say_none(folder: Path, moved: Path, call: Call) 
 
 def test_frames(folder: Path, moved: Path, call: Call) -> None:
     bvh = folder / "walk.bvh"
-    clip = document(call("diff", bvh, moved, "--frames", "5:10", "--json"))["clips"][0]
+    clip = call("diff", bvh, moved, "--frames", "5:10", "--json").document["clips"][0]
     assert (clip["frames"], clip["max_position_error_frame"]) == (5, 7)
-    clip = document(call("diff", bvh, moved, "--frames", ":7", "--json"))["clips"][0]
+    clip = call("diff", bvh, moved, "--frames", ":7", "--json").document["clips"][0]
     assert (clip["frames"], clip["max_position_error"]) == (7, pytest.approx(1))
     fails(call("diff", bvh, moved, "--frames", "5:99999"), 2, "99999")
     fails(call("diff", bvh, moved, "--frames", "5"), 2, "A:B")
@@ -108,7 +87,7 @@ def test_other_numbers_of_frames_are_refused(folder: Path, call: Call) -> None:
     files = folder / "walk.bvh", folder / "short.mcz"
     fails(call("diff", *files), 1, "100", f"{motion.n_frames} frames", "--frames")
     fails(call("diff", *files, "--frames", "50:"), 1, "short.mcz 50;", "--frames")
-    clip = document(call("diff", *files, "--frames", "0:100", "--json"))["clips"][0]
+    clip = call("diff", *files, "--frames", "0:100", "--json").document["clips"][0]
     assert (clip["frames"], clip["mse"]) == (100, 0)
 
 
@@ -129,24 +108,24 @@ def test_clips_of_archives(folder: Path, call: Call) -> None:
             (path / f"{name}.bvh").write_bytes(changed)
         assert call("pack", path, f"{path}.mcz")[0] == 0
     files = folder / "one.mcz", folder / "two.mcz"
-    shown = document(call("diff", *files, "--json"))
+    shown = call("diff", *files, "--json").document
     assert [clip["name_a"] for clip in shown["clips"]] == ["b"]
     assert (shown["only_in_a"], shown["only_in_b"]) == (["a"], ["c", "d"])
     code, out, _ = call("diff", *files)
     assert code == 0
     assert f"only in {files[0]}: a" in out
-    shown = document(call("diff", files[1], files[1], "--clip", "d", "--clip", "c", "--json"))
+    shown = call("diff", files[1], files[1], "--clip", "d", "--clip", "c", "--json").document
     assert [clip["name_b"] for clip in shown["clips"]] == ["d", "c"]
     assert "only_in_a" not in shown
-    shown = document(call("diff", folder / "walk.bvh", files[1], "--clip", "c", "--json"))
+    shown = call("diff", folder / "walk.bvh", files[1], "--clip", "c", "--json").document
     assert shown["clips"][0]["mse"] == 0
     fails(call("diff", *files, "--clip", "a"), 2, "two.mcz", "no clip 'a'")
     fails(call("diff", folder / "walk.bvh", files[1]), 2, "two.mcz", "choose one")
-    shown = document(call("diff", folder / "three.mcz", files[1], "--json"))
+    shown = call("diff", folder / "three.mcz", files[1], "--json").document
     assert (shown["only_in_a"], shown["only_in_b"]) == ([], ["c", "d"])
     assert shown["clips"][0]["max_position_error"] == 0
     fails(call("diff", files[0], folder / "four.mcz"), 2, "no clip in common")
-    shown = document(call("diff", folder / "three.mcz", folder / "four.mcz", "--json"))
+    shown = call("diff", folder / "three.mcz", folder / "four.mcz", "--json").document
     assert (shown["clips"][0]["name_b"], "only_in_b" in shown) == ("x", False)
 
 
@@ -155,7 +134,7 @@ def test_the_skeleton_of_an_amc(folder: Path, call: Call) -> None:
     away.mkdir()
     shutil.copy(folder / "walk.amc", away / "walk.amc")
     files = folder / "walk.amc", away / "walk.amc"
-    shown = document(call("diff", *files, "--skeleton", folder / "walk.asf", "--json"))
+    shown = call("diff", *files, "--skeleton", folder / "walk.asf", "--json").document
     assert shown["clips"][0]["max_position_error_cm"] == 0
 
 
@@ -164,7 +143,7 @@ def test_standard_input(
 ) -> None:
     stream = io.TextIOWrapper(io.BytesIO(moved.read_bytes()))
     monkeypatch.setattr("sys.stdin", stream)
-    clip = document(call("diff", folder / "walk.bvh", "-", "--json"))["clips"][0]
+    clip = call("diff", folder / "walk.bvh", "-", "--json").document["clips"][0]
     assert clip["max_position_error"] == pytest.approx(5)
     fails(call("diff", "-", "-"), 2, "standard input")
 
@@ -183,7 +162,7 @@ def test_info_shows_the_record(folder: Path, call: Call, monkeypatch: pytest.Mon
     monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, overlap_codec.CODEC)
     arguments = "-o", folder / "x.mcz", "--codec", "overlap", "--param", "length=20"
     assert call("encode", folder / "walk.amc", *arguments)[0] == 0
-    clip = document(call("info", folder / "x.mcz", "--json"))["clips"][0]
+    clip = call("info", folder / "x.mcz", "--json").document["clips"][0]
     assert clip["quality"]["param.length"] == "20"
     assert float(clip["quality"]["mse"]) < 1e-20
     assert clip["quality_bytes"] > 100
@@ -214,7 +193,7 @@ def test_real_rounding(data: Path, tmp_path: Path, call: Call) -> None:
     motion = mcz.read(data / "cmu/amc/10_03.amc")
     rounded = motion.with_values(np.round(motion.values, 1))
     mcz.write(replace(rounded, source=None), tmp_path / "x.mcz")
-    shown = document(call("diff", data / "cmu/amc/10_03.amc", tmp_path / "x.mcz", "--json"))
+    shown = call("diff", data / "cmu/amc/10_03.amc", tmp_path / "x.mcz", "--json").document
     (clip,) = shown["clips"]
     found = mcz.compare(motion, rounded)
     assert clip["mse"] == found.mse
@@ -242,7 +221,7 @@ def standing(tmp_path: Path) -> tuple[Path, Path]:
 
 def test_the_shell_has_a_radius(folder: Path, moved: Path, call: Call) -> None:
     walk = folder / "walk.bvh"
-    clip = document(call("diff", walk, moved, "--unit", "cm", "--json"))["clips"][0]
+    clip = call("diff", walk, moved, "--unit", "cm", "--json").document["clips"][0]
     assert (clip["shell_radius_cm"], clip["shell_max_frame"]) == (3, 7)
     assert clip["shell_max_cm"] == pytest.approx(5)
     code, out, _ = call("diff", walk, moved, "--unit", "cm", "--shell", "0.5", "--frames", "5:9")
@@ -262,7 +241,7 @@ def test_a_table_by_joint(folder: Path, moved: Path, call: Call) -> None:
     assert code == 0
     assert lines[head - 1] == ""
     assert lines[head + 1].split() == ["Hips", "2", "5", "7", "2", "5", "7"]
-    shown = document(call(*arguments, "--json"))["clips"][0]["by_joint"]
+    shown = call(*arguments, "--json").document["clips"][0]["by_joint"]
     assert [joint["joint"] for joint in shown] == mcz.read(moved).skeleton.addresses()
     assert len(lines) - head - 1 >= len(shown)
     first = shown[0]
@@ -274,8 +253,9 @@ def test_a_table_by_joint(folder: Path, moved: Path, call: Call) -> None:
     assert first["mean_position_error_cm"] == first["mean_position_error"] == pytest.approx(2)
     code, out, _ = call(*arguments[:3], "--by-joint")
     assert "mean units" in out and "shell" not in out
-    document(call("diff", folder / "walk.bvh", folder / "walk.c3d", "--by-joint", "--json"))
-    assert "by_joint" not in document(call(*arguments[:3], "--json"))["clips"][0]
+    both = call("diff", folder / "walk.bvh", folder / "walk.c3d", "--by-joint", "--json")
+    assert both.document["clips"]
+    assert "by_joint" not in call(*arguments[:3], "--json").document["clips"][0]
 
 
 def test_small_distances_by_joint_are_in_mm(standing: tuple[Path, Path], call: Call) -> None:
@@ -292,7 +272,7 @@ def test_feet_that_stand_slide(standing: tuple[Path, Path], call: Call) -> None:
     (slid,) = [line for line in lines if line.startswith("they slide")]
     assert "joint lfoot)" in slid and "mm on average, at most" in slid
     assert "feet: lfoot; z up (guessed), 120 frames a second (assumed)" in lines
-    clip = document(call("diff", *standing, "--contacts", "--json"))["clips"][0]
+    clip = call("diff", *standing, "--contacts", "--json").document["clips"][0]
     (contact,) = clip["contact_list"]
     assert said == f"contacts of feet: 1, {contact['n_frames']} frames"
     assert clip["slide_max_mm"] == pytest.approx((contact["n_frames"] - 1) * 0.1)
@@ -305,7 +285,7 @@ def test_feet_that_stand_slide(standing: tuple[Path, Path], call: Call) -> None:
         "frame_rate": 120.0,
         "rate_assumed": True,
     }
-    cut = document(call("diff", *standing, "--frames", "30:60", "--contacts", "--json"))["clips"][0]
+    cut = call("diff", *standing, "--frames", "30:60", "--contacts", "--json").document["clips"][0]
     assert [(c["first"], c["n_frames"]) for c in cut["contact_list"]] == [(30, 30)]
     assert cut["slide_max_frame"] == 59
     _, out, _ = call("diff", *standing, "--contacts")
@@ -313,9 +293,9 @@ def test_feet_that_stand_slide(standing: tuple[Path, Path], call: Call) -> None:
 
 
 def test_who_stands_how_fast_and_where_up_is(standing: tuple[Path, Path], call: Call) -> None:
-    found = document(call("diff", *standing, "--rate", "30", "--up", "z", "--json"))["clips"][0]
+    found = call("diff", *standing, "--rate", "30", "--up", "z", "--json").document["clips"][0]
     assert (found["feet"]["frame_rate"], found["feet"]["up_guessed"]) == (30, False)
-    found = document(call("diff", *standing, "--feet", "head, lfoot", "--json"))["clips"][0]
+    found = call("diff", *standing, "--feet", "head, lfoot", "--json").document["clips"][0]
     assert found["feet"]["joints"] == ["head", "lfoot"]
     assert found["contacts"] == 2
     fails(call("diff", *standing, "--feet", "hand"), 1, "a.mcz", "no joint 'hand'")
@@ -332,7 +312,7 @@ def test_without_feet_nothing_is_said_unless_asked(tmp_path: Path, call: Call) -
     assert (
         "note: no joint is a foot by its name: no contacts; name the joints of feet (--feet)" in out
     )
-    clip = document(call("diff", *pair, "--contacts", "--json"))["clips"][0]
+    clip = call("diff", *pair, "--contacts", "--json").document["clips"][0]
     assert (clip["feet"], clip["contacts"], clip["contact_list"]) == (None, None, [])
 
 

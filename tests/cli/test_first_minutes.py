@@ -10,7 +10,7 @@ import pytest
 import mcz
 from mcz.codecs.posewave.choices import PRESETS
 from mcz.formats import FORMATS
-from tests.conftest import Call
+from tests.commands import Call
 
 SUFFIXES = sorted({suffix for found in FORMATS.values() for suffix in found.suffixes} | {".mcz"})
 

@@ -14,21 +14,14 @@ import pytest
 
 import mcz
 from mcz import OptionError
+from mcz.cli.common import run
 from mcz.cli.info import command as info_command
 from mcz.cli.main import cli
-from tests.commands import run
-from tests.conftest import Call
+from tests.commands import Call
 
 ROOT = Path(__file__).parents[2]
 SLOPPY = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: %d\n"
 SLOPPY += "Frame Time: 0.01\n1\n2\n3\n"
-
-
-@pytest.fixture
-def folder(samples: Path, tmp_path: Path) -> Path:
-    for path in samples.iterdir():
-        shutil.copy(path, tmp_path)
-    return tmp_path
 
 
 @pytest.fixture

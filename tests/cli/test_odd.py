@@ -19,10 +19,11 @@ import pytest
 
 import mcz
 from mcz import AccessError, ExistsError, Signal
-from mcz.cli.common import Exit, code_of, run
+from mcz.cli.common import Exit, code_of
 from mcz.codecs import by_name
 from mcz.container.writer import Writer
 from mcz.writing.clip_writer import write_clip
+from tests.commands import Call, run
 from tests.motions import smooth
 
 BVH = (
@@ -38,12 +39,6 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "a.bvh").write_text(BVH)
     mcz.encode(tmp_path / "a.bvh", tmp_path / "a.mcz", codec="raw")
     return tmp_path
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = int(run(*arguments))
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def shell(folder: Path, arguments: str, streams: str) -> subprocess.CompletedProcess[str]:
@@ -78,10 +73,8 @@ def test_closed_streams(folder: Path, arguments: str, streams: str, code: int, s
 
 
 @pytest.mark.parametrize("source", ["", ".", "/", "..", "a.mcz/"])
-def test_sources_without_a_name(
-    folder: Path, capsys: pytest.CaptureFixture[str], source: str
-) -> None:
-    code, out, err = call(capsys, "encode", source)
+def test_sources_without_a_name(folder: Path, call: Call, source: str) -> None:
+    code, out, err = call("encode", source)
     assert (code, out) == (1, "")
     assert err.startswith("mcz: ")
     assert err.count("\n") == 1
@@ -102,11 +95,9 @@ def test_sources_without_a_name(
         ("encode", "--param", "segment_frames=nan"),
     ],
 )
-def test_hostile_numbers(
-    folder: Path, capsys: pytest.CaptureFixture[str], arguments: Sequence[str]
-) -> None:
+def test_hostile_numbers(folder: Path, call: Call, arguments: Sequence[str]) -> None:
     path = folder / ("a.bvh" if arguments[0] == "encode" else "a.mcz")
-    code, out, err = call(capsys, arguments[0], path, *arguments[1:], "--force")
+    code, out, err = call(arguments[0], path, *arguments[1:], "--force")
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
 
@@ -161,46 +152,42 @@ def test_pipes_and_devices_are_written_in_place(folder: Path) -> None:
     assert got[1] == (folder / "a.mcz").read_bytes()
 
 
-def test_long_names(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_long_names(folder: Path, call: Call) -> None:
     for name in (f"{244 * 'n'}.bvh", f"{60 * '€'}.bvh"):
-        assert call(capsys, "decode", folder / "a.mcz", "-o", folder / name)[0] == 0
+        assert call("decode", folder / "a.mcz", "-o", folder / name)[0] == 0
         assert (folder / name).read_text() == BVH
-    code, _, err = call(capsys, "decode", folder / "a.mcz", "-o", folder / (300 * "n"))
+    code, _, err = call("decode", folder / "a.mcz", "-o", folder / (300 * "n"))
     assert code == 1
     assert "too long" in err
     assert not list(folder.glob(".*"))
 
 
-def test_a_link_to_nowhere_is_in_the_way(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_link_to_nowhere_is_in_the_way(folder: Path, call: Call) -> None:
     (folder / "link.bvh").symlink_to(folder / "nowhere")
-    code, _, err = call(capsys, "decode", folder / "a.mcz", "-o", folder / "link.bvh")
+    code, _, err = call("decode", folder / "a.mcz", "-o", folder / "link.bvh")
     assert (code, "--force" in err) == (2, True)
 
 
 @pytest.mark.parametrize("name", ["a\0b", "..", "x/.."])
-def test_names_in_files_never_leave_the_folder(
-    folder: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
+def test_names_in_files_never_leave_the_folder(folder: Path, call: Call, name: str) -> None:
     with (folder / "odd.mcz").open("wb") as stream:
         writer = Writer(stream)
         write_clip(writer, replace(smooth(3), name=name), by_name("raw"), {})
         writer.finish()
     (folder / "out").mkdir()
     code, _, err = call(
-        capsys, "decode", folder / "odd.mcz", "--to", "csv", "-o", folder / "out", "--force"
+        "decode", folder / "odd.mcz", "--to", "csv", "-o", folder / "out", "--force"
     )
     assert code == 0, err
     assert len(list((folder / "out").iterdir())) == 1
 
 
-def test_attachment_with_a_zero_in_its_name(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_attachment_with_a_zero_in_its_name(folder: Path, call: Call) -> None:
     with (folder / "odd.mcz").open("wb") as stream:
         writer = Writer(stream)
         writer.attachment("a\0b", b"kept")
         writer.finish()
-    assert call(capsys, "decode", folder / "odd.mcz")[0] == 0
+    assert call("decode", folder / "odd.mcz")[0] == 0
     assert (folder / "a_b").read_bytes() == b"kept"
 
 
@@ -216,20 +203,18 @@ def test_unreadable_is_bad_input_and_existing_is_usage(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("place", [3, -3])
-def test_validate_and_verify_agree(
-    folder: Path, capsys: pytest.CaptureFixture[str], place: int
-) -> None:
+def test_validate_and_verify_agree(folder: Path, call: Call, place: int) -> None:
     """A fault in the signature or in FOOT is a file that is not sound."""
     data = bytearray((folder / "a.mcz").read_bytes())
     data[place] ^= 1
     (folder / "a.mcz").write_bytes(data)
     for arguments in (("verify",), ("info", "--validate")):
-        code, out, err = call(capsys, *arguments, folder / "a.mcz")
+        code, out, err = call(*arguments, folder / "a.mcz")
         assert (code, out) == (3, "")
         assert err.startswith(f"mcz: {folder / 'a.mcz'}: ")
-        code, out, _ = call(capsys, *arguments, folder / "a.mcz", "--json")
+        code, out, _ = call(*arguments, folder / "a.mcz", "--json")
         assert (code, "problems" in out) == (3, True)
-        assert call(capsys, *arguments, folder / "none.mcz")[0] == 1
+        assert call(*arguments, folder / "none.mcz")[0] == 1
 
 
 def still(n_frames: int) -> mcz.Motion:
@@ -245,7 +230,7 @@ def small_limit(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("small_limit")
-def test_more_decoded_bytes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_more_decoded_bytes(folder: Path, call: Call) -> None:
     path = folder / "still.mcz"
     mcz.write(still(1000), path)
     with pytest.raises(mcz.LimitError, match="max_decoded raises it"):
@@ -253,77 +238,75 @@ def test_more_decoded_bytes(folder: Path, capsys: pytest.CaptureFixture[str]) ->
     assert mcz.read(path, max_decoded=2**21).n_frames == 1000
     assert mcz.verify(path, max_decoded=2**21) == []
     for arguments in (("verify",), ("info", "--validate"), ("decode", "--to", "npz")):
-        code, _, err = call(capsys, *arguments, path)
+        code, _, err = call(*arguments, path)
         assert code in (1, 3)
         assert "--max-decoded" in err
-        assert call(capsys, *arguments, path, "--max-decoded", "2M")[0] == 0
+        assert call(*arguments, path, "--max-decoded", "2M")[0] == 0
 
 
 @pytest.mark.usefixtures("small_limit")
-def test_encode_says_what_reading_takes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_encode_says_what_reading_takes(folder: Path, call: Call) -> None:
     path = folder / "still.bvh"
     path.write_text(BVH.split("1.25")[0] + "0\n" * 150_000)
-    code, _, err = call(capsys, "encode", path)
+    code, _, err = call("encode", path)
     assert (code, "--max-decoded 1200000" in err) == (0, True)
-    assert call(capsys, "verify", path.with_suffix(".mcz"))[0] == 3
-    assert call(capsys, "verify", path.with_suffix(".mcz"), "--max-decoded", "1200000")[0] == 0
+    assert call("verify", path.with_suffix(".mcz"))[0] == 3
+    assert call("verify", path.with_suffix(".mcz"), "--max-decoded", "1200000")[0] == 0
 
 
-def test_csv_of_a_motion_with_channels_of_its_own(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_csv_of_a_motion_with_channels_of_its_own(folder: Path, call: Call) -> None:
     channels = (mcz.Channel("", "knee", "deg"), mcz.Channel("", ""))
     signal_ = Signal(np.array([[1.5, 2.5]]), channels=channels)
     skeleton = mcz.Skeleton((mcz.Joint("a", channels=tuple(map(mcz.Channel, ("rx", "ry", "rz")))),))
     mcz.write(mcz.Motion(skeleton, (signal_,)), folder / "own.mcz")
-    code, _, errors = call(capsys, "decode", folder / "own.mcz", "--to", "csv", "--joints", "a")
+    code, _, errors = call("decode", folder / "own.mcz", "--to", "csv", "--joints", "a")
     assert code == 2 and "channels of its own, no joints" in errors
-    assert call(capsys, "decode", folder / "own.mcz", "--to", "csv")[0] == 0
+    assert call("decode", folder / "own.mcz", "--to", "csv")[0] == 0
     rows = list(csv.reader((folder / "motion.csv").read_text().splitlines()))
     assert rows == [["frame", "knee", "channel-1"], ["1", "1.5", "2.5"]]
 
 
-def test_csv_of_no_clip(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_csv_of_no_clip(folder: Path, call: Call) -> None:
     from mcz.sample import write_samples
 
     write_samples(folder)
     mcz.encode(folder / "walk.asf", folder / "walk.mcz")
-    code, out, err = call(capsys, "decode", folder / "walk.mcz", "--to", "csv")
+    code, out, err = call("decode", folder / "walk.mcz", "--to", "csv")
     assert (code, out) == (2, "")
     assert "no clips" in err
 
 
-def test_append_of_a_cut_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_append_of_a_cut_file(folder: Path, call: Call) -> None:
     for name in ("b", "c"):
         (folder / f"{name}.bvh").write_text(BVH.replace("1.25", f"1.{len(name)}"))
     path = folder / "a.mcz"
     mcz.append([folder / "b.bvh"], path)
     cut = path.read_bytes()[:-20]
     path.write_bytes(cut)
-    code, out, err = call(capsys, "append", folder / "c.bvh", path)
+    code, out, err = call("append", folder / "c.bvh", path)
     assert (code, out, " b;" in err) == (1, "", True)
-    assert call(capsys, "append", folder / "c.bvh", path, "--salvage", "--force")[0] == 2
-    code, out, err = call(capsys, "append", folder / "c.bvh", path, "--salvage")
+    assert call("append", folder / "c.bvh", path, "--salvage", "--force")[0] == 2
+    code, out, err = call("append", folder / "c.bvh", path, "--salvage")
     assert (code, "1 salvaged" in out, "b: salvaged" in err) == (4, True, True)
     path.write_bytes(cut)
-    code, out, err = call(capsys, "append", folder / "c.bvh", path, "--force")
+    code, out, err = call("append", folder / "c.bvh", path, "--force")
     assert (code, "1 dropped" in out, "b: dropped" in err) == (0, True, True)
 
 
-def test_unpack_in_part_onto_what_exists(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unpack_in_part_onto_what_exists(folder: Path, call: Call) -> None:
     out = io.BytesIO()
     writer = Writer(out)
     for name in ("a", "a/b"):
         writer.attachment(name, b"x")
     writer.finish()
     (folder / "two.mcz").write_bytes(out.getvalue())
-    assert call(capsys, "unpack", folder / "two.mcz", folder / "out")[0] == 1
-    assert call(capsys, "unpack", folder / "a.mcz", folder)[0] == 2
+    assert call("unpack", folder / "two.mcz", folder / "out")[0] == 1
+    assert call("unpack", folder / "a.mcz", folder)[0] == 2
 
 
 def test_only_opening_tells_what_can_be_read(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)
-    assert call(capsys, "info", folder / "a.mcz")[0] == 0
-    assert call(capsys, "encode", folder / "a.bvh", "--force", "--codec", "raw")[0] == 0
+    assert call("info", folder / "a.mcz")[0] == 0
+    assert call("encode", folder / "a.bvh", "--force", "--codec", "raw")[0] == 0

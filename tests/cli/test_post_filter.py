@@ -12,13 +12,7 @@ import pytest
 
 import mcz
 from mcz import Motion
-from tests.commands import run
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = run(*arguments)
-    captured = capsys.readouterr()
-    return int(code), captured.out, captured.err
+from tests.commands import Call
 
 
 @pytest.fixture
@@ -43,26 +37,26 @@ def decoded(file: Path) -> Motion:
         return next(iter(held.clips.values())).motion()
 
 
-def test_tables(markers: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tables(markers: Path, tmp_path: Path, call: Call) -> None:
     whole = mcz.post_filter(decoded(markers)).signals[0]
     out = tmp_path / "walk.npz"
-    assert call(capsys, "decode", markers, "--post-filter", "--to", "npz", "-o", out)[0] == 0
+    assert call("decode", markers, "--post-filter", "--to", "npz", "-o", out)[0] == 0
     with np.load(out, allow_pickle=False) as table:
         assert np.array_equal(table["values"], whole.values)
         assert np.array_equal(table["mask"], whole.mask)
     arguments = ("--frames", "5:9", "--joints", "1", "--to", "csv", "-o", tmp_path / "w.csv")
-    assert call(capsys, "decode", markers, "--post-filter", *arguments)[0] == 0
+    assert call("decode", markers, "--post-filter", *arguments)[0] == 0
     rows = list(csv.reader(io.StringIO((tmp_path / "w.csv").read_text())))
     found = np.array([[float(cell) for cell in row[2:]] for row in rows[1:]])
     assert np.array_equal(found, whole.values[5:9, 3:6])
 
 
-def test_c3d(markers: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_c3d(markers: Path, tmp_path: Path, call: Call) -> None:
     """Its own file again, in the style of the source, and a plain one."""
     whole = mcz.post_filter(decoded(markers))
     for name, arguments in {"own.c3d": (), "plain.c3d": ("--to", "c3d")}.items():
         out = tmp_path / name
-        code, _, err = call(capsys, "decode", markers, "--post-filter", *arguments, "-o", out)
+        code, _, err = call("decode", markers, "--post-filter", *arguments, "-o", out)
         assert code == 0, err
         again = mcz.read(out).signals[0]
         valid = np.ones(again.values.shape, bool) if again.mask is None else again.mask
@@ -71,48 +65,44 @@ def test_c3d(markers: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert len(mcz.read(tmp_path / "own.c3d").signals) == len(decoded(markers).signals)
 
 
-def test_inverse_kinematics_after_the_filter(
-    places: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inverse_kinematics_after_the_filter(places: Path, tmp_path: Path, call: Call) -> None:
     out = tmp_path / "walk.amc"
     arguments = ("decode", places, "--post-filter", "--to", "amc", "--solve-ik", "-o", out)
-    code, _, err = call(capsys, *arguments)
+    code, _, err = call(*arguments)
     assert code != 0
     assert "frame rate is unknown" in err
-    code, _, err = call(capsys, *arguments, "--rate", "120", "--with-skeleton")
+    code, _, err = call(*arguments, "--rate", "120", "--with-skeleton")
     assert code == 0, err
     assert "inverse kinematics: 31 points" in err
     seen = mcz.positions(mcz.post_filter(decoded(places), rate=120))
     found = mcz.positions(mcz.read(out))
     assert np.abs(found - seen).mean() < np.abs(found - mcz.positions(decoded(places))).mean()
-    code, _, err = call(capsys, "decode", places, "--post-filter", "--rate", "120")
+    code, _, err = call("decode", places, "--post-filter", "--rate", "120")
     assert code != 0
     assert "choose a format with --to" in err
 
 
-def test_what_is_refused(
-    markers: Path, samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, _, err = call(capsys, "decode", markers, "--post-filter", "--preview", "--to", "csv")
+def test_what_is_refused(markers: Path, samples: Path, tmp_path: Path, call: Call) -> None:
+    code, _, err = call("decode", markers, "--post-filter", "--preview", "--to", "csv")
     assert code == 2
     assert "--post-filter" in err
     angles = tmp_path / "angles.mcz"
     mcz.write(mcz.read(samples / "walk.bvh"), angles)
     for arguments in ((), ("--to", "bvh"), ("--to", "csv")):
-        code, _, err = call(capsys, "decode", angles, "--post-filter", *arguments)
+        code, _, err = call("decode", angles, "--post-filter", *arguments)
         assert code not in (0, 2)
         assert "not one of markers alone" in err
         assert len(err.splitlines()) == 1
     unknown = replace(mcz.post_filter(decoded(markers)), frame_rate=None)
     mcz.write(unknown, tmp_path / "unknown.mcz")
     arguments = ("decode", tmp_path / "unknown.mcz", "--to", "csv", "-o", tmp_path / "u.csv")
-    code, _, err = call(capsys, *arguments, "--post-filter")
+    code, _, err = call(*arguments, "--post-filter")
     assert code == 2
     assert "give the rate (--rate)" in err
-    assert call(capsys, *arguments, "--post-filter", "--rate", "120")[0] == 0
-    assert call(capsys, *arguments, "--force", "--rate", "120")[0] == 2
+    assert call(*arguments, "--post-filter", "--rate", "120")[0] == 0
+    assert call(*arguments, "--force", "--rate", "120")[0] == 2
     bare = tmp_path / "bare.mcz"
-    assert call(capsys, "encode", samples / "walk.asf", "-o", bare)[0] == 0
-    code, _, err = call(capsys, "decode", bare, "--post-filter")
+    assert call("encode", samples / "walk.asf", "-o", bare)[0] == 0
+    code, _, err = call("decode", bare, "--post-filter")
     assert code == 2
     assert "no clips" in err

@@ -20,7 +20,7 @@ from mcz.kinematics.marker_motion import NOTE
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from mcz.writing.clip_writer import write_clip
 from mcz.writing.positions import as_domain
-from tests.commands import run
+from tests.commands import Call
 
 
 def write_positions(path: Path, motion: Motion, *, virtual_markers: bool = False) -> Path:
@@ -40,23 +40,17 @@ def walk(samples: Path) -> Motion:
     return replace(motion, signals=(motion.signals[0].cut(0, 30),), source=None)
 
 
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = run(*arguments)
-    captured = capsys.readouterr()
-    return int(code), captured.out, captured.err
-
-
 @pytest.mark.parametrize("virtual_markers", [False, True])
 def test_amc_from_positions(
     walk: Motion,
     samples: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    call: Call,
     virtual_markers: bool,
 ) -> None:
     file = write_positions(tmp_path / "walk.mcz", walk, virtual_markers=virtual_markers)
     arguments = ("decode", file, "--to", "amc", "--solve-ik", "--with-skeleton")
-    code, out, err = call(capsys, *arguments)
+    code, out, err = call(*arguments)
     assert code == 0, err
     assert "inverse kinematics: 31 points" in err
     assert "cm off on average" in err
@@ -67,7 +61,7 @@ def test_amc_from_positions(
     assert np.abs(mcz.positions(again) - mcz.positions(walk)).max() < 1e-3
     if virtual_markers:
         assert np.abs(again.values - walk.values).max() < 0.01
-    code, out, err = call(capsys, *arguments, "--force", "--json")
+    code, out, err = call(*arguments, "--force", "--json")
     fit = json.loads(out)["fit"]
     assert (code, fit["n_points"], fit["n_markers"]) == (0, 31, 93 * virtual_markers)
     assert 0 <= fit["mean_error_cm"] <= fit["max_error_cm"] < 1e-3
@@ -75,34 +69,32 @@ def test_amc_from_positions(
     assert (fit["marker_mean_error"] is not None) == virtual_markers
 
 
-def test_bvh_from_positions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bvh_from_positions(tmp_path: Path, call: Call) -> None:
     walk = bvh_walk()
     walk = replace(walk, signals=(walk.signals[0].cut(0, 30),), source=None)
     file = write_positions(tmp_path / "walk.mcz", walk)
-    code, _, err = call(capsys, "decode", file, "--to", "bvh", "--solve-ik")
+    code, _, err = call("decode", file, "--to", "bvh", "--solve-ik")
     assert (code, " units off" in err) == (0, walk.skeleton.unit_cm is None), err
     again = mcz.read(tmp_path / f"{walk.name}.bvh")
     assert np.abs(mcz.positions(again) - mcz.positions(walk)).max() < 1e-2
-    code, _, err = call(capsys, "decode", file, "--to", "amc", "--solve-ik", "--with-skeleton")
+    code, _, err = call("decode", file, "--to", "amc", "--solve-ik", "--with-skeleton")
     assert code == 0, err
     assert mcz.read(tmp_path / f"{walk.name}.amc").n_frames == walk.n_frames
 
 
-def test_what_the_command_refuses(
-    walk: Motion, samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_the_command_refuses(walk: Motion, samples: Path, tmp_path: Path, call: Call) -> None:
     file = write_positions(tmp_path / "walk.mcz", walk)
-    code, _, err = call(capsys, "decode", file, "--to", "amc")
+    code, _, err = call("decode", file, "--to", "amc")
     assert (code, "holds positions; --solve-ik" in err) == (2, True)
-    code, _, err = call(capsys, "decode", file, "--to", "csv", "--solve-ik")
+    code, _, err = call("decode", file, "--to", "csv", "--solve-ik")
     assert (code, "--solve-ik needs --to amc or --to bvh" in err) == (2, True)
-    assert call(capsys, "encode", samples / "walk.c3d", "-o", tmp_path / "points.mcz")[0] == 0
+    assert call("encode", samples / "walk.c3d", "-o", tmp_path / "points.mcz")[0] == 0
     points = tmp_path / "points.mcz"
-    code, _, err = call(capsys, "decode", points, "--to", "amc", "--solve-ik")
+    code, _, err = call("decode", points, "--to", "amc", "--solve-ik")
     assert (code, "names no skeleton" in err) == (2, True)
     small = tmp_path / "small.mcz"
-    assert call(capsys, "extract", file, small, "--joints", "root,head")[0] == 0
-    code, _, err = call(capsys, "decode", small, "--to", "amc", "--solve-ik")
+    assert call("extract", file, small, "--joints", "root,head")[0] == 0
+    code, _, err = call("decode", small, "--to", "amc", "--solve-ik")
     assert (code, "no positions to fit" in err) == (1, True)
 
 

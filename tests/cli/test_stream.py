@@ -18,6 +18,7 @@ import pytest
 import mcz
 from mcz import live_frames
 from mcz.cli import common, tcp
+from mcz.cli.main import cli
 from mcz.cli.rows import Rows
 
 ROOT = Path(mcz.__file__).parent.parent
@@ -45,7 +46,7 @@ def run(*arguments: str | Path, data: bytes = b"") -> tuple[int, bytes, str]:
     streams = [io.TextIOWrapper(io.BytesIO(part), "utf-8") for part in (data, b"", b"")]
     sys.stdin, sys.stdout, sys.stderr = streams
     try:
-        code = common.run("stream", *map(str, arguments))
+        code = common.run(cli, "mcz", ["stream", *map(str, arguments)])
         for stream in streams[1:]:
             stream.flush()
     finally:
@@ -162,7 +163,7 @@ def test_what_is_printed_can_be_read_again(tmp_path: Path) -> None:
     path.write_bytes(encoded(data=NAMES + b"".join(map(line, rows))))
     plain = list(live_frames(io.BytesIO(path.read_bytes())))
     stored = tmp_path / "a.csv"
-    common.run("decode", path, "--to", "csv", "-o", stored)
+    common.run(cli, "mcz", ["decode", str(path), "--to", "csv", "-o", str(stored)])
     for printed in (
         run("decode", path)[1],
         run("decode", "--states", path)[1],

@@ -9,7 +9,8 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from mcz.cli import tcp
-from mcz.cli.common import Failure, run
+from mcz.cli.common import Failure
+from tests.commands import run
 
 TOKEN = "s3cret-of-the-stage"
 

@@ -15,7 +15,7 @@ import pytest
 
 import mcz
 from mcz.formats import FORMATS
-from tests.conftest import Call
+from tests.commands import Call
 
 SOURCES = Path(__file__).parents[2] / "conformance" / "vectors" / "valid" / "sources"
 CLIPS = [name for name, known in FORMATS.items() if not known.is_skeleton]

@@ -21,7 +21,7 @@ import mcz
 from mcz import AccessError, OptionError
 from mcz.viewing import browser, showing
 from mcz.viewing.visitors import Visitors
-from tests.conftest import Call
+from tests.commands import Call
 
 
 @pytest.fixture(autouse=True)

@@ -447,7 +447,7 @@ def test_a_clip_is_coded_anew(server: Server) -> None:
 def test_diff_is_that_of_the_command(
     server: Server, folder: Path, samples: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from mcz.cli.common import run
+    from tests.commands import run
 
     words = ["diff", str(folder / "walk.mcz"), str(folder / "walk.mcz"), "--by-joint", "--json"]
     assert run(*words, "--unit", "cm") == 0
