@@ -2,8 +2,8 @@
 
     python tools/registry.py [--check]
 
-SPEC.md is normative, and docs/measures.md of metrics; the file is for programs that would rather
-not parse them.
+SPEC.md is normative; pages of the manual define metrics and keys of quality records. The file is
+for programs that would rather not parse them.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "SPEC.md"
 MEASURES = (ROOT / "docs/measures.md", ROOT / "docs/contacts.md")
+PARTS = ROOT / "docs/parts.md"
 REGISTRY = ROOT / "conformance" / "annex" / "registry.json"
 Rows = list[list[str]]
 
@@ -38,6 +39,7 @@ def registry(text: str) -> dict[str, Any]:
     version = re.search(r"^Version (\d+\.\d+)", text, re.M)
     assert version is not None
     limits = rows_after(text, "## Limits and profiles\n")
+    parts = PARTS.read_text("utf-8")
     return {
         "format_version": version[1],
         "identification": _keyed(
@@ -64,10 +66,8 @@ def registry(text: str) -> dict[str, Any]:
         "metadata_keys": _keyed(
             rows_after(text, "**Metadata keys**"), "key", "value", "type", "dublin_core", "others"
         ),
-        "cut_keys": _keyed(
-            rows_after(text, "- A quality record says what was cut"), "key", "value"
-        ),
-        "edit_keys": _keyed(rows_after(text, "## Replacing a joint\n"), "key", "value"),
+        "cut_keys": _keyed(rows_after(parts, "## Keys of cuts\n"), "key", "value"),
+        "edit_keys": _keyed(rows_after(parts, "## Keys of replaced joints\n"), "key", "value"),
         "metrics": [
             {"id": name, "unit": unit, "meaning": meaning}
             for page, heading in zip(MEASURES, ("## Metrics\n", "# Contacts\n"), strict=True)

@@ -1,4 +1,4 @@
-"""What the quality record of a clip says after a cut. SPEC.md, "Cutting without re-encoding"."""
+"""The quality record of a clip after a cut: docs/parts.md, "Keys of cuts"."""
 
 from __future__ import annotations
 
