@@ -97,7 +97,7 @@ def parse_heads(data: bytes, where: str = "model") -> tuple[tuple[Head, ...], in
     """What a model of kind 1 says of its bases, and where their entries begin."""
     n_bases, at = read_varint(data, 0)
     if not 1 <= n_bases <= MAX_BASES:  # BASES-02
-        raise FormatError(f"{where}: {n_bases} bases, not 1 to {MAX_BASES}")
+        raise FormatError(f"{n_bases} bases, not 1 to {MAX_BASES}", where=where)
     heads: list[Head] = []
     size = 0
     for _ in range(n_bases):
@@ -106,11 +106,11 @@ def parse_heads(data: bytes, where: str = "model") -> tuple[tuple[Head, ...], in
         size += n_points * n_vectors
         # BASES-03, BASES-04, BASES-06
         if not 1 <= n_vectors <= n_points <= MAX_POINTS or size > MAX_ENTRIES:
-            raise FormatError(f"{where}: a basis of {n_vectors} vectors of {n_points} entries")
+            raise FormatError(f"a basis of {n_vectors} vectors of {n_points} entries", where=where)
         digits = np.frombuffer(data[at : at + n_vectors], "u1").astype(np.int64)
         at += n_vectors
         if len(digits) < n_vectors or digits.max() > MAX_SHIFT:  # BASES-04, BASES-05
-            raise FormatError(f"{where}: the shifts of a basis end, or one exceeds {MAX_SHIFT}")
+            raise FormatError(f"the shifts of a basis end, or one exceeds {MAX_SHIFT}", where=where)
         heads.append(Head(digits, n_points))
     return tuple(heads), at
 

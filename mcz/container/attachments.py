@@ -25,11 +25,13 @@ def joined_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> by
         expected = (row.name, number, len(row.parts), row.size)
         # ATTA-01, ATTA-02
         if (fields.name, fields.part, fields.n_parts, fields.size) != expected:
-            raise FormatError(f"chunk {chunk.label}: not part {number} of {row.name!r}")
+            raise FormatError(f"not part {number} of {row.name!r}", where=f"chunk {chunk.label}")
         if digest not in (b"", fields.sha256):  # ATTA-02
-            raise FormatError(f"chunk {chunk.label}: another hash than in the part before")
+            raise FormatError("another hash than in the part before", where=f"chunk {chunk.label}")
         if fields.part_size > left:  # ATTA-03
-            raise FormatError(f"chunk {chunk.label}: more than the {row.size} bytes of the file")
+            raise FormatError(
+                f"more than the {row.size} bytes of the file", where=f"chunk {chunk.label}"
+            )
         parts.append(decoded(fields.data, fields.encoding, fields.part_size, chunk.label))
         left, digest = left - fields.part_size, fields.sha256  # ATTA-03
     data = b"".join(parts)

@@ -60,9 +60,9 @@ def signal_rows(clip: Any, where: str) -> tuple[SignalRow, ...]:
 def _signal_row(signal: Any, clip: Any, where: str) -> SignalRow:
     cut = signal.skip, signal.spare
     if clip.flags & payloads.OPEN_CLIP and any(cut):  # CLIP-19
-        raise FormatError(f"{where}: n_frames is open, but a signal has skip and spare {cut}")
+        raise FormatError(f"n_frames is open, but a signal has skip and spare {cut}", where=where)
     if sum(cut) + clip.n_frames > MAX_COUNT:  # CLIP-20
-        raise FormatError(f"{where}: skip and spare {cut} of {clip.n_frames} frames")
+        raise FormatError(f"skip and spare {cut} of {clip.n_frames} frames", where=where)
     n_channels = sum(run.n_channels for run in signal.grids)
     codec = signal.codec, signal.codec_version
     return SignalRow(n_channels, signal.samples_per_frame, *codec, *cut)

@@ -148,6 +148,6 @@ def records_in(
 def _check_keys(keys: Sequence[str], where: str) -> None:
     for key in keys:
         if key in INTERPRETED:  # META-03
-            raise FormatError(f"{where}: {key!r} is not to be said behind a clip")
+            raise FormatError(f"{key!r} is not to be said behind a clip", where=where)
     if len(keys) != len(set(keys)):  # META-04
-        raise FormatError(f"{where}: a key occurs twice in one record: {sorted(keys)}")
+        raise FormatError(f"a key occurs twice in one record: {sorted(keys)}", where=where)

@@ -64,5 +64,5 @@ def _flags_at(payload: bytes, where: str) -> int:
     try:
         length, at = read_varint(payload, 0)
     except FormatError as error:
-        raise FormatError(f"{where}: name: {error}") from None
+        raise FormatError(f"name: {error}", where=where) from None
     return at + length

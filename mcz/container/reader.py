@@ -220,7 +220,7 @@ class Container:
         if chunk is None:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
         if payload_id(payload := self.payload(chunk)) != id_:
-            raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
+            raise ChecksumError(f"its id is not {id_.hex()}", where=f"chunk {chunk.label}")
         return payload, chunk.label
 
     def skeleton(self, id_: bytes) -> Skeleton:

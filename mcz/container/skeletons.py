@@ -86,7 +86,7 @@ def parse_skeleton(fields: payloads.Skel, profile: Profile, where: str) -> Skele
             base=fields.base,
         )
     except MotionError as error:
-        raise FormatError(f"{where}: {error}") from None
+        raise FormatError(str(error), where=where) from None
 
 
 def _parse_joint(row: payloads.Joint, where: str) -> Joint:

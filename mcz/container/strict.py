@@ -28,7 +28,7 @@ def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
     """The ``size`` bytes that SRCE and ATTA hold as ``data``."""
     if encoding == payloads.STORED:
         if len(data) != size:  # ATTA-03, SRCE-01
-            raise FormatError(f"{where}: {len(data)} bytes stored, {size} stated")
+            raise FormatError(f"{len(data)} bytes stored, {size} stated", where=where)
         return bytes(data)
     after = words() if encoding == payloads.AFTER_WORDS else b""
     return inflate(data, size, where, words=after)
@@ -44,7 +44,7 @@ def is_plain_path(name: str) -> bool:
 
 def check_path(name: str, where: str) -> None:
     if not is_plain_path(name):
-        raise FormatError(f"{where}: path {name!r} is not relative and plain")
+        raise FormatError(f"path {name!r} is not relative and plain", where=where)
 
 
 def check_skeleton(
@@ -79,9 +79,13 @@ def _check_source(
     id_ = bytes(source.template)
     _refer(directory, b"SRCE", id_, where)  # GRAM-03
     if templates.get(id_, source.format) != source.format:  # CLIP-03, SKEL-04
-        raise FormatError(f"{where}: source format {source.format}, its SRCE has {templates[id_]}")
+        raise FormatError(
+            f"source format {source.format}, its SRCE has {templates[id_]}", where=where
+        )
     if source.format in others:  # CLIP-04, SKEL-03
-        raise FormatError(f"{where}: source format {source.format} is of the other sort of source")
+        raise FormatError(
+            f"source format {source.format} is of the other sort of source", where=where
+        )
 
 
 def check_clip(
@@ -95,13 +99,15 @@ def check_clip(
             check_path(fields.source.path, where)
     keys = [pair.key for pair in fields.metadata]
     if len(keys) != len(set(keys)):  # CLIP-02, CLIP-21
-        raise FormatError(f"{where}: a key of the metadata occurs twice: {sorted(keys)}")
+        raise FormatError(f"a key of the metadata occurs twice: {sorted(keys)}", where=where)
     return bool(fields.source)
 
 
 def _refer(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
     if (kind, bytes(id_)) not in directory.shared:
-        raise FormatError(f"{where}: no {kind.decode()} before it has the id {bytes(id_).hex()}")
+        raise FormatError(
+            f"no {kind.decode()} before it has the id {bytes(id_).hex()}", where=where
+        )
 
 
 def check_target(fields: Any, where: str, sourced: Collection[tuple[int, bytes]]) -> None:
@@ -114,18 +120,19 @@ def check_index(payload: bytes, chunk: Chunk, directory: Directory, limit: int) 
     """Compare INDX with what the walk has found."""
     listed = parse_index(payload, limit)
     if listed.head != directory.head:
-        raise FormatError(f"chunk {chunk.label}: its copy of HEAD differs from HEAD")
+        raise FormatError("its copy of HEAD differs from HEAD", where=f"chunk {chunk.label}")
     for what in ("shared", "attachments", "aliases", "clips"):
         ours, theirs = getattr(directory, what), getattr(listed, what)
         if list(ours) != list(theirs):  # INDX-04, INDX-05
             raise FormatError(
-                f"chunk {chunk.label}: it lists other {what} than there are, or in another order"
+                f"it lists other {what} than there are, or in another order",
+                where=f"chunk {chunk.label}",
             )
         for key, row in ours.items():
             if row != theirs[key]:  # INDX-05
                 raise FormatError(
-                    f"chunk {chunk.label}: {_name(key)} is {_short(row)}, "
-                    f"but INDX says {_short(theirs[key])}"
+                    f"{_name(key)} is {_short(row)}, but INDX says {_short(theirs[key])}",
+                    where=f"chunk {chunk.label}",
                 )
 
 

@@ -71,7 +71,7 @@ class Carrier:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
         payload = self.container.payload(chunk)
         if payload_id(payload) != id_:
-            raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
+            raise ChecksumError(f"its id is not {id_.hex()}", where=f"chunk {chunk.label}")
         return payload
 
     def shared(self, kind: bytes, id_: bytes) -> None:

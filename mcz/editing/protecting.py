@@ -93,7 +93,7 @@ def protections(container: Container) -> list[Key]:
     for chunk in recovery_chunks(container):
         packet = read_packet(container.source, chunk.payload_offset)
         if packet is None:
-            raise FormatError(f"chunk {chunk.label}: its first packet is damaged")
+            raise FormatError("its first packet is damaged", where=f"chunk {chunk.label}")
         found.append(packet[0])
     return found
 

@@ -191,17 +191,17 @@ class _Model:
                 }[version]
                 shape, by_columns, dtype = read(member)
             except (ValueError, KeyError, SyntaxError) as error:
-                raise SourceError(f"{where}: no NPY array: {error}") from None
+                raise SourceError(f"no NPY array: {error}", where=where) from None
             if dtype.hasobject:
-                raise SourceError(f"{where}: {NOT_DENSE}")
+                raise SourceError(NOT_DENSE, where=where)
             if dtype.kind not in "fiu":
-                raise SourceError(f"{where}: of type {dtype}, not numbers")
+                raise SourceError(f"of type {dtype}, not numbers", where=where)
             size = int(np.prod(shape, dtype=object)) * dtype.itemsize
             if size > min(MOST_BYTES, info.file_size):
-                raise SourceError(f"{where}: {size} bytes of shape {shape} are not there")
+                raise SourceError(f"{size} bytes of shape {shape} are not there", where=where)
             data = member.read(size)
         if len(data) != size:
-            raise SourceError(f"{where}: {len(data)} of {size} bytes")
+            raise SourceError(f"{len(data)} of {size} bytes", where=where)
         return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
 
     def parents(self) -> list[int]:

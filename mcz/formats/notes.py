@@ -119,7 +119,9 @@ def checked_runs(runs: Sequence[Any], n_rows: int, where: str) -> list[tuple[int
     for run in runs:
         # AMC-01, AMC-02
         if run.n_rows < 1 or run.n_rows > n_rows - row or run.pattern >= MAX_PATTERNS:
-            raise FormatError(f"{where}: pattern {run.pattern} for {run.n_rows} rows from {row} on")
+            raise FormatError(
+                f"pattern {run.pattern} for {run.n_rows} rows from {row} on", where=where
+            )
         found.append((row, row + run.n_rows, run.pattern))
         row += run.n_rows
     return found
@@ -130,12 +132,12 @@ def checked_texts(texts: Sequence[Any], n_rows: int, where: str) -> list[tuple[i
     rows = _rows([entry.row for entry in texts], n_rows, where)
     wrong = [entry.text for entry in texts if not FRAME_NUMBER_TEXT.fullmatch(entry.text)]
     if wrong:  # AMC-05
-        raise FormatError(f"{where}: {wrong[0][:40]!r} is not a frame number")
+        raise FormatError(f"{wrong[0][:40]!r} is not a frame number", where=where)
     return [(row, entry.text) for row, entry in zip(rows, texts, strict=True)]
 
 
 def _rows(distances: Sequence[int], n_rows: int, where: str) -> list[int]:
     """The rows from their distances, checked: each later than the one before, and below n_rows."""
     if 0 in distances[1:] or (distances and sum(distances) >= n_rows):  # AMC-04
-        raise FormatError(f"{where}: rows {distances[:8]} of {n_rows}")
+        raise FormatError(f"rows {distances[:8]} of {n_rows}", where=where)
     return list(accumulate(distances))

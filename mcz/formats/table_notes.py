@@ -132,7 +132,7 @@ def join_table_notes(parts: Sequence[tuple[int, int, bytes]]) -> TableNotes:
             mine = found[number]
             if mine.n_each != fields.rows_per_frame:  # TABLE-09
                 raise FormatError(
-                    f"{where}: {fields.rows_per_frame} rows a frame, once {mine.n_each}"
+                    f"{fields.rows_per_frame} rows a frame, once {mine.n_each}", where=where
                 )
             first, n_rows = start * mine.n_each, (stop - start) * mine.n_each
             runs = checked_runs(fields.patterns, n_rows, where)

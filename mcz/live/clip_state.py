@@ -59,7 +59,7 @@ def needs(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
 def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
     """A clip of which nothing but its CLIP is known; raises FormatError."""
     if not fields.name or not fields.signals:
-        raise FormatError(f"chunk {chunk.label}: a clip without a name or a signal")
+        raise FormatError("a clip without a name or a signal", where=f"chunk {chunk.label}")
     rate = fields.rate_numerator, fields.rate_denominator
     rows = signal_rows(fields, chunk.label)
     return ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, rows, chunk)
@@ -122,15 +122,16 @@ class ClipState:
         where = f"{self._where}, frame {header.first}"
         if header.n_frames != 1 or header.flags & ~(FRESH | MASKS):
             raise UnsupportedError(
-                f"{self._where}: a segment of {header.n_frames} frames, flags {header.flags}, "
-                "cannot be followed; read the whole file"
+                f"a segment of {header.n_frames} frames, flags {header.flags}, "
+                "cannot be followed; read the whole file",
+                where=self._where,
             )
         try:
             table = parse_table(payload, self.info.counts)
         except TruncatedError as error:
-            raise FormatError(f"{where}: {error}") from None
+            raise FormatError(str(error), where=where) from None
         if table.payload_size != len(payload):
-            raise FormatError(f"{where}: {len(payload)} bytes of streams")
+            raise FormatError(f"{len(payload)} bytes of streams", where=where)
         streams = [
             payload[at : at + size] for at, size in zip(table.offsets, table.lengths, strict=True)
         ]
@@ -148,6 +149,8 @@ class ClipState:
         """Compare the hash of all frames with that of CEND; raises ChecksumError."""
         hashes = fields.value_sha256
         if len(hashes) != self.n_signals:
-            raise FormatError(f"{self._where}: {len(hashes)} hashes of {self.n_signals} signals")
+            raise FormatError(
+                f"{len(hashes)} hashes of {self.n_signals} signals", where=self._where
+            )
         if self._digest.digest() != hashes[0]:
-            raise ChecksumError(f"{self._where}: its frames are not those it was closed with")
+            raise ChecksumError("its frames are not those it was closed with", where=self._where)

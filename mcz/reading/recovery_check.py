@@ -35,16 +35,20 @@ def recovery_problems(container: Container) -> Iterator[tuple[str, list[Problem]
 def _checked(source: ByteSource, chunk: Chunk) -> str:
     first = read_packet(source, chunk.payload_offset)
     if first is None:
-        raise FormatError(f"chunk {chunk.label}: its first packet is damaged")
+        raise FormatError("its first packet is damaged", where=f"chunk {chunk.label}")
     shape = first[0].shape
     sizes = shape.chunk_offset, shape.payload_size
     if sizes != (chunk.offset, chunk.length) or shape.stop > source.size:
-        raise FormatError(f"chunk {chunk.label}: it is about {shape}, not what is around it")
+        raise FormatError(
+            f"it is about {shape}, not what is around it", where=f"chunk {chunk.label}"
+        )
     _, packets = made(shape, lambda block: stored_block(source, shape, block))
     at = chunk.payload_offset
     for packet in packets:
         if source.read(at, len(packet)) != packet:
-            raise FormatError(f"chunk {chunk.label}: the packet at {at} is not that of its bytes")
+            raise FormatError(
+                f"the packet at {at} is not that of its bytes", where=f"chunk {chunk.label}"
+            )
         at += len(packet)
     return f"bytes {shape.start} to {shape.stop}"
 

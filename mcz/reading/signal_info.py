@@ -153,15 +153,15 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
         if row.packet in SHORT:
             frame_table(row.header, info.counts, row.size)  # refuses what cannot be such a packet
         if row.header.flags & FRAME_NOTES and not noted:  # NOTES-01
-            raise FormatError(f"{where}: frame notes, but no source that they belong to")
+            raise FormatError("frame notes, but no source that they belong to", where=where)
         if not (row.header.first or row.header.flags & FRESH):  # DATA-12
-            raise FormatError(f"{where}: the first segment needs one before it")
+            raise FormatError("the first segment needs one before it", where=where)
         check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
         if row.header.first != due and not container.salvage:
-            raise FormatError(f"{where}: a segment begins at {row.header.first}, {due} is due")
+            raise FormatError(f"a segment begins at {row.header.first}, {due} is due", where=where)
         due = row.header.stop
     if due != info.layout.n_frames and not container.salvage:
-        raise FormatError(f"{where}: segments end at frame {due} of {info.layout.n_frames}")
+        raise FormatError(f"segments end at frame {due} of {info.layout.n_frames}", where=where)
 
 
 def parse_groups(
@@ -172,14 +172,14 @@ def parse_groups(
         return (tuple(range(n_channels)),) if n_channels else ()
     if fields.kind == payloads.GROUP_JOINT:
         if skeleton is None:
-            raise FormatError(f"{where}: groups per joint, but the channels have no joints")
+            raise FormatError("groups per joint, but the channels have no joints", where=where)
         sizes = [len(joint.channels) for joint in skeleton.joints]
     elif fields.kind == payloads.GROUP_CHANNEL:
         sizes = [1] * n_channels  # CLIP-08
     else:
         sizes = list(fields.sizes)
         if 0 in sizes or sum(sizes) != n_channels:  # CLIP-10, CLIP-11
-            raise FormatError(f"{where}: groups of {sizes} channels do not make {n_channels}")
+            raise FormatError(f"groups of {sizes} channels do not make {n_channels}", where=where)
     groups, at = [], 0
     for size in sizes:
         if size:  # CLIP-08
@@ -192,10 +192,10 @@ def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
     grids: list[Grid] = []
     for run in runs:
         if not 1 <= run.n_channels <= n_channels - len(grids):  # CLIP-06, CLIP-07
-            raise FormatError(f"{where}: grids for more than its {n_channels} channels")
+            raise FormatError(f"grids for more than its {n_channels} channels", where=where)
         grids += [run.grid] * run.n_channels
     if len(grids) != n_channels:  # CLIP-07
-        raise FormatError(f"{where}: grids for {len(grids)} of {n_channels} channels")
+        raise FormatError(f"grids for {len(grids)} of {n_channels} channels", where=where)
     return tuple(grids)
 
 

@@ -131,11 +131,11 @@ def _file_of(skeleton: Skeleton) -> str:
     return _text(Path(skeleton.source.path).name) if skeleton.source is not None else ""
 
 
-def check_own(where: str, skeleton: Skeleton, label: str, counts: Counts) -> None:
+def check_own(path: str, skeleton: Skeleton, label: str, counts: Counts) -> None:
     """Raise SourceError where ``skeleton`` has none of the bones but the root."""
     match = matched(skeleton, counts)
     if match.is_foreign:
-        raise SourceError(f"{where}: {label} has none of its bones: {_listed(match.lacking)}")
+        raise SourceError(f"{label} has none of its bones: {_listed(match.lacking)}", path=path)
 
 
 @dataclass(frozen=True, slots=True)

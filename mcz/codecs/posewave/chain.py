@@ -84,7 +84,7 @@ class Chain:
 
     def _so_far(self, where: str) -> tuple[Walk, RowCoder]:
         if self._walk is None or self._rows is None:  # DATA-11
-            raise FormatError(f"{where}: goes on from a segment that is not there")
+            raise FormatError("goes on from a segment that is not there", where=where)
         return self._walk, self._rows
 
     def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[Walk, RowCoder]:

@@ -173,7 +173,7 @@ def decode_contacts(
         fault = corrections.code(coder, point, *nothing)
         if fault >= 0:
             raise FormatError(
-                f"{where}: a contact of point {point} at or after frame {fault} is out of range"
+                f"a contact of point {point} at or after frame {fault} is out of range", where=where
             )
     coder.close()
     if not stream.is_whole:  # HOLD-07

@@ -110,11 +110,11 @@ def decode_exact(
     def rows(index: int, group: int) -> Ints:
         for resolution in range(1, layout.n_resolutions - request.resolution):
             if stream(index, resolution, group):  # PWAVE-35
-                raise FormatError(f"{where}: a detail of the exact group {group}")
+                raise FormatError(f"a detail of the exact group {group}", where=where)
         grids = [layout.grids[channel] for channel in layout.groups[group]]
         data = stream(index, 0, group)
         if any(kind == COPY for kind, _, _ in read_heads(data, grids)[0]):  # PWAVE-37
-            raise FormatError(f"{where}: a copy in the exact group {group}")
+            raise FormatError(f"a copy in the exact group {group}", where=where)
         return parse_stream(data, grids, spans[index].n_frames)[0]  # PWAVE-36
 
     return gather(layout, spans, request, rows)

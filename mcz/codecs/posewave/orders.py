@@ -79,7 +79,7 @@ def check_orders(codes: Sequence[int], skeleton: Skeleton, where: str) -> None:
     """Raises FormatError for a joint that cannot have an order."""
     for index, (code, joint) in enumerate(zip(codes, skeleton.joints, strict=False)):
         if code != KEPT and own_sequence(joint, skeleton) is None:  # PWAVE-23
-            raise FormatError(f"{where}: order {code} of joint {index}, whose axes have none")
+            raise FormatError(f"order {code} of joint {index}, whose axes have none", where=where)
 
 
 class Orders:
@@ -165,11 +165,11 @@ def _read_notes(stream: bytes, notes: Ints, where: str) -> bytes:
         gap, at = read_varint(stream, at)
         number += 1 + gap
         if number >= len(flat):  # PWAVE-25
-            raise FormatError(f"{where}: a note {number} of {len(flat)}")
+            raise FormatError(f"a note {number} of {len(flat)}", where=where)
         flat[number] = 1
         if number % N_NOTES:
             turns, at = read_varint(stream, at)
             if not 0 < turns < MAX_TURNS:  # PWAVE-26
-                raise FormatError(f"{where}: {turns} for turns")
+                raise FormatError(f"{turns} for turns", where=where)
             flat[number] = (turns >> 1) ^ -(turns & 1)  # PWAVE-24
     return stream[at:]

@@ -80,7 +80,7 @@ def fresh_coder(start: Start) -> Ints:
 def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: str) -> None:
     """Code which channels are ``kept`` and the ``numbers`` of all, in place."""
     if _head().code_head(stream.coder, stream.data, N_SMALL, classes, kept, numbers):
-        raise FormatError(f"{where}: a first value of more than 40 bits")
+        raise FormatError("a first value of more than 40 bits", where=where)
 
 
 class RowCoder:
@@ -146,12 +146,13 @@ class RowCoder:
         """All rows of the level, (n_rows, n_kept), in steps; ``ends``: the stream does, too."""
         if not self.n_kept:
             if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
-                raise FormatError(f"{self.where}: bytes of rows, but no channel is kept")
+                raise FormatError("bytes of rows, but no channel is kept", where=self.where)
             return self._decoded(self._n_known, len(self._indices))
         self._run(self._n_known, len(self._indices), -1.0)
         if ends and not self.stream.is_whole:  # ROWS-01
             raise FormatError(
-                f"{self.where}: rows of kind {self.kind} do not take {len(self.stream.data)} bytes"
+                f"rows of kind {self.kind} do not take {len(self.stream.data)} bytes",
+                where=self.where,
             )
         return self._decoded(self._n_known, len(self._indices))
 
@@ -175,7 +176,7 @@ class RowCoder:
         )
         if fault >= 0:
             raise FormatError(
-                f"{self.where}: row {fault} of level of kind {self.kind} is out of range"
+                f"row {fault} of level of kind {self.kind} is out of range", where=self.where
             )
 
     def _decoded(self, first: int, stop: int) -> Floats:

@@ -140,7 +140,7 @@ def decode_segment(
     pyramid = Pyramid(n_frames, header.levels, header.borrowing)
     n_empty = header.levels - pyramid.n_details
     if any(streams[1 : 1 + n_empty]):  # PWAVE-17
-        raise FormatError(f"{where}: a stream of a level that {n_frames} frames have not")
+        raise FormatError(f"a stream of a level that {n_frames} frames have not", where=where)
     orders = Orders(header.orders, skeleton)
     notes, coarsest = orders.take_notes(streams[0], n_frames, where)
     streams = [coarsest, *streams[1 + n_empty :]]

@@ -131,4 +131,6 @@ def parse_vectors(
         raise FormatError(f"{where} has no code, or is out of range")
     # BITS-02, BITS-03
     if whole and (-(-used // 8) != len(data) or (used % 8 and data[-1] << used % 8 & 255)):
-        raise FormatError(f"{where}: {len(data)} bytes for {used} bits, or bits behind the last")
+        raise FormatError(
+            f"{len(data)} bytes for {used} bits, or bits behind the last", where=where
+        )

@@ -89,8 +89,8 @@ def windows_of(stream: bytes, n_windows: int, where: str) -> Iterator[bytes]:
     for _ in range(n_windows):
         size, at = read_varint(stream, at)
         if size > len(stream) - at:  # WIND-07
-            raise FormatError(f"{where}: a window of {size} bytes at {at} of {len(stream)}")
+            raise FormatError(f"a window of {size} bytes at {at} of {len(stream)}", where=where)
         yield stream[at : at + size]
         at += size
     if at != len(stream):  # WIND-07
-        raise FormatError(f"{where}: {len(stream) - at} bytes after the last window")
+        raise FormatError(f"{len(stream) - at} bytes after the last window", where=where)
