@@ -26,7 +26,7 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
         except (TypeError, ValueError, OverflowError):
             raise OptionError(f"{name} is {text!r}, not an integer") from None
         if not low <= value <= high:
-            raise OptionError(f"{name} is {value}, not from {low} to {high}")
+            raise OptionError(f"{name} is {value}, not from {low} to {high}", value=value)
         return value
 
     return in_range(f"{low:,} to {high:,}", parse)
@@ -43,7 +43,7 @@ def number(name: str, low: float, high: float) -> Callable[[Any], float]:
         except (TypeError, ValueError, OverflowError):
             raise OptionError(f"{name} is {text!r}, not a number") from None
         if not low <= value <= high:
-            raise OptionError(f"{name} is {value}, not from {low:g} to {high:g}")
+            raise OptionError(f"{name} is {value}, not from {low:g} to {high:g}", value=value)
         return value
 
     return in_range(f"{low:g} to {high:g}", parse)

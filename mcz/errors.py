@@ -76,14 +76,14 @@ class MczError(Exception):
     hint: Hint | None = None
     _shows_offset: ClassVar[bool] = True
 
-    def __init__(self, *message: str, **fields: Unpack[Fields]) -> None:
-        super().__init__(*message)
+    def __init__(self, message: str = "", **fields: Unpack[Fields]) -> None:
+        super().__init__(message)
         self.add(**fields)
 
     @property
     def message(self) -> str:
         """The text without the other fields."""
-        return str(self.args[-1]) if self.args else ""
+        return str(self.args[0])
 
     @property
     def fields(self) -> Fields:
@@ -183,9 +183,9 @@ class TruncatedError(FormatError):
     """
 
     def __init__(
-        self, *message: str, last_foot: int | None = None, **fields: Unpack[Fields]
+        self, message: str = "", *, last_foot: int | None = None, **fields: Unpack[Fields]
     ) -> None:
-        super().__init__(*message, **fields)
+        super().__init__(message, **fields)
         self.last_foot = last_foot
 
 

@@ -36,7 +36,12 @@ def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
     bad = np.flatnonzero(tokens.bad())
     if len(bad):
         at, token = int(tokens.start[bad[0]]), tokens.token(int(bad[0]))
-        raise SourceError(f"{token[:40]!r} is not a number", line=line_of(data, at))
+        text = token[:40]
+        raise SourceError(
+            f"{text!r} is not a number",
+            line=line_of(data, at),
+            value=text.decode("latin-1"),
+        )
     values = np.zeros(shape)
     values.ravel()[chosen] = tokens.values()
     if not dense:
