@@ -158,7 +158,7 @@ def _wrapped(links: list[str]) -> str:
     """The links as a paragraph; none is broken over two lines."""
     lines = [""]
     for link in links:
-        if lines[-1] and len(lines[-1]) + len(link) > 106:
+        if lines[-1] and len(lines[-1]) + len(link) > 105:
             lines.append("")
         lines[-1] += f"{' · ' if lines[-1] else ''}{link}"
     return " ·\n".join(lines)
