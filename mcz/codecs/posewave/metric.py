@@ -6,7 +6,7 @@ SPEC.md, "Pose metric", is normative.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,14 @@ ALONE = np.zeros(1, np.int64)
 
 
 @cache
-def kernels() -> Any:
+def kernels() -> ModuleType:
     from mcz.codecs.posewave import metric_kernels
 
     return metric_kernels
 
 
 @cache
-def apply_kernels() -> Any:
+def apply_kernels() -> ModuleType:
     from mcz.codecs.posewave import apply_kernels as found
 
     return found

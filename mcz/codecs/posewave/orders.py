@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ class Place(NamedTuple):
 
 
 @cache
-def kernels() -> Any:
+def kernels() -> ModuleType:
     from mcz.codecs.posewave import order_kernels
 
     return order_kernels

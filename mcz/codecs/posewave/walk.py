@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy, deepcopy
 from functools import cache
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
 
 
 @cache
-def kernels() -> Any:
+def kernels() -> ModuleType:
     from mcz.codecs.posewave import course_kernels
 
     return course_kernels
