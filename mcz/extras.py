@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from types import ModuleType
 
 from mcz.errors import OptionError
 
 
-def import_extra(name: str, extra: str, *, package: str = "", purpose: str = "") -> Any:
+def import_extra(name: str, extra: str, *, package: str = "", purpose: str = "") -> ModuleType:
     """The module ``name``; raises OptionError that names the extra where it is not installed.
 
     ``package`` is its name for users, where that is another one; ``purpose`` is a noun phrase, for

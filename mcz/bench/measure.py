@@ -8,12 +8,11 @@ import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import mcz
 from mcz.bench.cases import Case, Loaded, Variant, load
 from mcz.codecs import by_name
-from mcz.codecs.contract import Codec, Request, Span, model_finder
+from mcz.codecs.contract import Codec, Encoded, Request, Segment, Span, model_finder
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
 from mcz.formats import format_of
@@ -102,7 +101,7 @@ def _ratios(motion: Motion, source_bytes: int, coded: int) -> dict[str, float | 
     return {name: n / coded if n else None for name, n in zip(names, numerators, strict=True)}
 
 
-def cpu_seconds(work: Callable[[], Any]) -> float:
+def cpu_seconds(work: Callable[[], object]) -> float:
     """CPU time of the fastest of several runs, the first of which (compilation) does not count."""
     work()
     spent, best = 0.0, float("inf")
@@ -116,7 +115,7 @@ def cpu_seconds(work: Callable[[], Any]) -> float:
     return max(best, 1e-9)
 
 
-def peak_bytes(work: Callable[[], Any]) -> int:
+def peak_bytes(work: Callable[[], object]) -> int:
     """The most memory that Python and numpy held while it ran, beside what they had before."""
     tracemalloc.start()
     try:
@@ -136,7 +135,7 @@ def speeds(case: Case, variant: Variant, params: Params) -> Record:
     given = variant.options(params)
     encode, decode = work_of(motion, variant.codec, given)
 
-    def read() -> Any:
+    def read() -> object:
         with mcz.open(data, max_decoded=2**53) as file:
             return file.only_clip().read()
 
@@ -160,13 +159,13 @@ def speeds(case: Case, variant: Variant, params: Params) -> Record:
 
 def work_of(
     motion: Motion, name: str, params: Params
-) -> tuple[Callable[[], Any], Callable[[], Any]]:
+) -> tuple[Callable[[], object], Callable[[], object]]:
     """Encoding and decoding by the codec alone, of values in the domain that it wants."""
     codec = by_name(name)
     options = codec.options(params)
     wanted = as_coded(motion, codec, options)
 
-    def encode() -> tuple[Any, list[Any]]:
+    def encode() -> tuple[Encoded, list[Segment]]:
         source = MemorySource(wanted, 0, codec, BASE.segment_bytes, options)
         encoded = codec.encode(source, options)
         return encoded, list(encoded.segments)
@@ -174,7 +173,7 @@ def work_of(
     encoded, segments = encode()
     find_model = model_finder((*encoded.models, *encoded.known))
 
-    def decode() -> Any:
+    def decode() -> None:
         layout = MemorySource(wanted, 0, codec, BASE.segment_bytes, options).layout
         layout = replace(layout, n_resolutions=encoded.n_resolutions, find_model=find_model)
         spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]

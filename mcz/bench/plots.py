@@ -7,10 +7,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mcz.bench.sweep import ClipResult, Curve
 from mcz.pictures.themes import THEMES, Theme, theme_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, says what it drew
 
@@ -91,7 +95,7 @@ def _draw(
 
     panels = [p for p in _panels(clip) if any(curve.pairs(p[0]) for curve in curves)]
     n_rows = -(-len(panels) // 2)
-    figure: Any = Figure(figsize=(13, 1.2 + 4.6 * n_rows), layout="constrained")
+    figure = Figure(figsize=(13, 1.2 + 4.6 * n_rows), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(n_rows, 2, squeeze=False).ravel()
     for axes in grid[len(panels) :]:
@@ -105,7 +109,7 @@ def _draw(
 
 
 def _panel(
-    axes: Any,
+    axes: Axes,
     clip: ClipResult,
     curves: Sequence[Curve],
     panel: tuple[str, str, bool],
@@ -152,7 +156,7 @@ def _panel(
     plain_ticks(above.xaxis)
 
 
-def plain_ticks(axis: Any) -> None:
+def plain_ticks(axis: Axis) -> None:
     """Marks at 1, 2 and 5, or of a long range at 1, of a logarithmic axis as plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -169,7 +173,7 @@ def _safe(x: Any) -> Any:
     return np.maximum(x, 1e-9)
 
 
-def _label_points(axes: Any, curve: Curve, key: str, published: bool) -> None:
+def _label_points(axes: Axes, curve: Curve, key: str, published: bool) -> None:
     """The setting beside every point."""
     for point in curve.points:
         if point.get(key) and point["params"]:

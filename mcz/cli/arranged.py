@@ -15,14 +15,14 @@ from mcz.cli.suffixes import file_in
 if TYPE_CHECKING:
     from mcz.editing.outcomes import Report
 
-Function = Callable[..., Any]
+Function = Callable[..., object]
 
 
 def output_option(function: Function) -> Function:
     """``-o``, without which a file is rewritten in its own place."""
 
     @wraps(function)
-    def command(*, file: str, output: str | None, **options: Any) -> Any:
+    def command(*, file: str, output: str | None, **options: Any) -> object:
         existing(file)
         return function(file=file, output=output and file_in(output, file), **options)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from mcz.cli.common import plural, printable, table
 from mcz.types import Params
@@ -128,19 +127,18 @@ def _contact_lines(held: Mapping[str, str]) -> Iterator[str]:
         yield f"they move {path} mm in all, {meant} mm in the original"
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     return printable(str(value)[:WIDEST])
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: str | float | None) -> bool:
     try:
-        int(value)
-    except (TypeError, ValueError):
+        return value is not None and isinstance(int(value), int)
+    except ValueError:
         return False
-    return True
 
 
-def _number(value: Any) -> str:
+def _number(value: str | float) -> str:
     """
     >>> _number("0.20411111"), _number(3), _number("?")
     ('0.204111', '3', '?')

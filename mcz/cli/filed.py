@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mcz.cli.common import Exit, Failure, about, check_new, given, write_output
 from mcz.cli.terminal import json_text
@@ -51,7 +51,7 @@ class Filed:
             finally:
                 source.close()
 
-    def document(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> Any:
+    def document(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> JsonObject:
         """The report, see ``mcz.reading.verification.report``."""
         from mcz import __version__
         from mcz.reading.verification import report
@@ -105,7 +105,7 @@ class Filed:
             lines += ["", *text_lines(held)]
         self._write(document, lines)
 
-    def _write(self, document: Any, lines: Sequence[str]) -> None:
+    def _write(self, document: object, lines: Sequence[str]) -> None:
         as_text = self.path.suffix.lower() == ".txt"
         text = "\n".join(lines) if as_text else json_text(document)
         write_output(self.path, f"{text}\n".encode("utf-8", "backslashreplace"), self.force)

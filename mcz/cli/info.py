@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -47,6 +47,7 @@ from mcz.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
+    from mcz.reading.quick_check import Problem
 
 FEW = 4  # clips that are shown in full; more are shown as a table
 WIDEST = 200  # characters that are shown of a value of metadata
@@ -176,7 +177,7 @@ def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
     return _say_problems(file, size, problems, as_json)
 
 
-def _say_problems(file: str, size: int, problems: list[Any], as_json: bool) -> Exit:
+def _say_problems(file: str, size: int, problems: list[Problem], as_json: bool) -> Exit:
     if as_json:
         rows = [
             {"offset": p.offset, "heading": p.heading, "message": in_options(p.message)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -98,7 +98,7 @@ def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[Js
     from mcz.reading.fields import getter_of
 
     every = held.clips.values()
-    getters: dict[str, Callable[[Clip], Any]] = {
+    getters: dict[str, Callable[[Clip], object]] = {
         name: getter_of(name, every) for name in names or USUAL
     }
     if names is None:

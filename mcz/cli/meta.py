@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import click
 
@@ -92,7 +93,7 @@ def command(
     match: str | None,
     take: str | None,
     skip_unknown: bool,
-    rate: Any,
+    rate: Fraction | float | None,
     force: bool,
     as_json: bool,
 ) -> Exit:
@@ -182,7 +183,7 @@ def _changes(
 def _set(
     file: str,
     changes: Mapping[str, Said],
-    rate: Any,
+    rate: Fraction | float | None,
     clips: tuple[str, ...],
     where: str | None,
     force: bool,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mcz.motion import Motion
     from mcz.reading.clip import Clip
 
-Function = Callable[..., Any]
+Function = Callable[..., object]
 
 
 def moving_options(function: Function) -> Function:

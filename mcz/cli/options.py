@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import wraps
-from typing import Any
 
 import click
 
@@ -16,7 +15,7 @@ EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to 
 RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
 ITS_RATE_HELP = "Frames a second (120, 29.97, 30000/1001), in place of what the source states."
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as those of the codec posewave
-Function = Callable[..., Any]
+Function = Callable[..., object]
 
 
 def to_bytes(ctx: click.Context, param: click.Parameter, value: str | None) -> int | None:
@@ -79,7 +78,7 @@ def threads_option(function: Function) -> Function:
     """``--threads``, as the argument ``threads`` of ``mcz.open`` and ``mcz.write``."""
 
     @wraps(function)
-    def command(*args: Any, threads: int | None, **options: Any) -> Any:
+    def command(*args: object, threads: int | None, **options: object) -> object:
         if threads is None:
             return function(*args, **options)
         from mcz.threads import limited
@@ -99,7 +98,7 @@ def jobs_option(function: Function) -> Function:
     """``--jobs``, as the argument ``jobs`` of ``mcz.pack`` and its kin, by default all cores."""
 
     @wraps(function)
-    def command(*args: Any, jobs: int | None, **options: Any) -> Any:
+    def command(*args: object, jobs: int | None, **options: object) -> object:
         from mcz import threads
         from mcz.jobs import limited
 
@@ -301,8 +300,8 @@ def encoding_options(function: Function) -> Function:
 
     @wraps(function)
     def command(
-        *args: Any, codec: str | None, quality: float | None, params: Settings, **others: Any
-    ) -> Any:
+        *args: object, codec: str | None, quality: float | None, params: Settings, **others: object
+    ) -> object:
         if quality is not None:
             if "max_error_cm" in params or "preset" in params:
                 raise click.UsageError("--quality and --param both say what the error may be")

@@ -25,6 +25,8 @@ from mcz.cli.common import (
 from mcz.errors import MczError
 
 if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
     from mcz.live.writer import LiveTraffic, LiveWriter
 
 NAME = "standard input"
@@ -63,7 +65,7 @@ class Awaited(RawIOBase):
     def readable(self) -> bool:
         return True
 
-    def readinto(self, buffer: Any, /) -> int | None:
+    def readinto(self, buffer: WriteableBuffer, /) -> int | None:
         if self.ending is not None:
             return 0
         until = None if self._timeout is None else monotonic() + self._timeout

@@ -7,10 +7,11 @@ import io
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
 from mcz.brief import cell_text
 from mcz.cli.common import (
@@ -126,7 +127,7 @@ def command(
     return Exit.FINE
 
 
-def read_values(path: str, clip: Clip, joint: str) -> Any:
+def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
     """The columns of the joint in a table, NaN where it says invalid; raises Failure."""
     from mcz.tables.files import channel_names
 
@@ -152,7 +153,7 @@ def read_values(path: str, clip: Clip, joint: str) -> Any:
     return values
 
 
-def _read_npz(path: Path) -> tuple[list[str], Any]:
+def _read_npz(path: Path) -> tuple[list[str], NDArray[np.float64]]:
     with np.load(path, allow_pickle=False) as held:
         values = np.asarray(held["values"], np.float64)
         if values.ndim != 2:
@@ -162,7 +163,7 @@ def _read_npz(path: Path) -> tuple[list[str], Any]:
         return [str(name) for name in held["names"]] if "names" in held else [], values
 
 
-def _read_csv(path: Path) -> tuple[list[str], Any]:
+def _read_csv(path: Path) -> tuple[list[str], NDArray[np.float64]]:
     rows = list(csv.reader(io.StringIO(path.read_text("utf-8-sig"))))
     names = rows.pop(0) if rows and not _is_number(rows[0][0] if rows[0] else "") else []
     values = [[float(cell) if cell.strip() else np.nan for cell in row] for row in rows if row]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Sequence
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mcz.brief import cell_text
 from mcz.cli.common import literal
 from mcz.errors import OptionError, SourceError
+from mcz.motion import Skeleton
 from mcz.types import JsonObject
 
 MOST_LINE = 2**24  # bytes of a line
@@ -113,7 +114,7 @@ def _are_coordinates(names: Sequence[str]) -> bool:
     return bool(names) and all(name.rpartition(".")[2] in COORDINATES for name in names)
 
 
-def skeleton_in(path: str) -> Any:
+def skeleton_in(path: str) -> Skeleton:
     """The skeleton in a .bvh, .asf or .mcz file, without its source; raises as its reader does."""
     from dataclasses import replace
 

@@ -12,13 +12,16 @@ import re
 import shutil
 import sys
 import unicodedata
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 import click
 
 from mcz.brief import ODD
 from mcz.brief import printable as printable
 from mcz.errors import AccessError, OptionError
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 ENCODING, KEPT = "utf-8", "surrogateescape"  # of text that is printed as bytes
 
@@ -85,13 +88,13 @@ def say(message: str) -> None:
     click.echo(f"mcz: {printable(' '.join(message.split()))}", err=True)
 
 
-def say_json(document: Any) -> None:
+def say_json(document: object) -> None:
     """Print ``document`` as one line of JSON on standard error."""
     STATUS.remove()
     click.echo(json_text(document, indent=None), err=True)
 
 
-def json_text(document: Any, indent: int | None = 2) -> str:
+def json_text(document: object, indent: int | None = 2) -> str:
     r"""``document`` as JSON, whose strings have escapes for what is not seen; see ``printable``.
 
     >>> print(json_text("a\u202eb \x9b V\xe4sa"))
@@ -108,7 +111,7 @@ def json_text(document: Any, indent: int | None = 2) -> str:
     )
 
 
-def print_json(document: Any) -> None:
+def print_json(document: object) -> None:
     """Print ``document`` as one JSON document with sorted layout but kept key order."""
     STATUS.remove()
     click.echo(json_text(document))
@@ -132,7 +135,7 @@ def text_output() -> BinaryIO:
     return _Escaping(_buffer()) if _stdout().isatty() else _buffer()
 
 
-def _stdout() -> Any:
+def _stdout() -> TextIO:
     if sys.stdout is None:
         raise AccessError("standard output is closed")
     return sys.stdout
@@ -150,10 +153,10 @@ class _Escaping(io.BytesIO):
         super().__init__()
         self._below = below
 
-    def write(self, data: Any, /) -> int:
+    def write(self, data: ReadableBuffer, /) -> int:
         text = bytes(data).decode(ENCODING, KEPT).replace("\r\n", "\n")
         self._below.write(printable(text, "\n\t").encode(ENCODING, "backslashreplace"))
-        return len(data)
+        return memoryview(data).nbytes
 
     def flush(self) -> None:
         self._below.flush()

@@ -18,6 +18,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.extras import import_extra
+from mcz.types import Target
 
 
 class ByteSource:
@@ -179,13 +180,18 @@ class Forward:
         return self._block[first:stop]
 
 
-def _is_plain_file(stream: Any) -> bool:
+def path_of(target: Target) -> str | os.PathLike[str] | None:
+    """The path or address that ``target`` is, for an error; None for bytes and streams."""
+    return target if isinstance(target, (str, os.PathLike)) else None
+
+
+def _is_plain_file(stream: object) -> bool:
     """Whether positions of ``stream`` are those of a file on disk, which can be read at any."""
     raw = stream.raw if isinstance(stream, io.BufferedReader) else stream
     return isinstance(raw, io.FileIO) and hasattr(os, "pread")
 
 
-def open_source(target: Any) -> ByteSource:
+def open_source(target: Target) -> ByteSource:
     """A ByteSource of a path, an fsspec target such as "https://...", or a binary stream.
 
     A stream that cannot seek is read to its end first.
@@ -193,15 +199,15 @@ def open_source(target: Any) -> ByteSource:
     if isinstance(target, (bytes, bytearray, memoryview)):
         data = bytes(target)
         return ByteSource(io.BytesIO(data), name="bytes", target=data)
-    if hasattr(target, "read"):
+    if not isinstance(target, (str, os.PathLike)):
+        if not hasattr(target, "read"):
+            raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
         name = str(getattr(target, "name", "stream"))
         if not target.seekable():
             return ByteSource(io.BytesIO(target.read()), name=name)
         return ByteSource(target, remote=_is_remote(target), name=name)
     if "://" in str(target):
         return _remote_source(str(target))
-    if not isinstance(target, (str, os.PathLike)):
-        raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
     path = str(Path(target).absolute())  # holds wherever the process goes
     return ByteSource(open(target, "rb"), name=os.fspath(target), target=path)
 
@@ -245,7 +251,7 @@ def _no_access(name: str, error: Exception) -> AccessError:
     return AccessError(text, path=name)
 
 
-def _is_remote(stream: Any) -> bool:
+def _is_remote(stream: object) -> bool:
     """Whether every read of ``stream`` is a request, as of an fsspec file that holds none."""
     if isinstance(stream, io.RawIOBase) and getattr(stream, "is_remote", False):
         return True

@@ -136,11 +136,11 @@ def check_index(payload: bytes, chunk: Chunk, directory: Directory, limit: int) 
                 )
 
 
-def _name(key: Any) -> str:
+def _name(key: str | tuple[bytes, bytes]) -> str:
     return repr(key) if isinstance(key, str) else f"{key[0].decode('latin-1')} {key[1].hex()}"
 
 
-def _short(row: Any) -> str:
+def _short(row: object) -> str:
     if isinstance(row, ClipRow):
         return f"{row.n_frames} frames in {len(row.segments)} segments, {row.signals}, {row.clip}"
     return str(row)

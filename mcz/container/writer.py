@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from mcz.container import payloads
 from mcz.container.chunks import (
@@ -54,7 +54,7 @@ ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
 
 
 class Sink(Protocol):
-    def write(self, data: bytes, /) -> Any: ...
+    def write(self, data: bytes, /) -> int | None: ...
 
 
 def payload_id(payload: bytes) -> bytes:

@@ -28,7 +28,7 @@ from mcz.writing.file import profile_of
 def pack(
     root: str | os.PathLike[str],
     target: Target,
-    client: Any = None,
+    client: object = None,
     *,
     codec: str | None = None,
     effort: str | None = None,

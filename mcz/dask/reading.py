@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from mcz.dask.cluster import Cluster, connected
 from mcz.errors import OptionError
@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 def verify(
     target: Target,
-    client: Any = None,
+    client: object = None,
     *,
     max_decoded: int | None = None,
     where: Where | None = None,
@@ -38,7 +38,7 @@ def verify(
 def map_clips(
     target: Target,
     function: Callable[[Clip], Result],
-    client: Any = None,
+    client: object = None,
     *,
     where: Where | None = None,
     max_decoded: int | None = None,

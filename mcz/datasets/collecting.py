@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -227,7 +226,7 @@ ADVICE = {
 }
 
 
-def _short(fact: Any) -> str:
+def _short(fact: object) -> str:
     if isinstance(fact, list):
         names = [name for each in fact for name in each]
         return f"{len(names)} names ({', '.join(names[:3])} ...)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -19,6 +19,7 @@ from mcz.poses.conversions import from_matrices
 from mcz.poses.moving import joint_numbers, scale_to
 from mcz.poses.places import chosen_points, point_names
 from mcz.skeleton import Joints, joint_columns
+from mcz.types import Values
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +213,7 @@ def features_of(
     rows: Rows,
     margins: tuple[int, int],
     dtype: DTypeLike,
-) -> dict[str, np.ndarray[Any, Any]]:
+) -> dict[str, Values]:
     """The arrays of frames, of whose ``rows`` there are ``margins`` more before and after."""
     values, steps = rows
     first, last = margins

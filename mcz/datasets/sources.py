@@ -8,7 +8,6 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from threading import Lock
-from typing import Any
 from weakref import finalize
 
 import numpy as np
@@ -39,7 +38,7 @@ class Recipe:
     rate: Fraction | None
     joints: Joints
     unit: str | None
-    dtype: np.dtype[Any]
+    dtype: np.dtype[np.generic]
 
     @property
     def reach(self) -> int:
@@ -71,10 +70,10 @@ class Sources:
         self._given = dict(given)
         self._runs = Runs(runs_bytes)
         self._open: OrderedDict[str, File] = OrderedDict()
-        self._subjects: OrderedDict[tuple[Any, ...], Subject] = OrderedDict()
+        self._subjects: OrderedDict[tuple[object, ...], Subject] = OrderedDict()
         self._lock = Lock()
         # Where files take turns in being open, none is closed while another thread reads it.
-        self._turns: AbstractContextManager[Any] = (
+        self._turns: AbstractContextManager[object] = (
             Lock() if n_targets > MOST_OPEN else nullcontext()
         )
         finalize(self, _close, self._open)

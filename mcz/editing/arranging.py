@@ -11,7 +11,6 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from mcz.brief import counted, nearest, shown
 from mcz.container import payloads
@@ -48,7 +47,7 @@ def delete_clips(
     *,
     where: Where | None = None,
     aliases: bool = False,
-    output: Any = None,
+    output: Target | None = None,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
@@ -153,7 +152,7 @@ def rename_clips(
     target: Target,
     names: Mapping[str, str],
     *,
-    output: Any = None,
+    output: Target | None = None,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
@@ -218,7 +217,7 @@ def reorder_clips(
     names: Sequence[str] = (),
     *,
     by: str | None = None,
-    output: Any = None,
+    output: Target | None = None,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
@@ -254,7 +253,7 @@ def in_order(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
     return [clip for _, clip in having] + [clip for value, clip in found if value is None]
 
 
-def natural(value: Value) -> tuple[Any, ...]:
+def natural(value: Value) -> tuple[object, ...]:
     """What sorts numbers as numbers, also those within a text: "take2" before "take10"."""
     if isinstance(value, str):
         parts = re.split(r"([0-9]+)", value)
@@ -353,7 +352,7 @@ def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
 def _finish(
     report: Report,
     target: Target,
-    output: Any,
+    output: Target | None,
     force: bool,
     file: File,
     plan: Plan,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from mcz.editing.cutting import ClipCut
+from mcz.types import Values
 
 
 def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
@@ -24,7 +24,7 @@ def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
 
 
 def recoded_quality(
-    cut: ClipCut, old: Mapping[str, str], now: dict[str, str], _: Sequence[Any]
+    cut: ClipCut, old: Mapping[str, str], now: dict[str, str], _: Sequence[Values]
 ) -> dict[str, str]:
     """The entries for a clip that was cut and coded anew; ``now`` are those of this coding."""
     before = {k: v for k, v in cut_quality(cut, old).items() if not k.startswith("param.")}

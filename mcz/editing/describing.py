@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from mcz.brief import shown
 from mcz.container.metadata import Record, applied
@@ -99,7 +98,7 @@ def set_rate(
     names: Iterable[str] | None = None,
     *,
     where: Where | None = None,
-    output: Any = None,
+    output: Target | None = None,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Report:

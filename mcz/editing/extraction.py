@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcz.brief import brief
 from mcz.container import payloads
@@ -94,7 +94,7 @@ class Extraction:
 
 
 def extract(
-    source: Any,
+    source: Target,
     target: Target,
     *,
     resolution: int = 0,

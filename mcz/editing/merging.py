@@ -12,7 +12,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import PurePosixPath
-from typing import Any
 
 from mcz.brief import counted, shown
 from mcz.container import payloads
@@ -143,7 +142,7 @@ class Held:
     ``paths`` are those of all files that it restores. ``double``: what cannot be taken in.
     """
 
-    names: dict[tuple[str, str], Callable[[], Any]] = field(default_factory=dict)
+    names: dict[tuple[str, str], Callable[[], object]] = field(default_factory=dict)
     paths: set[str] = field(default_factory=set)
     double: list[str] = field(default_factory=list)
 
@@ -181,7 +180,7 @@ def _refuse_double(held: Held) -> None:
         )
 
 
-def _things(file: File) -> Iterator[tuple[str, str, Callable[[], Any]]]:
+def _things(file: File) -> Iterator[tuple[str, str, Callable[[], object]]]:
     """Kind, name, and what finds the content of everything that has a name."""
     for clip in file:
         yield CLIP, clip.name, _of_clip(clip)
@@ -191,10 +190,10 @@ def _things(file: File) -> Iterator[tuple[str, str, Callable[[], Any]]]:
         yield ALIAS, name, _of_alias(file, of, target)
 
 
-def _of_clip(clip: Clip) -> Callable[[], Any]:
+def _of_clip(clip: Clip) -> Callable[[], object]:
     """What is the same in two clips of which one can stand for the other."""
 
-    def content() -> Any:
+    def content() -> object:
         hashes = clip.container.whole_cend(clip.container.directory.clips[clip.name])
         digests = [hashes.source_sha256, *hashes.value_sha256]
         path = clip.source.path if clip.source is not None else ""
@@ -203,8 +202,8 @@ def _of_clip(clip: Clip) -> Callable[[], Any]:
     return content
 
 
-def _of_attachment(file: File, name: str) -> Callable[[], Any]:
-    def content() -> Any:
+def _of_attachment(file: File, name: str) -> Callable[[], tuple[object, ...]]:
+    def content() -> tuple[object, ...]:
         container = file.container
         part = container.directory.attachments[name].parts[0]
         fields = parse(payloads.Atta, container.payload(part), part.label)
@@ -213,7 +212,7 @@ def _of_attachment(file: File, name: str) -> Callable[[], Any]:
     return content
 
 
-def _of_alias(file: File, of: int, target: bytes) -> Callable[[], Any]:
+def _of_alias(file: File, of: int, target: bytes) -> Callable[[], object]:
     """The content of what an alias stands for; of a skeleton's file its id."""
     name = target.decode("utf-8", "replace")
     if of == payloads.OF_CLIP and name in file.clips.rows:

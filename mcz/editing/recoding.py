@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mcz.codecs.contract import Codec, Recoding, Request
 from mcz.codecs.parameters import TARGETS
@@ -56,7 +55,7 @@ class Recoded:
         return notes, masks
 
 
-def recode_joint(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Recoded:
+def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Recoded:
     """Code the joint anew, and decode it again.
 
     Raises OptionError for what cannot be edited, MotionError for values that do not suit.
@@ -103,7 +102,7 @@ class Edited:
     given: NDArray[np.float64]
 
 
-def edit(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Edited:
+def edit(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Edited:
     """A clip with other values for one joint; raises as ``recode_joint`` does."""
     index = _editable(clip, joint)
     columns = list(clip.skeleton.columns(index))
@@ -155,12 +154,12 @@ def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...
     return tuple(groups)
 
 
-def _joints_of(clip: Clip, info: SignalInfo, groups: Mapping[int, Any]) -> tuple[int, ...]:
+def _joints_of(clip: Clip, info: SignalInfo, groups: Mapping[int, object]) -> tuple[int, ...]:
     owners = joint_of_column(clip.skeleton)
     return tuple(sorted({owners[c] for group in groups for c in info.layout.groups[group]}))
 
 
-def _checked(clip: Clip, columns: Sequence[int], values: Any) -> NDArray[np.float64]:
+def _checked(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDArray[np.float64]:
     """The values that were given as an array (rows, channels)."""
     try:
         given = np.asarray(values, np.float64)

@@ -11,7 +11,7 @@ import shutil
 import tempfile
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcz.container.chunks import CRC, Chunk
 from mcz.container.reader import Container
@@ -30,7 +30,7 @@ Content = set[tuple[object, ...]]
 
 
 def repair(
-    source: Any,
+    source: Target,
     target: Target,
     *,
     force: bool = False,

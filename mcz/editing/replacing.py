@@ -14,9 +14,10 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mcz.brief import brief
 from mcz.container import payloads
@@ -38,7 +39,7 @@ from mcz.errors import (
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.schema import build, parse
-from mcz.types import Values
+from mcz.types import Target, Values
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Progress
 from mcz.writing.quality import CHUNK, figures, texts_of
@@ -77,11 +78,11 @@ class Replacement:
 
 
 def replace(
-    source: Any,
+    source: Target,
     clip: str | None,
     joint: int | str,
-    values: Any,
-    target: Any = None,
+    values: ArrayLike,
+    target: Target | None = None,
     *,
     on_grid: bool = False,
     force: bool = False,
@@ -119,7 +120,7 @@ def replace(
         return _write(file, chosen, recoded, writer)
 
 
-def _locked(source: Any, stack: ExitStack) -> Path:
+def _locked(source: Target, stack: ExitStack) -> Path:
     """The file that ``source`` names, taken for this process until ``stack`` ends."""
     if not isinstance(source, (str, os.PathLike)) or "://" in str(source):
         raise OptionError(f"{source!r} cannot be edited in place; name a target")

@@ -13,12 +13,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import BinaryIO
 
 from mcz.container import payloads
 from mcz.container.limits import BASE, Profile
 from mcz.container.locks import lock
 from mcz.container.reader import Container
+from mcz.container.source import path_of
 from mcz.container.writer import Writer
 from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
 from mcz.editing.protecting import (
@@ -37,6 +38,7 @@ from mcz.errors import (
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
 from mcz.schema import parse
+from mcz.types import Target
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Progress
 
@@ -145,7 +147,7 @@ def source_path(file: File, name: str) -> str:
     return source.path if source is not None else ""
 
 
-def writer_like(stream: Any, files: Iterable[File]) -> Writer:
+def writer_like(stream: BinaryIO, files: Iterable[File]) -> Writer:
     """A Writer of a new file that has what the first of ``files`` has, and holds what all hold."""
     files = list(files)
     head = parse(payloads.Head, files[0].container.directory.head, "HEAD")
@@ -159,7 +161,7 @@ def writer_like(stream: Any, files: Iterable[File]) -> Writer:
 
 
 @contextmanager
-def source_of(target: Any, output: Any) -> Iterator[File]:
+def source_of(target: Target, output: Target | None) -> Iterator[File]:
     """The file to be rewritten; where it is to take its own place, nobody appends meanwhile.
 
     Raises AccessError where another process is appending to it.
@@ -170,7 +172,7 @@ def source_of(target: Any, output: Any) -> Iterator[File]:
         return
     if not isinstance(target, (str, os.PathLike)) or "://" in str(target):
         raise OptionError(
-            "only a file on disk can be rewritten in place; name an output", path=target
+            "only a file on disk can be rewritten in place; name an output", path=path_of(target)
         )
     try:
         stream = builtins.open(target, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
@@ -183,10 +185,18 @@ def source_of(target: Any, output: Any) -> Iterator[File]:
             yield file
 
 
-def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step: Step) -> Written:
+def _disk_path(target: Target) -> Path:
+    """The path of a file that ``source_of`` lets be rewritten in place."""
+    assert isinstance(target, (str, os.PathLike))
+    return Path(target)
+
+
+def rewrite(
+    target: Target, output: Target | None, force: bool, file: File, plan: Plan, step: Step
+) -> Written:
     """Write what ``plan`` says of ``file`` in its own place, or to ``output``."""
     inputs = () if output is None else (target,)
-    path = Path(target) if output is None else output
+    path = output or _disk_path(target)
     with replacing_file(path, force=force or output is None, inputs=inputs) as stream:
         size, left_out = _written(stream, file, plan, step)
         if output is None and UNPROTECTED in left_out:
@@ -196,7 +206,7 @@ def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step:
     return Written(size, left_out)
 
 
-def _written(stream: Any, file: File, plan: Plan, step: Step) -> tuple[int, list[str]]:
+def _written(stream: BinaryIO, file: File, plan: Plan, step: Step) -> tuple[int, list[str]]:
     """Write what ``plan`` says of ``file``; the size, and what was left out."""
     writer = writer_like(stream, [file])
     left_out = carry(file, writer, plan, step)
@@ -205,7 +215,7 @@ def _written(stream: Any, file: File, plan: Plan, step: Step) -> tuple[int, list
 
 
 def protected_anew(
-    target: Any, redundancy: float, progress: Callable[[int, int], object] | None
+    target: Target, redundancy: float, progress: Callable[[int, int], object] | None
 ) -> Protection | None:
     """Rewrite a file with recovery data for all of it in place of those that it has.
 
@@ -215,7 +225,7 @@ def protected_anew(
     with source_of(target, None) as file:
         if redundancy_of(file.container) is None:
             return None
-        with replacing_file(Path(target), force=True) as stream:
+        with replacing_file(_disk_path(target), force=True) as stream:
             _, left_out = _written(stream, file, whole(file), lambda name: None)
             if lost := [text for text in left_out if text != UNPROTECTED]:
                 raise FormatError(f"rewriting it would lose {lost[0]}", path=file.name)

@@ -11,7 +11,7 @@ import zipfile
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -108,7 +108,7 @@ def offsets_of_joints(joints: ArrayLike, parents: Sequence[int]) -> Floats:
 def offsets_from_positions(
     positions: ArrayLike,
     rotations: ArrayLike,
-    parents: Sequence[int] | NDArray[np.integer[Any]],
+    parents: Sequence[int] | NDArray[np.integer],
     translations: ArrayLike | None = None,
 ) -> FoundOffsets:
     """The offsets that fit positions of joints best, in the sense of least squares.

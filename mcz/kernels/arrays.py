@@ -16,7 +16,12 @@ WRITEABLE = 0x400
 
 
 def fit(
-    given: object, dtype: np.dtype[Any], rank: int, dense: bool, is_written: bool, moved: Moved
+    given: object,
+    dtype: np.dtype[np.generic],
+    rank: int,
+    dense: bool,
+    is_written: bool,
+    moved: Moved,
 ) -> Values:
     """``given`` with this dtype and number of axes, aligned, contiguous where ``dense``.
 

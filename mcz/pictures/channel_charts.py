@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,10 @@ from mcz.pictures.charts import Chart, legend, line, rows_of, styled
 from mcz.pictures.themes import Theme
 from mcz.poses import velocities
 from mcz.poses.moving import signal_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 WIDTH, PANEL = 1000, 280  # pixels of a chart and the height of a panel
 LONGEST = 1024  # frames of a piece whose spectrum is taken
@@ -181,7 +185,7 @@ def _columns(
 def channel_chart(motion: Motion, wanted: Wanted, first: int = 0) -> Chart:
     """Channels over time; ``first`` is the frame of the clip where the motion begins."""
     shown = _shown(motion, wanted, first)
-    rows: list[list[Any]] = [["channel", "in", "least", "mean", "greatest", "unknown"]]
+    rows: list[list[object]] = [["channel", "in", "least", "mean", "greatest", "unknown"]]
     for each in shown.series:
         known = each.numbers[np.isfinite(each.numbers)]
         with np.errstate(over="ignore"):
@@ -194,8 +198,8 @@ def channel_chart(motion: Motion, wanted: Wanted, first: int = 0) -> Chart:
 
 
 def _panels(
-    figure: Any, theme: Theme, series: Sequence[_Series], x: str, y: str
-) -> Iterator[tuple[Any, list[_Series]]]:
+    figure: Figure, theme: Theme, series: Sequence[_Series], x: str, y: str
+) -> Iterator[tuple[Axes, list[_Series]]]:
     """Axes for each unit, one below the other, and what is drawn there."""
     units = list(dict.fromkeys(each.unit for each in series))
     every = np.atleast_1d(figure.subplots(len(units), 1, sharex=True))
@@ -206,14 +210,14 @@ def _panels(
         legend(axes, theme, loc="upper right", ncols=len(own))
 
 
-def _draw_channels(figure: Any, theme: Theme, *, shown: _Shown) -> None:
+def _draw_channels(figure: Figure, theme: Theme, *, shown: _Shown) -> None:
     for axes, own in _panels(figure, theme, shown.series, shown.when, "{unit}"):
         for place, each in enumerate(own):
             draw_runs(axes, (each.at, each.numbers), shown.runs, _color(theme, place), each.label)
 
 
 def draw_runs(
-    axes: Any,
+    axes: Axes,
     points: tuple[Floats, Floats],
     runs: Sequence[tuple[int, int]],
     color: str,
@@ -261,7 +265,7 @@ def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
         raise MotionError(f"{shown.name!r} has no known value", clip=motion.name)
     per = "cycles a frame" if period is None else "Hz"
     heads = [f"{what}, {per}" for what in ("strongest", "half below", "99 % below")]
-    rows: list[list[Any]] = [["of", "in", *heads]]
+    rows: list[list[object]] = [["of", "in", *heads]]
     rows += [[each.label, each.unit, *_marks(each.at, each.numbers)] for each in series]
     table = Sheet("Frequencies", rows_of(rows), "llrrr", "Half, and 99 %, of the power is below.")
     size = WIDTH, 60 + PANEL * len({each.unit for each in series})
@@ -297,7 +301,7 @@ def density(column: Floats, rate: float) -> tuple[Floats, Floats]:
     return np.arange(size // 2 + 1, dtype=np.float64) * (rate / size), np.asarray(power)
 
 
-def _draw_spectra(figure: Any, theme: Theme, *, series: Sequence[_Series], per: str) -> None:
+def _draw_spectra(figure: Figure, theme: Theme, *, series: Sequence[_Series], per: str) -> None:
     for axes, own in _panels(figure, theme, series, per, f"({{unit}})² / {per}"):
         for place, each in enumerate(own):
             power = np.maximum(each.numbers, LEAST_POWER)

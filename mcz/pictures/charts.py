@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,12 @@ from mcz.kinematics.chain import Floats
 from mcz.pictures.chart_pages import ChartPage, Sheet, data_uri
 from mcz.pictures.libraries import new_figure, quietly
 from mcz.pictures.themes import THEMES, Theme, theme_of
+from mcz.types import Settings
 from mcz.writing.atomic import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".html")
 MOST_POINTS = 3000  # of a line: of more the least and the greatest of neighbors
@@ -29,7 +34,7 @@ class Chart:
 
     title: str
     size: tuple[int, int]
-    draw: Callable[[Any, Theme], None]
+    draw: Callable[[Figure, Theme], None]
     tables: tuple[Sheet, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
@@ -91,7 +96,7 @@ def html(chart: Chart, size: tuple[int, int]) -> bytes:
     return found.html()
 
 
-def styled(axes: Any, theme: Theme, *, x: str = "", y: str = "", title: str = "") -> Any:
+def styled(axes: Axes, theme: Theme, *, x: str = "", y: str = "", title: str = "") -> Axes:
     """Axes in the colors of the theme, with words of which none is mathematics."""
     axes.set_facecolor(theme.ground)
     for side, spine in axes.spines.items():
@@ -100,22 +105,22 @@ def styled(axes: Any, theme: Theme, *, x: str = "", y: str = "", title: str = ""
     axes.tick_params(colors=theme.quiet, labelsize=8, which="both")
     axes.grid(True, color=theme.grid, linewidth=0.6)
     axes.set_axisbelow(True)
-    words = {"parse_math": False, "color": theme.quiet, "fontsize": 9}
+    words: Settings = {"parse_math": False, "color": theme.quiet, "fontsize": 9}
     axes.set_xlabel(printable(x), **words)
     axes.set_ylabel(printable(y), **words)
-    heading = {"loc": "left", "fontsize": 9.5}
+    heading: Settings = {"loc": "left", "fontsize": 9.5}
     axes.set_title(printable(title), **words | heading | {"color": theme.ink})
     return axes
 
 
-def legend(axes: Any, theme: Theme, **options: object) -> None:
+def legend(axes: Axes, theme: Theme, **options: Any) -> None:
     """The legend in the colors of the theme; its texts are no mathematics."""
     found = axes.legend(frameon=False, fontsize=8, labelcolor=theme.ink, **options)
     for text in found.get_texts():
         text.set_parse_math(False)
 
 
-def name_ticks(axes: Any, places: Any, names: Sequence[str], most: int) -> None:
+def name_ticks(axes: Axes, places: Any, names: Sequence[str], most: int) -> None:
     """Names of bars at their places, long ones cut; none is mathematics."""
     shown = [printable(name) for name in names]
     shown = [name if len(name) <= most else f"{name[: most - 1]}…" for name in shown]
@@ -124,7 +129,7 @@ def name_ticks(axes: Any, places: Any, names: Sequence[str], most: int) -> None:
     axes.grid(False, axis="y")
 
 
-def line(axes: Any, x: Floats, y: Floats, color: str, label: str = "", **options: object) -> None:
+def line(axes: Axes, x: Floats, y: Floats, color: str, label: str = "", **options: Any) -> None:
     """A line of many points, of which those are drawn that are seen; breaks where y is NaN."""
     x, y = thinned(x, y)
     axes.plot(x, y, color=color, label=printable(label), **{"linewidth": 1.1} | options)
@@ -150,7 +155,7 @@ def number(value: float | None, digits: int = 4) -> str:
     return "-" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
 
 
-def rows_of(rows: Sequence[Sequence[Any]]) -> list[list[str]]:
+def rows_of(rows: Sequence[Sequence[object]]) -> list[list[str]]:
     """Cells as text: numbers short, counts whole."""
     return [[_cell(cell) for cell in row] for row in rows]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +25,11 @@ from mcz.pictures.libraries import library
 from mcz.pictures.stages import stage_of
 from mcz.pictures.themes import Theme
 from mcz.pictures.tracks import Track, track_of
+from mcz.types import Settings
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BLOCK = 2**19  # numbers that are worked on at a time
 MOST_BARS = 18  # joints that have a bar
@@ -163,7 +168,7 @@ def error_chart(original: Motion, other: Motion, up: str | None, first: int = 0)
         f"(frame {found.frame + first}, {found.place})"
     )
 
-    rows: list[list[Any]] = [["joint", f"mean {found.unit}", f"greatest {found.unit}", "frame"]]
+    rows: list[list[object]] = [["joint", f"mean {found.unit}", f"greatest {found.unit}", "frame"]]
     rows += [
         [name, mean, most, "-" if frame is None else str(frame + first)]
         for name, mean, most, frame in found.joints
@@ -175,7 +180,7 @@ def error_chart(original: Motion, other: Motion, up: str | None, first: int = 0)
 
 
 def _draw(
-    figure: Any, theme: Theme, *, motion: Motion, found: Errors, up: str | None, first: int
+    figure: Figure, theme: Theme, *, motion: Motion, found: Errors, up: str | None, first: int
 ) -> None:
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.3), height_ratios=(1, 1.15))
     _draw_figure(figure.add_subplot(grid[:, 0]), theme, motion, found, up, first)
@@ -183,7 +188,7 @@ def _draw(
     _draw_bars(figure.add_subplot(grid[1, 1]), theme, found)
 
 
-def _draw_time(axes: Any, theme: Theme, motion: Motion, found: Errors, first: int) -> None:
+def _draw_time(axes: Axes, theme: Theme, motion: Motion, found: Errors, first: int) -> None:
     at, when = times_of(motion, first)
     at = at[:: motion.signals[0].samples_per_frame]
     styled(axes, theme, x=when, y=found.unit, title="over time")
@@ -194,7 +199,7 @@ def _draw_time(axes: Any, theme: Theme, motion: Motion, found: Errors, first: in
     legend(axes, theme, loc="upper right", ncols=2)
 
 
-def _draw_bars(axes: Any, theme: Theme, found: Errors) -> None:
+def _draw_bars(axes: Axes, theme: Theme, found: Errors) -> None:
     known = [each for each in found.joints if each[1] is not None and each[2] is not None]
     known.sort(key=lambda each: each[1] or 0.0, reverse=True)
     more = len(known) - MOST_BARS
@@ -212,7 +217,7 @@ def _draw_bars(axes: Any, theme: Theme, found: Errors) -> None:
 
 
 def _draw_figure(
-    axes: Any, theme: Theme, motion: Motion, found: Errors, up: str | None, first: int
+    axes: Axes, theme: Theme, motion: Motion, found: Errors, up: str | None, first: int
 ) -> None:
     """The original in the frame of the greatest error, each joint in the color of its mean."""
     axes.set_axis_off()
@@ -233,14 +238,20 @@ def _draw_figure(
         ]
     )
     _add_polygons(axes, track, by_joint[track.body.joints], theme)
-    place = {"ax": axes, "orientation": "horizontal", "shrink": 0.75, "aspect": 28, "pad": 0.02}
+    place: Settings = {
+        "ax": axes,
+        "orientation": "horizontal",
+        "shrink": 0.75,
+        "aspect": 28,
+        "pad": 0.02,
+    }
     bar = axes.figure.colorbar(scale, **place)
     bar.outline.set_visible(False)
     bar.ax.tick_params(colors=theme.quiet, labelsize=8)
     bar.set_label(f"mean error, {found.unit}", color=theme.quiet, fontsize=9)
 
 
-def _add_polygons(axes: Any, track: Track, colors: Floats, theme: Theme) -> None:
+def _add_polygons(axes: Axes, track: Track, colors: Floats, theme: Theme) -> None:
     """The one frame of a track, its nodes in these colors (n_nodes, 3)."""
     port = Viewport(0, 0, 420, 560)
     camera = stage_of(track, theme, "front", port, None, 1.0).camera

@@ -5,25 +5,29 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from mcz.extras import import_extra
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 EXTRAS = {"matplotlib": "plot", "PIL": "plot", "av": "render"}
 PACKAGES = {"PIL": "pillow", "av": "av (PyAV)"}
 
 
-def library(name: str) -> Any:
+def library(name: str) -> ModuleType:
     """The module ``name``; OptionError that names the extra of mcz where it is not installed."""
     top = name.partition(".")[0]
     return import_extra(name, EXTRAS[top], package=PACKAGES.get(top, top), purpose="this picture")
 
 
-def new_figure(width: int, height: int, **options: object) -> Any:
+def new_figure(width: int, height: int, **options: object) -> Figure:
     """A matplotlib figure of so many pixels, apart from every global state of pyplot."""
     library("matplotlib")
     canvas = library("matplotlib.backends.backend_agg")
-    figure = library("matplotlib.figure").Figure(
+    figure: Figure = library("matplotlib.figure").Figure(
         figsize=(width / DPI, height / DPI), dpi=DPI, **options
     )
     canvas.FigureCanvasAgg(figure)

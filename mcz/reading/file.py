@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from mcz.brief import counted, shown
 from mcz.container import payloads
@@ -18,7 +18,7 @@ from mcz.container.chunks import SIGNATURE
 from mcz.container.directory import AttachmentRow
 from mcz.container.metadata import applied
 from mcz.container.reader import Container
-from mcz.container.source import ByteSource, open_source
+from mcz.container.source import ByteSource, open_source, path_of
 from mcz.errors import (
     AccessError,
     ChecksumError,
@@ -39,7 +39,7 @@ from mcz.reading.names import listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 from mcz.threads import checked
-from mcz.types import JsonObject, Params
+from mcz.types import JsonObject, Params, Target
 
 
 def is_mcz(path: str | os.PathLike[str]) -> bool:
@@ -278,7 +278,7 @@ class File:
 
 
 def open(
-    target: Any,
+    target: Target,
     salvage: bool = False,
     max_decoded: int | None = None,
     unverified: bool = False,
@@ -313,12 +313,12 @@ def open(
         raise
 
 
-def reached(target: Any) -> ByteSource:
+def reached(target: Target) -> ByteSource:
     """The bytes of ``target``, as ``open`` takes it; raises AccessError and OptionError."""
     try:
         return open_source(target)
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
-        raise AccessError(reason_of(error), path=target) from None
+        raise AccessError(reason_of(error), path=path_of(target)) from None
 
 
 def file_of(container: Container) -> File:

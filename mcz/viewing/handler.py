@@ -177,7 +177,7 @@ class Handler(BaseHTTPRequestHandler):
             self._unread = False
             self._send_json(found)
             return
-        tasks: Mapping[str, Callable[[JsonObject], Any]] = {
+        tasks: Mapping[str, Callable[[JsonObject], object]] = {
             "encode": work.encode,
             "diff": work.diff,
             "glb": work.glb,
@@ -198,7 +198,7 @@ class Handler(BaseHTTPRequestHandler):
 
     # How it is said ---------------------------------------------------------------
 
-    def _send_json(self, document: Any) -> None:
+    def _send_json(self, document: object) -> None:
         self._send(json.dumps(document, allow_nan=False).encode(), JSON, 200)
 
     def _send(

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from threading import Lock, RLock
-from typing import Any, BinaryIO, Protocol
+from typing import BinaryIO, Protocol
 
 from mcz.container.source import ByteSource
 from mcz.errors import (
@@ -161,7 +161,7 @@ class Made:
         return OnDisk(self.target())
 
 
-def _state(path: Path, skeleton: Any = None) -> object:
+def _state(path: Path, skeleton: object = None) -> object:
     """What changes when a file does, a motion file below a folder, or the ASF of an AMC.
 
     ``skeleton``: the ASF that was named, or None. Raises AccessError where there is no ``path``.

@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcz.errors import OptionError
 from mcz.motion import Motion
@@ -55,8 +55,11 @@ class View:
             self._server.close()
 
 
+Thing = Motion | Clip | str | os.PathLike[str]
+
+
 def view(
-    *things: Any,
+    *things: Thing,
     skeleton: str | os.PathLike[str] | None = None,
     rate: Fraction | float | None = None,
     unit: str | None = None,
@@ -107,7 +110,7 @@ def _tell(line: str) -> None:
     sys.stderr.write(f"mcz: {line}\n")
 
 
-def _player_of(thing: Any, said: JsonObject, salvage: bool) -> str:
+def _player_of(thing: Thing, said: JsonObject, salvage: bool) -> str:
     """A player of a Motion or Clip, or of a file; of an ``.mcz`` that is one of its first clip."""
     from mcz.reading.file import open
     from mcz.reading.read import read
@@ -122,7 +125,7 @@ def _player_of(thing: Any, said: JsonObject, salvage: bool) -> str:
     raise OptionError("it has no clip", path=thing)
 
 
-def _give(shelf: Shelf, thing: Any) -> None:
+def _give(shelf: Shelf, thing: Thing) -> None:
     if isinstance(thing, Motion):
         shelf.give(Stored(thing.name, shelf.write(lambda out: _write(thing, out))))
     elif isinstance(thing, Clip):

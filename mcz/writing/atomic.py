@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcz.container.locks import is_abandoned, lock
 from mcz.container.scan import scan
@@ -23,6 +23,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.hints import Hint
+from mcz.types import Target
 from mcz.writing.inputs import refuse_inputs
 
 SUFFIX = ".part"
@@ -31,7 +32,7 @@ FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)  # errors that only writing has
 
 
 @contextmanager
-def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterator[BinaryIO]:
+def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> Iterator[BinaryIO]:
     """A binary stream whose bytes become ``target`` only when the block ends well.
 
     On disk that is a temporary file beside the target, synced and renamed; a device or a pipe, and
@@ -40,7 +41,7 @@ def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterat
     where it cannot be written.
     """
     refuse_inputs(target, inputs)
-    if hasattr(target, "write"):
+    if not isinstance(target, (str, bytes, os.PathLike)):
         yield target
         return
     if "://" in str(target):
@@ -61,7 +62,9 @@ def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterat
 
 
 @contextmanager
-def replacing_file(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterator[BinaryIO]:
+def replacing_file(
+    target: Target, *, force: bool, inputs: Iterable[object] = ()
+) -> Iterator[BinaryIO]:
     """As ``replacing``, for an MCZ file: it is read again, strictly, before it gets its name.
 
     The stream can be read. Also raises FormatError where the new file breaks a rule.

@@ -6,9 +6,8 @@ of what bears upon it are to be finer.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
 from mcz.codecs.parameters import Dial
 from mcz.errors import MotionError, OptionError
@@ -31,7 +30,7 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict
     step = (dial.guess and dial.guess(target.name, target.limit)) or 1.0
     step = min(max(step, dial.low), dial.high)
     for _ in range(MOST_STEPS):
-        octaves = np.zeros(trial.motion.n_frames, np.int64)
+        octaves: NDArray[np.int64] = np.zeros(trial.motion.n_frames, np.int64)
         for _ in range(MOST_ROUNDS):
             found = {dial.parameter: step, REFINEMENT: octaves}
             errors = _errors(trial, found, target)
@@ -51,7 +50,7 @@ def _errors(trial: Trials, found: JsonObject, target: Target) -> Floats:
         raise OptionError(f"{target.name} {target.limit:g} cannot be met: {error}") from error
 
 
-def _refined(octaves: Any, ratios: Floats) -> Any:
+def _refined(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
     """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and beside it."""
     with np.errstate(divide="ignore"):
         missing = np.where(ratios > 1, np.ceil(np.log2(ratios) + MARGIN), 0.0).astype(np.int64)

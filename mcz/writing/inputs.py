@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterable
-from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from mcz.errors import OptionError
@@ -29,11 +28,11 @@ def refuse_inputs(target: object, inputs: Iterable[object]) -> None:
             raise OptionError(f"{name}: it is the input itself{other}; name another output")
 
 
-def _name(file: Any) -> str:
+def _name(file: object) -> str:
     return str(file if isinstance(file, (str, os.PathLike)) else getattr(file, "name", "a stream"))
 
 
-def _identity(file: Any) -> object:
+def _identity(file: object) -> object:
     """What tells a file from all others; None for what is no file."""
     if isinstance(file, (str, os.PathLike)):
         path = os.fspath(file)
@@ -44,12 +43,13 @@ def _identity(file: Any) -> object:
             path = unquote(url.path)
         return _stat_of(path)
     try:
-        return _stat_of(file.fileno())
-    except (AttributeError, OSError, ValueError):  # not a stream, or one of memory
+        number = getattr(file, "fileno", None)
+        return None if number is None else _stat_of(number())
+    except (OSError, ValueError):  # a stream of memory, or a closed one
         return None
 
 
-def _stat_of(file: Any) -> tuple[int, int] | None:
+def _stat_of(file: str | bytes | int) -> tuple[int, int] | None:
     try:
         found = os.stat(file)  # noqa: PTH116 - of a path or a number
     except (OSError, ValueError):  # ValueError: a name with a zero byte

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import warnings
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.errors import ContactWarning, OptionError
 from mcz.kinematics import positions_of
-from mcz.metrics import compare
+from mcz.metrics import Comparison, compare
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.sizes import clip_sizes
@@ -117,7 +116,7 @@ class Trials:
         return float(sizes.payload * 8 * motion.frame_rate / motion.n_frames / 1000)
 
 
-def _error(target: Target, comparison: Any) -> float:
+def _error(target: Target, comparison: Comparison) -> float:
     name = target.name.replace("_error_cm", "_position_error_cm")
     value = getattr(comparison, name)
     if value is None:

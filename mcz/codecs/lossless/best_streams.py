@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +133,7 @@ def read_links(data: bytes, n_coded: int) -> tuple[list[Link], int]:
 
 
 @cache
-def loops() -> tuple[Any, Any]:
+def loops() -> tuple[ModuleType, ModuleType]:
     from mcz.codecs.lossless import best_kernels
     from mcz.coding import mixing
 

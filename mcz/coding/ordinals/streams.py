@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,7 +143,7 @@ def in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, bytes,
 
 
 @cache
-def loops() -> tuple[Any, Any]:
+def loops() -> tuple[ModuleType, ModuleType]:
     from mcz.coding import mixing
     from mcz.coding.ordinals import kernels
 

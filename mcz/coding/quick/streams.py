@@ -9,7 +9,8 @@ import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
+
+if TYPE_CHECKING:
+    from mcz.coding.quick.kernels import Tables
 
 Ints = NDArray[np.int64]
 
@@ -61,7 +65,7 @@ def channels_of(grids: Iterable[Grid]) -> Channels:
 
 
 @cache
-def loops() -> tuple[Any, Any, Any, Any]:
+def loops() -> tuple[ModuleType, ModuleType, ModuleType, ModuleType]:
     """The compiled loops, imported on first use: of values, of streams; of an encoder."""
     from mcz.coding.quick import choice_kernels, kernels, record_kernels, stream_kernels
 
@@ -69,7 +73,7 @@ def loops() -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def tables() -> Any:
+def tables() -> Tables:
     """The distributions that all streams have."""
     from mcz.coding.quick import tables
 
