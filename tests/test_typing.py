@@ -48,3 +48,14 @@ def test_a_checker_sees_types_and_finds_mistakes(tmp_path: Path) -> None:
     found[-1] = found[-1].partition(" (")[0]
     text = "\n".join(found).replace("builtins.", "").replace("typing.", "")
     assert text == SEEN.strip(), done.stdout + done.stderr
+
+
+def test_the_script_of_a_user_runs_and_is_sound(tmp_path: Path) -> None:
+    """.ci/full checks it against the installed wheel, by pyright as well."""
+    script = Path(__file__).parent / "typing/user_script.py"
+    (tmp_path / "walks").mkdir()
+    checked = [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", script]
+    for command in (checked, [sys.executable, script, tmp_path / "walks"]):
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "walks.mcz").stat().st_size > 0
