@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mcz.errors import MotionError
-from mcz.types import Values
+from mcz.types import Items
 
 
 class Rule(NamedTuple):
@@ -140,7 +140,7 @@ def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
     A masked array counts as one only where nothing is masked.
     """
 
-    def form(value: Any) -> Values:
+    def form(value: Any) -> Items:
         if np.ma.is_masked(value):
             raise ValueError
         array = np.asarray(value)
@@ -153,7 +153,7 @@ def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
     return Rule(words, form)
 
 
-def plain(array: Values) -> Values:
+def plain(array: Items) -> Items:
     """``array`` in the byte order of the machine, aligned and in C order; itself if it is."""
     flags = array.flags
     if array.dtype.isnative and flags.c_contiguous and flags.aligned:

@@ -61,6 +61,7 @@ from mcz.skeleton import Vector as Vector
 from mcz.skeleton import joint_columns as joint_columns
 from mcz.source import FrameNotes as FrameNotes
 from mcz.source import Source as Source
+from mcz.types import Values
 
 
 def frame_rate_of(rate: Any, name: str) -> Fraction:
@@ -133,7 +134,7 @@ class Motion:
             raise MotionError(f"a number step of {self.number_step}", clip=self.name)
 
     @property
-    def values(self) -> NDArray[np.float64]:
+    def values(self) -> Values:
         """The motion signal, (n_frames, n_channels), NaN where invalid."""
         return self.signals[0].masked()
 

@@ -272,7 +272,7 @@ class Signal:
             ordinals[rows, columns], exact[rows, columns] = found, on_grid
         return ordinals, exact
 
-    def masked(self) -> NDArray[np.float64]:
+    def masked(self) -> Values:
         """The values with NaN where the mask says invalid."""
         if self.mask is None:
             return self.values

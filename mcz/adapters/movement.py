@@ -15,7 +15,7 @@ from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.numbers import Grid, GridKind
 from mcz.poses import point_names, positions
 from mcz.reading.source_files import with_facts
-from mcz.types import JsonObject, Values
+from mcz.types import JsonObject, Reals, Values
 from mcz.units import UNIT_CM
 
 Floats = NDArray[np.float64]
@@ -126,11 +126,11 @@ def _grid_of(names: tuple[str, ...], name: str) -> tuple[list[str], list[str]]:
     return [name], list(names)
 
 
-def _confidence(motion: Motion, places: Floats) -> Floats:
+def _confidence(motion: Motion, places: Reals) -> Floats:
     """Of every point in every frame."""
     for signal in motion.signals[1:]:
         if signal.name == CONFIDENCE and signal.n_channels == places.shape[1] * places.shape[2]:
-            return signal.masked()
+            return np.asarray(signal.masked(), np.float64)
     return np.asarray(np.isfinite(places).all(axis=3), np.float64)
 
 

@@ -46,7 +46,7 @@ def missing() -> list[str]:
 def measure(loaded: Loaded) -> list[Record]:
     """One record a peer and what it codes; zfp also with bounds on the error of a value."""
     motion = loaded.motion
-    values = motion.signals[0].masked()
+    values = np.asarray(motion.signals[0].masked(), np.float64)
     if motion.signals[0].channels is None:
         values = unwrap(values, motion.skeleton)
     matrix = np.ascontiguousarray(np.nan_to_num(values), np.float32)

@@ -158,7 +158,7 @@ def _values(
     return clip.read_masked(given.frames, given.joints, resolution, signal=signal)
 
 
-def _part(clip: str, signal: str, array: str, values: Values) -> Part:
+def _part(clip: str, signal: str, array: str, values: Values | NDArray[np.bool_]) -> Part:
     if values.dtype == np.bool_:
         dtype, data = "u1", values.astype("u1").tobytes()
     elif values.dtype == np.int64:

@@ -95,7 +95,8 @@ class Part:
             times = timeline.samples(per_frame)[start * per_frame : stop * per_frame]
         if self.decimate:
             step = 2**self.resolution
-            values, mask = (decimated_rows(rows, per_frame, step) for rows in (values, mask))
+            values = decimated_rows(values, per_frame, step)
+            mask = decimated_rows(mask, per_frame, step)
             numbers, rate = numbers[::step], rate and rate / step
             if times is not None:
                 times = decimated_rows(times[:, None], per_frame, step)[:, 0]

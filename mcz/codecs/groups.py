@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
-from typing import Any
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import SignalSource
 from mcz.motion import Joint, Skeleton
 from mcz.numbers import Grid
-from mcz.types import Values
+
+Item = TypeVar("Item", bound=np.generic)
+Read = Callable[[int, int], NDArray[Item]]  # frames first <= f < stop
 
 
 class Part:
@@ -51,12 +53,12 @@ class Part:
     def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
         if self._source.valid(0, 0) is None:
             return None
-        return self._held(self._source.valid, start, stop)
+        return self._held(cast("Read[np.bool_]", self._source.valid), start, stop)
 
-    def _held(self, read: Callable[[int, int], Any], start: int, stop: int) -> Values:
+    def _held(self, read: Read[Item], start: int, stop: int) -> NDArray[Item]:
         """What ``read`` gives of these columns, the last frame again and again behind the end."""
         end = self._n_read
-        found: Values = read(min(start, end), min(stop, end))[:, self._columns]
+        found = read(min(start, end), min(stop, end))[:, self._columns]
         missing = stop - max(start, end)
         if missing <= 0:
             return found

@@ -24,7 +24,7 @@ def to_c3d(motion: Motion) -> Motion:
     if made is motion or unit_cm is None:
         return replace(made, metadata=motion.metadata)
     with np.errstate(over="ignore"):
-        values = made.signals[0].values * (unit_cm * MM_PER_CM)
+        values = np.asarray(made.signals[0].values, np.float64) * (unit_cm * MM_PER_CM)
     if np.isinf(values).any():
         raise MotionError("a position in mm is beyond float64", clip=motion.name)
     signal = replace(made.signals[0], values=values)

@@ -15,9 +15,9 @@ from threading import Lock
 import numpy as np
 
 from mcz.errors import AccessError, OptionError, reason_of
-from mcz.types import Values
+from mcz.types import Reals
 
-Arrays = Mapping[str, Values]
+Arrays = Mapping[str, Reals]
 UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 UNITS |= {f"{letter}IB": 2 ** (10 * (n + 1)) for n, letter in enumerate("KMGT")}
 

@@ -19,7 +19,7 @@ from mcz.poses.conversions import from_matrices
 from mcz.poses.moving import joint_numbers, scale_to
 from mcz.poses.places import chosen_points, point_names
 from mcz.skeleton import Joints, joint_columns
-from mcz.types import Values
+from mcz.types import Reals
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +213,7 @@ def features_of(
     rows: Rows,
     margins: tuple[int, int],
     dtype: DTypeLike,
-) -> dict[str, Values]:
+) -> dict[str, Reals]:
     """The arrays of frames, of whose ``rows`` there are ``margins`` more before and after."""
     values, steps = rows
     first, last = margins

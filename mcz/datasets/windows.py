@@ -23,7 +23,7 @@ from mcz.errors import OptionError, OutOfRangeError
 from mcz.indexing import row_numbers
 from mcz.poses.conversions import continuous
 from mcz.reading.file import File
-from mcz.types import JsonObject, Values
+from mcz.types import JsonObject, Reals
 
 RUNS_SHARE = 4  # a quarter of the cache is for frames as they were decoded
 RUN_BLOCKS = 6  # of windows that stay together until a pool is shuffled
@@ -177,7 +177,7 @@ class Dataset:
         start = (number - before) * self._settings.stride
         return member, start, start + self._settings.window
 
-    def __getitem__(self, index: Any) -> dict[str, Values]:
+    def __getitem__(self, index: Any) -> dict[str, Reals]:
         """One window, or a batch of those that ``index`` chooses, as NumPy indexes an axis.
 
         A slice, a list, an array of integers or a mask gives arrays (n, window, ...); an array of
@@ -196,15 +196,15 @@ class Dataset:
         batch = self._batch(numbers.ravel().tolist())
         return {name: a.reshape(*numbers.shape, *a.shape[1:]) for name, a in batch.items()}
 
-    def __iter__(self) -> Iterator[dict[str, Values]]:
+    def __iter__(self) -> Iterator[dict[str, Reals]]:
         return (self[index] for index in range(len(self)))
 
-    def _batch(self, numbers: Sequence[int]) -> dict[str, Values]:
+    def _batch(self, numbers: Sequence[int]) -> dict[str, Reals]:
         if self._settings.window is None:
             raise OptionError("whole clips differ in length and make no batch; give a window=")
         shape = len(numbers), self._settings.window
         shapes = self.shapes if not numbers else None
-        out: dict[str, Values] = {}
+        out: dict[str, Reals] = {}
         for row, number in enumerate(numbers):
             for name, parts in self._parts(*self._place(number)).items():
                 if name not in out:
@@ -216,21 +216,21 @@ class Dataset:
             return {name: np.empty((*shape, *rest), dtype) for name, rest in shapes.items()}
         return out
 
-    def _arrays(self, member: Member, start: int, stop: int) -> dict[str, Values]:
+    def _arrays(self, member: Member, start: int, stop: int) -> dict[str, Reals]:
         parts = self._parts(member, start, stop)
         arrays = {name: np.concatenate(each) for name, each in parts.items()}
         for name, array in arrays.items():
             self._finish(name, array)
         return arrays
 
-    def _finish(self, name: str, array: Values) -> None:
+    def _finish(self, name: str, array: Reals) -> None:
         """Give quaternions the signs that keep them together, whichever blocks they are from."""
         if FIELDS[name].signed:
-            array[:] = continuous(array)
+            array[:] = continuous(np.asarray(array, np.float64))
 
-    def _parts(self, member: Member, start: int, stop: int) -> dict[str, list[Values]]:
+    def _parts(self, member: Member, start: int, stop: int) -> dict[str, list[Reals]]:
         """The arrays of frames of a clip as parts of blocks, which nobody may change."""
-        parts: dict[str, list[Values]] = {name: [] for name in self.fields}
+        parts: dict[str, list[Reals]] = {name: [] for name in self.fields}
         first = start // BLOCK
         for number in range(first, max(first + 1, -(-stop // BLOCK))):
             at = number * BLOCK
@@ -320,13 +320,13 @@ class Dataset:
         # Segments reach beyond the ends of a run: two thirds of what is decoded is of use.
         return min(kept, int(decoded // (8 * max(1, n_channels))) * 2 // 3)
 
-    def shuffled(self, seed: int, epoch: int = 0) -> Iterator[dict[str, Values]]:
+    def shuffled(self, seed: int, epoch: int = 0) -> Iterator[dict[str, Reals]]:
         """The windows in the ``order`` of an epoch."""
         return (self[int(index)] for index in self.order(seed, epoch))
 
     def batches(
         self, size: int, *, seed: int | None = None, epoch: int = 0, drop_last: bool = False
-    ) -> Iterator[dict[str, Values]]:
+    ) -> Iterator[dict[str, Reals]]:
         """Batches of ``size`` windows, in the ``order`` of an epoch or, seed None, as they come.
 
         The last one is smaller where they do not come out even, unless ``drop_last``.

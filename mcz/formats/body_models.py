@@ -23,7 +23,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.formats.body_trees import has_tree, tree
-from mcz.types import Values
+from mcz.types import Items
 
 Floats = NDArray[np.float64]
 
@@ -175,7 +175,7 @@ class _Model:
     def has(self, name: str) -> bool:
         return f"{name}.npy" in self.names
 
-    def array(self, name: str) -> Values:
+    def array(self, name: str) -> Items:
         """The numbers of a member; raises SourceError for one that is not there or is no such."""
         where = f"{self.file}: {name}"
         if not self.has(name):

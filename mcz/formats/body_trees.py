@@ -24,7 +24,7 @@ from mcz.motion import (
     Joint,
     Skeleton,
 )
-from mcz.types import Values
+from mcz.types import Items
 
 ANNEX = "body_trees.json"
 METER_CM = 100.0
@@ -80,7 +80,7 @@ def _trees() -> dict[str, BodyTree]:
 
 def body_skeleton(
     body: BodyTree | str | int,
-    offsets: Values | None = None,
+    offsets: Items | None = None,
     *,
     turns: str = "rotvec",
     moves: bool = True,

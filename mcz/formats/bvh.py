@@ -12,7 +12,6 @@ from dataclasses import replace
 from itertools import chain, islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
 from mcz.formats.hierarchy import read_hierarchy, write_hierarchy
@@ -24,6 +23,7 @@ from mcz.formats.rows import Token, line_of, read_rows, tail_end
 from mcz.formats.signals import read_signal
 from mcz.formats.text_source import check_text, source_of, text_encoding
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
+from mcz.types import Values
 
 _FRAMES = re.compile(rb"\s*Frames\s*:\s*([^\s]+)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*Frame\s+Time\s*:\s*([^\s]+)", re.IGNORECASE)
@@ -163,7 +163,7 @@ class _Frames:
         return ([], line_end) if line_end and not self.n_columns else None
 
 
-def with_positions(joints: Sequence[Joint], values: NDArray[np.float64]) -> tuple[Joint, ...]:
+def with_positions(joints: Sequence[Joint], values: Values) -> tuple[Joint, ...]:
     """The joints, with what their position channels do to the offset.
 
     BVH does not say it, and programs differ, so the values decide: positions replace the offset

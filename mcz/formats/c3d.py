@@ -34,7 +34,7 @@ from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton,
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.numbers.scaling import Scaling
-from mcz.types import Values
+from mcz.types import Items, Values
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54}
 POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
@@ -124,7 +124,7 @@ def _scale(data: bytes, parameters: Parameters) -> tuple[float, str]:
     return 1.0, "no scale that can be used: coordinates are the integers of the file"
 
 
-def _words(data: bytes, parameters: Parameters, shape: Shape) -> Values:
+def _words(data: bytes, parameters: Parameters, shape: Shape) -> Items:
     """The data section, a row a frame."""
     kind = "i2" if shape.word == 2 else "u4"
     n_words = shape.n_frames * shape.frame_words
@@ -191,7 +191,7 @@ def _other_signals(
 
 def _signal(
     name: str,
-    words: Values,
+    words: Items,
     grid: Grid,
     channels: tuple[Channel, ...] | None = None,
     per_frame: int = 1,

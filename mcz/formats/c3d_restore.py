@@ -19,7 +19,7 @@ from mcz.formats.c3d_parameters import BLOCK, Order
 from mcz.formats.c3d_shape import COUNTED, ROTATION_WORDS
 from mcz.motion import Motion, Signal, Source
 from mcz.numbers import Grid, GridKind
-from mcz.types import Values
+from mcz.types import Items, Values
 
 INTEGERS = (GridKind.SCALED, GridKind.INTEGER)
 
@@ -103,7 +103,7 @@ def _section(motion: Motion, layout: Layout) -> bytes:
     return words.tobytes()
 
 
-def _fill_points(words: Values, motion: Motion, layout: Layout) -> None:
+def _fill_points(words: Items, motion: Motion, layout: Layout) -> None:
     """The words of all points, which are the first of each row."""
     parts = _parts(motion, layout)
     if not layout.n_points:
@@ -191,7 +191,7 @@ def valid_points(signal: Signal) -> NDArray[np.bool_] | None:
     return valid
 
 
-def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> Values:
+def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> Items:
     """The words of a signal, (rows, channels), in the byte order of the file."""
     grids = (*signal.grids, *(grid for _, _, grid in signal.grid_changes))
     kinds = {grid.kind for grid in grids}
@@ -200,7 +200,7 @@ def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> Values:
         names = " or ".join(kind.name for kind in wanted)
         raise FormatError(f"source template: signal {signal.name!r} is not on a grid {names}")
     integral = signal.values.dtype == np.int64
-    ordinals = signal.values if integral else signal.to_ordinals()[0]  # C3D-15
+    ordinals = signal.values.astype(np.int64) if integral else signal.to_ordinals()[0]  # C3D-15
     if layout.word == 4:
         return layout.order.grid.bits(ordinals).astype(f"{layout.order.prefix}u4")
     low, high = (0, 0xFFFF) if unsigned else (-0x8000, 0x7FFF)  # C3D-15

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mcz.errors import FormatError
 from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind, scan
+from mcz.types import Values
 
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
@@ -85,9 +86,7 @@ class Cells:
             sizes[block, columns] = np.diff(texts.offsets)[inverse].reshape(shape)
             self._append(texts.buffer)
 
-    def _print(
-        self, grid: Grid, values: NDArray[np.float64], rows: slice, columns: Columns
-    ) -> None:
+    def _print(self, grid: Grid, values: Values, rows: slice, columns: Columns) -> None:
         """Print values by the nearest number of their grid, by repr where they lie beyond it."""
         if not grid.is_text:
             grid = SHORTEST  # GRID-07

@@ -10,6 +10,8 @@ import re
 from dataclasses import dataclass
 from itertools import accumulate
 
+import numpy as np
+
 from mcz.errors import SourceError
 from mcz.formats.csv_text import check_points
 from mcz.formats.rows import line_of
@@ -74,7 +76,7 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
         ),
         angle_unit={"yes": "deg", "no": "rad"}.get(header.values.get("indegrees", "").lower(), ""),
     )
-    times = signal.values[:, 0]
+    times = np.asarray(signal.values[:, 0], np.float64)
     tokens = scan(data, rows.start[:, 0], rows.stop[:, 0])
     stated = stated_rate(header.values.get("datarate", ""))
     digits = half_digits_of(data, rows.stop[:, 0], tokens)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mcz.types import Values
+from mcz.types import Items
 
-Moved = list[tuple[Values, Values]]  # what was given, what was taken for it
+Moved = list[tuple[Items, Items]]  # what was given, what was taken for it
 SOUND = 0x1 | 0x100  # flags of an array: contiguous, aligned
 WRITEABLE = 0x400
 
@@ -22,7 +22,7 @@ def fit(
     dense: bool,
     is_written: bool,
     moved: Moved,
-) -> Values:
+) -> Items:
     """``given`` with this dtype and number of axes, aligned, contiguous where ``dense``.
 
     It is copied where it is not so. A copy of an array that the kernel writes is noted in

@@ -212,7 +212,7 @@ class LiveReader:
                     self.clip = clip = now
                     stage = self._stage()
                 waiting.append(frame)
-                row = stage.push(frame.values)
+                row = stage.push(np.asarray(frame.values, np.float64))
                 if row is not None:
                     yield _with_values(waiting.popleft(), row)
         except FormatError:

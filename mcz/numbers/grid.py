@@ -24,7 +24,7 @@ from mcz.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
 from mcz.numbers.tokens import NAN, TENS, Bools, Floats, Ints, Texts, Tokens, nearest
 from mcz.schema import FINITE, Adapted, Record
 from mcz.schema import field as record_field
-from mcz.types import Values
+from mcz.types import Items, Values
 
 MAX = np.finfo(np.float64).max
 _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
@@ -74,17 +74,17 @@ class Grid:
         """The largest magnitude index; ordinals run from -1 - limit (or -limit) to limit."""
         return rules.limit(self.kind, self.digits, self.style)
 
-    def magnitudes(self, ordinals: Ints) -> Ints:
+    def magnitudes(self, ordinals: Values) -> Ints:
         """Magnitude indices; FormatError for an ordinal that is no number's."""
-        ordinals = np.ascontiguousarray(ordinals, np.int64)
+        whole: Ints = np.ascontiguousarray(ordinals, np.int64)
         limit = self.limit
         low = -1 - limit if self.signed_magnitude else -limit
-        if ordinals.size and not (low <= ordinals.min() and ordinals.max() <= limit):  # GRID-05
-            wrong = ordinals.max() if ordinals.max() > limit else ordinals.min()
+        if whole.size and not (low <= whole.min() and whole.max() <= limit):  # GRID-05
+            wrong = whole.max() if whole.max() > limit else whole.min()
             raise FormatError(f"{wrong} is not an ordinal of {self}: {low} to {limit}")
-        return ordinals ^ (ordinals >> 63) if self.signed_magnitude else np.abs(ordinals)
+        return whole ^ (whole >> 63) if self.signed_magnitude else np.abs(whole)
 
-    def values(self, ordinals: Ints) -> Floats:
+    def values(self, ordinals: Values) -> Floats:
         """The binary64 of each ordinal; every NaN is 0x7FF8000000000000."""
         ordinals = np.ascontiguousarray(ordinals, np.int64)
         magnitudes = self.magnitudes(ordinals)
@@ -112,7 +112,7 @@ class Grid:
         np.negative(values, where=negative & (values == values), out=values)  # GRID-09
         return values
 
-    def ordinals(self, values: Floats) -> tuple[Ints, Bools]:
+    def ordinals(self, values: Values) -> tuple[Ints, Bools]:
         """The ordinal of each value, and whether ``values`` gives exactly these bits back.
 
         Where the grid does not have a value: the ordinal of a nearest one, the last one beyond
@@ -153,7 +153,7 @@ class Grid:
             case _:
                 return scaled_magnitudes(values, self.scale, True, self.limit)
 
-    def bits(self, ordinals: Ints) -> Values:
+    def bits(self, ordinals: Values) -> Items:
         """The words of a BINARY32, BINARY64 or VAX_F grid as a file stores them, "<u4" or "<u8"."""
         wide = self._word_type() == "<u8"
         sign = np.int64(-(2**63)) if wide else np.int64(2**31)
@@ -162,7 +162,7 @@ class Grid:
             words = vax_swap(words)
         return words.view("<u8") if wide else words.astype("<u4")
 
-    def ordinals_of_bits(self, words: Values) -> Ints:
+    def ordinals_of_bits(self, words: Items) -> Ints:
         """The inverse of ``bits``: words as stored, read as little-endian u4 or u8."""
         kind = self._word_type()
         words = np.ascontiguousarray(words, kind)

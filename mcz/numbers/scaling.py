@@ -56,7 +56,7 @@ class Scaling:
             scaled: Floats = moved * self.scales[channels] * self.general
         return scaled
 
-    def stored(self, values: Floats, numbers: Values) -> Values:
+    def stored(self, values: Values, numbers: Values) -> Values:
         """The stored numbers that mean ``values``: ``numbers``, but where a value is another.
 
         What is new is the number that means it or, among integers, the nearest one; NaN or 0 where

@@ -15,19 +15,20 @@ from mcz.numbers.grid import Grid
 from mcz.numbers.magnitudes import POWERS
 from mcz.numbers.rules import MIN_POWER, GridKind
 from mcz.numbers.tokens import TENS, Bools, Floats, Ints
+from mcz.types import Values
 
 
 def values_of(
-    ordinals: Ints,
+    ordinals: Values,
     grids: Sequence[Grid],
     changes: Sequence[tuple[int, int, Grid]] = (),
-    out: Floats | None = None,
+    out: Values | None = None,
 ) -> Floats:
     """The binary64 of each ordinal, (rows, channels); see ``Signal.grid_changes``.
 
     As ``Grid.values`` gives them, and refuses them. They go to ``out`` where that is given.
     """
-    values = np.empty(ordinals.shape) if out is None else out
+    values = np.empty(ordinals.shape) if out is None else np.asarray(out, np.float64)
     if not changes and ordinals.flags.c_contiguous:
         left = np.ones(len(grids), np.int64)
         if not lacks_compiled_kernels():
@@ -41,7 +42,7 @@ def values_of(
     return values
 
 
-def ordinals_of(values: Floats, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
+def ordinals_of(values: Values, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
     """The ordinal of each value, (rows, channels), and whether it gives exactly this value back.
 
     As ``Grid.ordinals`` finds them.

@@ -11,6 +11,7 @@ from mcz.kinematics.chain import Floats
 from mcz.motion import Motion
 from mcz.poses import positions
 from mcz.poses.moving import Moving
+from mcz.types import Reals
 
 CELLS = 48  # of a line: as many segments are decoded at most
 BLOCK = 2**19  # numbers that are worked on at a time
@@ -72,7 +73,7 @@ def _sampled(moving: Moving, edges: Any) -> Floats:
     return speeds
 
 
-def _steps(places: Floats) -> Floats:
+def _steps(places: Reals) -> Floats:
     """The mean step of all points from each frame to the next, (n_frames - 1,)."""
     moved = np.sqrt((np.diff(places, axis=0) ** 2).sum(axis=2))
     known = np.isfinite(moved)

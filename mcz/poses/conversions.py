@@ -15,7 +15,7 @@ from mcz.kinematics.rotation_vectors import (
     quaternions_of_matrices,
     vectors_of_quaternions,
 )
-from mcz.types import Values
+from mcz.types import Reals
 
 # What each representation adds to the shape of an array of rotations.
 FORMS = {"matrix": (3, 3), "quat": (4,), "rotvec": (3,), "6d": (6,), "euler": (3,)}
@@ -101,21 +101,21 @@ def _euler_angles(quaternions: Floats, order: str) -> Floats:
     return np.stack([ends[first], second, ends[third]], axis=1)
 
 
-def to_matrices(values: Values, form: str, order: str = "XYZ") -> Floats:
+def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
     """The inverse of ``from_matrices``: (..., *FORMS[form]) to (..., 3, 3).
 
     Quaternions may have any length but 0; of 6D vectors the second is made orthogonal to the first.
     Raises OptionError where the shape does not fit.
     """
     check_form(form)
-    values = np.asarray(values, np.float64)
+    given: Floats = np.asarray(values, np.float64)
     tail = FORMS[form]
-    if values.shape[-len(tail) :] != tail:
-        raise OptionError(f"rotations as {form!r} of shape {values.shape}: ends in {tail}")
+    if given.shape[-len(tail) :] != tail:
+        raise OptionError(f"rotations as {form!r} of shape {given.shape}: ends in {tail}")
     if form == "matrix":
-        return values
-    lead = values.shape[: -len(tail)]
-    flat = values.reshape(-1, *tail)
+        return given
+    lead = given.shape[: -len(tail)]
+    flat = given.reshape(-1, *tail)
     if form == "6d":
         return _from_6d(flat).reshape(*lead, 3, 3)
     if form == "euler":

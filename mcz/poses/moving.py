@@ -14,7 +14,7 @@ from mcz.errors import OptionError
 from mcz.kinematics.chain import Floats
 from mcz.motion import Motion, Skeleton, check_poses
 from mcz.skeleton import Joints, joint_columns, joint_list
-from mcz.types import Values
+from mcz.types import Reals, Values
 from mcz.units import unit_cm_of
 
 Frames = tuple[int, int] | slice | None
@@ -126,7 +126,7 @@ def signal_of(moving: Moving, signal: int | str) -> Any:
     return moving.signals[signal]
 
 
-def as_type(values: Values, dtype: DTypeLike) -> Values:
+def as_type(values: Reals, dtype: DTypeLike) -> Reals:
     """``values`` as float64 or float32; raises OptionError for another type."""
     wanted = np.dtype(dtype)
     if wanted not in (np.float64, np.float32):

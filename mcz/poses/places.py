@@ -27,7 +27,7 @@ from mcz.poses.moving import (
     values_of,
 )
 from mcz.skeleton import Joints, joint_list
-from mcz.types import Values
+from mcz.types import Reals
 
 
 def point_names(moving: Moving | Skeleton, joints: Joints = None) -> tuple[str, ...]:
@@ -68,7 +68,7 @@ def positions(
     *,
     unit: str | None = None,
     dtype: DTypeLike = np.float64,
-) -> Values:
+) -> Reals:
     """Where the points of a Motion or Clip are in the world, (n_frames, n_points, 3).
 
     ``joints`` by index or name, or points by the names of ``point_names``; None: all points, those
@@ -96,7 +96,7 @@ def velocities(
     *,
     unit: str | None = None,
     dtype: DTypeLike = np.float64,
-) -> Values:
+) -> Reals:
     """How fast the points move, (n_frames, n_points, 3), in length units (or ``unit``) a second.
 
     Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate where these are
@@ -116,7 +116,7 @@ def accelerations(
     *,
     unit: str | None = None,
     dtype: DTypeLike = np.float64,
-) -> Values:
+) -> Reals:
     """How the velocity of the points changes, in length units (or ``unit``) a second squared.
 
     (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or beside a gap that of
@@ -164,14 +164,14 @@ class Root:
     """
 
     joint: str
-    positions: Values
-    rotations: Values
+    positions: Reals
+    rotations: Reals
     up_axis: str
 
     __repr__ = brief
 
     @property
-    def headings(self) -> Values:
+    def headings(self) -> Reals:
         """How far the root is turned about the axis that points up, (n_frames,), in radians.
 
         0 in the rest pose, continuous over turns: the twist of the rotation. Raises OptionError

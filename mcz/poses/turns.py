@@ -10,7 +10,7 @@ from mcz.kinematics.frames import frame_poses_of
 from mcz.poses.conversions import check_form, check_order, from_matrices
 from mcz.poses.moving import Frames, Moving, as_type, frame_range, joint_numbers, values_of
 from mcz.skeleton import Joints
-from mcz.types import Values
+from mcz.types import Reals
 
 SPACES = ("local", "world")
 
@@ -25,7 +25,7 @@ def rotations(
     order: str = "XYZ",
     degrees: bool = False,
     dtype: DTypeLike = np.float64,
-) -> Values:
+) -> Reals:
     """How the joints of a Motion or Clip are turned, (n_frames, n_joints, ...).
 
     ``form``: "quat" (..., 4), w first, unit length, signs continuous; "matrix" (..., 3, 3);

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcz.clock import numbers_or_rows
 from mcz.motion import Exceptions, FrameNotes, Motion, Signal
-from mcz.types import Values
 
+Item = TypeVar("Item", bound=np.generic)
 JoinNotes = Callable[[Sequence[tuple[int, int, bytes]]], FrameNotes]
 
 
-def decimated_rows(values: Values, samples_per_frame: int, step: int) -> Values:
+def decimated_rows(values: NDArray[Item], samples_per_frame: int, step: int) -> NDArray[Item]:
     """The rows of frames 0, step, 2 * step, ...; ``values`` has samples_per_frame rows a frame."""
     if samples_per_frame == 1:
         return values[::step]
@@ -51,15 +52,15 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
         if frame < n_frames:
             changes[frame * per_frame, channel] = grid
 
-    def thin(values: Values | None) -> Any:
-        return None if values is None else decimated_rows(values, per_frame, step)
+    def thin(values: NDArray[Item]) -> NDArray[Item]:
+        return decimated_rows(values, per_frame, step)
 
     return replace(
         signal,
         values=thin(signal.values),
         stored=thin(signal.stored),
-        mask=thin(signal.mask),
-        ordinals=thin(signal.ordinals),
+        mask=None if signal.mask is None else thin(signal.mask),
+        ordinals=None if signal.ordinals is None else thin(signal.ordinals),
         exceptions=Exceptions(
             frames[kept] // step * per_frame + samples[kept],
             signal.exceptions.channels[kept],

@@ -9,7 +9,7 @@ from numpy.typing import DTypeLike
 
 from mcz.displays import html_of
 from mcz.skeleton import Joints, joint_list
-from mcz.types import Values
+from mcz.types import Reals
 
 if TYPE_CHECKING:
     from mcz.kinematics.contacts import ContactRule, Contacts
@@ -50,7 +50,7 @@ class Posed:
         *,
         unit: str | None = None,
         dtype: DTypeLike = np.float64,
-    ) -> Values:
+    ) -> Reals:
         """Where the points are, (n_frames, n_points, 3): see ``mcz.positions``."""
         from mcz.poses import places
 
@@ -66,7 +66,7 @@ class Posed:
         order: str = "XYZ",
         degrees: bool = False,
         dtype: DTypeLike = np.float64,
-    ) -> Values:
+    ) -> Reals:
         """How the joints are turned, (n_frames, n_joints, ...): see ``mcz.rotations``."""
         from mcz.poses import turns
 
@@ -101,7 +101,7 @@ class Posed:
         *,
         unit: str | None = None,
         dtype: DTypeLike = np.float64,
-    ) -> Values:
+    ) -> Reals:
         """How fast the points move, (n_frames, n_points, 3): see ``mcz.velocities``."""
         from mcz.poses import places
 
@@ -114,7 +114,7 @@ class Posed:
         *,
         unit: str | None = None,
         dtype: DTypeLike = np.float64,
-    ) -> Values:
+    ) -> Reals:
         """How velocities change, (n_frames, n_points, 3): see ``mcz.accelerations``."""
         from mcz.poses import places
 

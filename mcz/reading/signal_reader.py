@@ -94,9 +94,8 @@ class SignalReader:
             return self._salvage(self._prepare(start, stop), start, stop)
         self._check_size(start, stop)
         per_frame = self.info.layout.samples_per_frame
-        values = np.empty(
-            self._shape(start, stop), np.int64 if self.info.is_integer else np.float64
-        )
+        kind = np.int64 if self.info.is_integer else np.float64
+        values: Values = np.empty(self._shape(start, stop), kind)
         mask: NDArray[np.bool_] | None = None
         near = ordinals is None and not self.container.reads_parts
         for block in (self._near if near else self.blocks)(start, stop, values):

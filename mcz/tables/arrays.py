@@ -8,7 +8,7 @@ from mcz.errors import MotionError
 from mcz.kinematics.frames import frame_poses_of
 from mcz.motion import Motion
 from mcz.poses import point_names, positions, rotations
-from mcz.types import Values
+from mcz.types import Items
 
 ABOUT = (
     "MCZ arrays 1. World rotation of joint j in frame f: W[f, j] = W[f, parents[j]] R(quaternions"
@@ -21,13 +21,13 @@ ABOUT = (
 )
 
 
-def pose_arrays(motion: Motion) -> dict[str, Values]:
+def pose_arrays(motion: Motion) -> dict[str, Items]:
     """Skeleton, rotations, translations and positions of a motion, by name; see ``ABOUT``.
 
     Rotations and places are left out where the skeleton has no kinematics.
     """
     skeleton = motion.skeleton
-    known: dict[str, Values] = {
+    known: dict[str, Items] = {
         "about": np.array(ABOUT),
         "name": np.array(motion.name),
         "joint_names": np.array(skeleton.joint_names, np.str_),
@@ -45,7 +45,7 @@ def pose_arrays(motion: Motion) -> dict[str, Values]:
         return known
 
 
-def _poses(motion: Motion) -> dict[str, Values]:
+def _poses(motion: Motion) -> dict[str, Items]:
     skeleton = motion.skeleton
     poses = frame_poses_of(skeleton)
     points = positions(motion)

@@ -11,7 +11,7 @@ from mcz.poses import accelerations, point_names, positions, rotations, velociti
 from mcz.skeleton import Joints
 from mcz.tables.files import channel_names
 from mcz.tables.labelled import COMPONENTS, row_times
-from mcz.types import Values
+from mcz.types import Items
 
 PLACES = {"positions": positions, "velocities": velocities, "accelerations": accelerations}
 
@@ -65,7 +65,7 @@ def _pairs(names: tuple[str, ...], components: list[str]) -> list[tuple[str, str
 
 
 def _table(
-    pandas: Any, motion: Motion, signal: Signal, array: Values, names: Any, flat: bool
+    pandas: Any, motion: Motion, signal: Signal, array: Items, names: Any, flat: bool
 ) -> Any:
     columns = names
     if names and isinstance(names[0], tuple):

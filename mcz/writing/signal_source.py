@@ -22,7 +22,7 @@ from mcz.formats import recording_of
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind, values_of_texts
 from mcz.schema import build
-from mcz.types import Params, Values
+from mcz.types import Params
 
 KEPT_BLOCKS = 8
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
@@ -68,8 +68,8 @@ class MemorySource:
     def grids(self, frame: int) -> tuple[Grid, ...]:
         return self.signal.cut(frame, frame).grids
 
-    def values(self, start: int, stop: int) -> Values:
-        return self.signal.cut(start, stop).values
+    def values(self, start: int, stop: int) -> NDArray[np.float64]:
+        return self.signal.cut(start, stop).values.astype(np.float64, copy=False)
 
     def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
         return self.signal.cut(start, stop).mask
@@ -180,7 +180,7 @@ def settle(signal: Signal) -> Block:
         inside = (signal.values >= -MAX_INTEGER) & (signal.values <= MAX_INTEGER)
         if not inside.all():
             raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
-        return signal.values, signal
+        return signal.values.astype(np.int64, copy=False), signal
     signal = replace(signal, exceptions=_holding(signal))
     ordinals, exact = signal.to_ordinals()
     exact[signal.exceptions.rows, signal.exceptions.channels] = True

@@ -41,7 +41,7 @@ from mcz.codecs.segments import (
 from mcz.codecs.steps import ratio_of
 from mcz.errors import FormatError
 from mcz.schema import Checked, Record, build, field, parse
-from mcz.types import Params, Settings, Values
+from mcz.types import Params, Reals, Settings, Values
 
 Floats = NDArray[np.float64]
 
@@ -141,7 +141,7 @@ def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, wanted: i
     return out
 
 
-def _plain(values: Values) -> Floats:
+def _plain(values: Reals | Values) -> Floats:
     return np.ascontiguousarray(values, np.float64)
 
 

@@ -27,7 +27,7 @@ from mcz.conversion.scenes.solids import (
     solid_of,
 )
 from mcz.kinematics.chain import Floats
-from mcz.types import JsonObject, Values
+from mcz.types import Items, JsonObject
 
 UBYTE, USHORT, UINT, FLOAT = 5121, 5123, 5125, 5126  # component types
 VERTICES, INDICES = 34962, 34963  # what a buffer view is for
@@ -206,7 +206,7 @@ class _Document:
         return len(self.views) - 1
 
     def _accessor(
-        self, data: Values, code: int, bounds: bool = False, view: int = 0, **more: Any
+        self, data: Items, code: int, bounds: bool = False, view: int = 0, **more: Any
     ) -> int:
         """Add rows of numbers to the last buffer view, which is number ``view``."""
         start = self.views[view]["byteOffset"]
@@ -240,6 +240,6 @@ def _material(side: str) -> JsonObject:
     }
 
 
-def _floats(values: Sequence[Any] | Values | Floats) -> list[float]:
+def _floats(values: Sequence[Any] | Items | Floats) -> list[float]:
     """Numbers as float32 has them."""
     return [float(value) for value in np.asarray(values, np.float32)]

@@ -14,7 +14,7 @@ import numpy as np
 from mcz.formats.arrays.files import Array
 from mcz.formats.body_trees import BodyTree, skeleton_of, tree
 from mcz.motion import Skeleton
-from mcz.types import Values
+from mcz.types import Items
 
 WHOLE = ("poses", "fullpose", "full_pose")  # all joints
 PLACES = ("trans", "transl")  # where the root is
@@ -36,7 +36,7 @@ class Body:
 
     skeleton: Skeleton
     n_frames: int
-    words: list[Values]
+    words: list[Items]
     places: dict[int, Sequence[int]]
 
 
@@ -120,7 +120,7 @@ def _repeated(
             yield index, range(first + at, first + stop)
 
 
-def _same(one: Values, other: Values) -> bool:
+def _same(one: Items, other: Items) -> bool:
     """Whether two arrays have the same type and the same bits."""
     if one.dtype != other.dtype or one.shape != other.shape:
         return False

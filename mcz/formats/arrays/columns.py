@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mcz.formats.arrays.header import Head
 from mcz.motion import Channel, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.types import Values
+from mcz.types import Items, Values
 
 BINARY32, BINARY64, INTEGER = (
     Grid(kind) for kind in (GridKind.BINARY32, GridKind.BINARY64, GridKind.INTEGER)
@@ -37,7 +37,7 @@ class Columns:
     ordinals: NDArray[np.int64] | None = None
 
 
-def words_of(data: bytes, head: Head) -> Values:
+def words_of(data: bytes, head: Head) -> Items:
     """The numbers of an array as they are stored, a row for each index of its first axis."""
     order = ">" if head.big_endian else "<"
     n_words = head.size // int(head.code[1:])
@@ -53,7 +53,7 @@ def file_columns(head: Head) -> NDArray[np.int64]:
     return columns.ravel(order="F" if head.by_columns else "C")
 
 
-def unfit(words: Values) -> str:
+def unfit(words: Items) -> str:
     """Why no grid holds such numbers bit for bit, "" where one does."""
     kind, size = words.dtype.kind, words.dtype.itemsize
     if kind == "b":
@@ -71,7 +71,7 @@ def unfit(words: Values) -> str:
     return ""
 
 
-def columns_of(words: Values) -> Columns:
+def columns_of(words: Items) -> Columns:
     """The columns of numbers (rows, columns) that are not ``unfit``."""
     if words.dtype.kind != "f":
         return Columns(words.astype(np.int64), (INTEGER,) * words.shape[1])
@@ -89,7 +89,7 @@ def columns_of(words: Values) -> Columns:
     return Columns(values, (grid,) * len(grids), grid.ordinals_of_bits(bits))
 
 
-def _bits(words: Values) -> Values:
+def _bits(words: Items) -> Items:
     """The bits of floats, in this machine's order."""
     plain = np.ascontiguousarray(words, words.dtype.newbyteorder("<"))
     return plain.view(f"<u{words.dtype.itemsize}")
@@ -158,5 +158,5 @@ def _ordinals(part: Columns) -> NDArray[np.int64]:
     if part.ordinals is not None:
         return part.ordinals
     if part.values.dtype == np.int64:
-        return part.values
+        return part.values.astype(np.int64, copy=False)
     return Signal(part.values, part.grids).to_ordinals()[0]

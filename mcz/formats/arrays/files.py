@@ -8,7 +8,7 @@ from mcz.errors import SourceError
 from mcz.formats.arrays.archive import Archive, Member, read_archive
 from mcz.formats.arrays.columns import unfit, words_of
 from mcz.formats.arrays.header import Head, read_head, refuse_odd
-from mcz.types import Values
+from mcz.types import Items
 
 LARGE = 1024  # bytes of an array: that a larger one is kept is said
 MAX_TEXT = 4096  # bytes of an array of text that are looked at
@@ -29,12 +29,12 @@ class Array:
     head: Head
     stop: int = 0
     kept: str = ""
-    words: Values | None = None
+    words: Items | None = None
     text: bytes = b""
     is_loud: bool = False
 
     @property
-    def numbers(self) -> Values:
+    def numbers(self) -> Items:
         """The numbers of an array that is not kept."""
         assert self.words is not None
         return self.words

@@ -15,7 +15,7 @@ from mcz.formats.arrays.body import Body, body_of
 from mcz.formats.arrays.facts import SHAPE, TIMES, facts_of, rate_of
 from mcz.formats.arrays.files import DEFLATED, STAYS, Array
 from mcz.motion import Channel, Joint, Skeleton
-from mcz.types import Values
+from mcz.types import Items
 
 MAX_PER_FRAME = 1000  # rows a frame of an array that is longer than the motion
 
@@ -25,7 +25,7 @@ class Part:
     """A signal to be: ``words`` are arrays (rows, columns), whose columns it has in order."""
 
     name: str
-    words: list[Values]
+    words: list[Items]
     per_frame: int = 1
     channels: tuple[Channel, ...] | None = None
 

@@ -17,7 +17,7 @@ from mcz.errors import FormatError, LimitError
 from mcz.formats.arrays.layout import BY_COLUMNS, TYPES, Kind, Piece, check_spans, parse_arrays
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.types import Values
+from mcz.types import Items
 
 SIZE_LIMIT = 2**26  # a file may always be that large,
 SIZE_PER_VALUE = 64  # or that large for each value of the clip
@@ -118,8 +118,8 @@ def array_words(signal: Signal, piece: Piece) -> memoryview:
     return np.ascontiguousarray(words, piece.dtype).reshape(-1).view(np.uint8).data
 
 
-def _floats(signal: Signal, values: Values, columns: Any, type_: str) -> Values:
-    """Values as floats of a type; NaNs keep the bits that a binary grid of that type has."""
+def _floats(signal: Signal, values: Items, columns: Any, type_: str) -> Items:
+    """Items as floats of a type; NaNs keep the bits that a binary grid of that type has."""
     with np.errstate(over="ignore", invalid="ignore"):
         words = values.astype(type_)  # ARRAY-14
     invalid = np.isnan(words)
@@ -148,11 +148,11 @@ def _on_grid(signal: Signal, kind: GridKind) -> NDArray[np.bool_]:
     return found
 
 
-def _integers(values: Values, kind: str, size: int) -> Values:
-    """Values as integers of a type, rounded and limited to what it holds."""
+def _integers(values: Items, kind: str, size: int) -> Items:
+    """Items as integers of a type, rounded and limited to what it holds."""
     low, high = (-(2 ** (8 * size - 1)), 2 ** (8 * size - 1) - 1) if kind == "i" else (0, 1)
     high = 2 ** (8 * size) - 1 if kind == "u" else high
     if values.dtype == np.float64:
         values = np.rint(np.where(np.isnan(values), 0, values))
-    limited: Values = np.clip(values, max(low, -WIDEST), min(high, WIDEST))  # ARRAY-14
+    limited: Items = np.clip(values, max(low, -WIDEST), min(high, WIDEST))  # ARRAY-14
     return limited.astype(f"{'u' if kind == 'b' else kind}{size}")

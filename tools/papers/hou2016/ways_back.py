@@ -42,7 +42,7 @@ def way_back(case: Case, step_cm: float | None, virtual_markers: bool) -> Record
         coded["coded_bytes"] = sizes.payload + sizes.overhead + sizes.models
     solved, _ = from_positions(seen, motion.skeleton)
     found = mcz.compare(motion, solved)
-    angles = angle_errors(motion.skeleton, motion.values, solved.values)
+    angles = angle_errors(motion.skeleton, floats_of(motion), floats_of(solved))
     return coded | {
         "seen_cm": _seen_error(places, seen) * unit,
         "cm": found.mean_position_error_cm,
@@ -51,6 +51,11 @@ def way_back(case: Case, step_cm: float | None, virtual_markers: bool) -> Record
         "channel_deg": float(np.abs(angles).mean()),
         "turn_deg": _turn_error(motion, solved),
     }
+
+
+def floats_of(motion: Motion) -> Floats:
+    """Values of a motion as binary64."""
+    return np.asarray(motion.values, np.float64)
 
 
 def _seen_error(places: Motion, seen: Motion) -> float:
@@ -64,7 +69,7 @@ def _turn_error(motion: Motion, solved: Motion) -> float:
     chain = chain_of(motion.skeleton)
     turning = [i for i, link in enumerate(chain.links) if link.turns]
     sums, count = 0.0, 0
-    both = zip(chain.poses(motion.values), chain.poses(solved.values), strict=True)
+    both = zip(chain.poses(floats_of(motion)), chain.poses(floats_of(solved)), strict=True)
     for (_, _, left), (_, _, right) in both:
         for joint in turning:
             angles = _angles(left.axes[joint], right.axes[joint])

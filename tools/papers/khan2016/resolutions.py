@@ -18,7 +18,7 @@ def resolutions(case: Case, variant: Variant, params: Mapping[str, Any], joint: 
     motion = load(case).motion
     skeleton = motion.skeleton
     column = skeleton.columns(skeleton.find(joint))[0]
-    wanted = unwrap(motion.values, skeleton)[:, column]
+    wanted = unwrap(np.asarray(motion.values, np.float64), skeleton)[:, column]
     data = write_file(motion, variant.codec, variant.options(params))
     rows = []
     with mcz.open(data) as file:

@@ -191,5 +191,5 @@ def _made(motion: Motion) -> Motion:
     columns = (3 * numbers[:, None] + np.arange(3)).ravel()
     joints = tuple(whole.skeleton.joints[n] for n in numbers)
     skeleton = replace(whole.skeleton, joints=joints, unit_cm=0.1, base=None)
-    signal = Signal(whole.values[:, columns] * scale)
+    signal = Signal(np.asarray(whole.values[:, columns], np.float64) * scale)
     return replace(whole, skeleton=skeleton, signals=(signal,))
