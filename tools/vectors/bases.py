@@ -15,10 +15,16 @@ import numpy as np
 
 from mcz.codecs import CODECS
 from mcz.container import payloads
+from mcz.container.chunks import ANCILLARY, COPY
 from mcz.container.limits import ARCHIVE
+from mcz.container.segments import SegmentHeader
 from mcz.motion import Channel, Motion, Signal
+from mcz.numbers import Grid, GridKind
+from mcz.schema import varint
 from tools.vectors.build import motions
-from tools.vectors.build.files import Crafter, file_of, finished
+from tools.vectors.build.copies import content_of, copies_of, payload_of
+from tools.vectors.build.edits import Made, both, indexed, put, raw_stream
+from tools.vectors.build.files import Crafter, file_of, finished, rehash
 from tools.vectors.build.source_files import ODD, PLAIN, take
 
 
@@ -30,6 +36,12 @@ class Base:
     data: bytes | None = None
     sources: tuple[tuple[str, bytes], ...] = ()
     attached: tuple[tuple[str, str], ...] = ()  # names of attachments, and aliases
+
+    bodies: tuple[Base, ...] = ()  # each with its own FOOT, one behind the other
+
+    def __or__(self, other: Base) -> Base:
+        bodies = (*(self.bodies or (self,)), other)
+        return Base(self.motions + other.motions, None, self.sources, self.attached, bodies)
 
     def __add__(self, other: Base) -> Base:
         sources = self.sources + other.sources
@@ -95,9 +107,73 @@ def wide(n_channels: int) -> Motion:
 
 
 @base
+def masked() -> Motion:
+    """Three frames, the middle one invalid."""
+    mask = np.ones((3, 6), np.bool_)
+    mask[1] = False
+    signal = Signal(motions.numbers(3, 6), (motions.HUNDREDTHS,) * 6, mask=mask)
+    return motions.dance(signals=(signal,))
+
+
+@base
+def twin() -> Motion:
+    """A second dance, of another skeleton."""
+    skeleton = replace(motions.puppet(), name="twin")
+    return motions.dance(3, name="encore", skeleton=skeleton)
+
+
+@base
+def column(values: list[float], kind: str, digits: int = 0, **more: Any) -> Motion:
+    """One channel on a grid of this kind."""
+    return motions.column(values, Grid(GridKind[kind], digits, **more))
+
+
+@base
+def grid_case(name: str) -> Motion:
+    """A channel of values at the ends of a grid."""
+    grid, values = motions.grid_cases()[name]
+    return motions.column(values, grid)
+
+
+@base
 def nothing() -> Base:
     """A file without clips."""
     return Base()
+
+
+@base
+def copies(stored: bool = False, few: int | None = None) -> bytes:
+    """Two clips, one with a source, and copies of their chunks, or of so few; no INDX."""
+    crafter = Crafter()
+    for motion in (take(PLAIN, "plain"), motions.dance()):
+        crafter.clip(motion)
+    content = content_of(copies_of(crafter)[:few], crafter.offset)
+    crafter.plain_chunk(COPY, payload_of(content, stored=stored), ANCILLARY)
+    return finished(crafter, index=False)
+
+
+@base
+def segments_of_zeros(n_rows: int, n_segments: int, padding: int = 0) -> bytes:
+    """Zeros in segments of one byte of data, and an ancillary chunk of so many bytes."""
+    stream = raw_stream([[0]], [0])
+    edges = [n_rows * i // n_segments for i in range(n_segments + 1)]
+    most = 2**24
+    hashed = [rehash(np.zeros((n_rows, 1)))] if n_rows <= most else []
+
+    def many(_: Made) -> Made:
+        pairs = zip(edges, edges[1:], strict=False)
+        return [(SegmentHeader(0, a, b - a), [stream]) for a, b in pairs]
+
+    crafter = Crafter(
+        segments=many,
+        CLIP=put(payloads.Clip, "n_frames", varint(n_rows)),
+        CEND=both(put(payloads.Cend, "n_frames", varint(n_rows)), *hashed),
+        row=indexed(n_frames=n_rows),
+    )
+    crafter.clip(motions.column([0.0], Grid(GridKind.FIXED, 0)))
+    if padding:
+        crafter.ancillary(b"xtra", bytes(padding))
+    return finished(crafter)
 
 
 def _limited(found: Base, options: dict[str, Any]) -> bytes:
@@ -124,9 +200,18 @@ def _with_attachments(found: Base, index: bool = True) -> bytes:
     return finished(crafter, *found.motions, index=index)
 
 
+def _appended(found: Base, index: bool = True) -> bytes:
+    crafter = Crafter()
+    for body in found.bodies:
+        finished(crafter, *body.motions, index=index)
+    return crafter.data
+
+
 def _evaluated(node: ast.expr) -> Any:
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         return _evaluated(node.left) + _evaluated(node.right)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitOr):
+        return _evaluated(node.left) | _evaluated(node.right)
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         given = [ast.literal_eval(argument) for argument in node.args]
         named = {k.arg: ast.literal_eval(k.value) for k in node.keywords if k.arg}
@@ -143,7 +228,8 @@ def base_of(text: str) -> Base:
 
 def base_bytes(text: str, options: Mapping[str, Any]) -> bytes:
     """The file of a base; ``options`` are those of ``file_of``."""
-    return _written(text, tuple(sorted(options.items())))
+    listed = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
+    return _written(text, tuple(sorted(listed.items())))
 
 
 @cache
@@ -152,6 +238,8 @@ def _written(text: str, options: tuple[tuple[str, Any], ...]) -> bytes:
     if found.data is not None:
         return found.data
     named = dict(options)
+    if found.bodies:
+        return _appended(found, **named)
     if found.attached:
         return _with_attachments(found, **named)
     if "codec" in named:

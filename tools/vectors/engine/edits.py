@@ -40,7 +40,9 @@ class Target:
     slice: str | None
 
     @classmethod
-    def of(cls, match: re.Match[str]) -> Target:
+    def of(cls, match: re.Match[str] | None) -> Target:
+        if match is None:
+            raise ValueError("an edit names no place")
         found = match.groupdict()
         stream, own = found["stream"], found["own"]
         return cls(
@@ -70,7 +72,7 @@ class Editor:
 
     def data(self) -> bytes:
         """The edited file."""
-        late = [edit for edit in self.edits if edit.startswith(LATE)]
+        late = [edit for edit in self.edits if edit.removeprefix("swap ").startswith(LATE)]
         for edit in self.edits:
             if edit not in late:
                 self._apply(edit)
@@ -114,8 +116,11 @@ class Editor:
     def _late(self, part: Part, name: str, number: int, late: Sequence[str]) -> None:
         schema = {"INDEX": Index}.get(name) or SCHEMAS.get(name)
         for edit in late:
-            words = edit.split()
-            if words[0] == "swap" and words[1].startswith(name + "."):
+            verb, *places = edit.split()
+            if verb == "swap":
+                one, other = (Target.of(FIELD.fullmatch(place)) for place in places)
+                if (one.name, one.number) == (name, number):
+                    part.payload = swapped(schema, part.payload, one.path, other.path)
                 continue
             match = EDIT.fullmatch(edit)
             if match is None:
@@ -155,14 +160,14 @@ class Editor:
         """``copy SKEL after CEND``: the same chunk a second time."""
         what, where, anchor = rest.split()
         part = self._part(what)
-        twin = replace(part, place=None, frame=dict(part.frame))
+        twin = replace(part, place=None, segment=None, frame=dict(part.frame))
         self.layout.parts.insert(self._place(where, anchor), twin)
 
     def _move(self, rest: str) -> None:
         what, where, anchor = rest.split()
-        part = self._part(what)
+        part, beside = self._part(what), self._part(anchor)
         self.layout.parts.remove(part)
-        self.layout.parts.insert(self._place(where, anchor), part)
+        self.layout.parts.insert(self.layout.parts.index(beside) + (where == "after"), part)
 
     def _insert(self, rest: str) -> None:
         """``insert xtra+1 after CEND = "more"``: a chunk with flags."""
@@ -179,12 +184,9 @@ class Editor:
 
     def _swap(self, rest: str) -> None:
         """``swap CLIP.signals.0 CLIP.signals.1``: items of a list."""
-        one, other = (FIELD.fullmatch(word) for word in rest.split())
-        assert one is not None and other is not None
-        target = Target.of(one)
-        part = self.layout.find(target.type, target.number)
-        schema = SCHEMAS[target.name]
-        part.payload = swapped(schema, part.payload, target.path, Target.of(other).path)
+        one, other = (Target.of(FIELD.fullmatch(word)) for word in rest.split())
+        part = self.layout.find(one.type, one.number)
+        part.payload = swapped(SCHEMAS[one.name], part.payload, one.path, other.path)
 
     def _edit(self, match: re.Match[str]) -> None:
         target = Target.of(match)

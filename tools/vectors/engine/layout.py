@@ -230,7 +230,7 @@ class Layout:
             return
         clip.offset, clip.length = part.offset - HEADER.size, len(part.payload)
         end = part.offset + clip.length + 4
-        rows, at = b"", 0
+        rows, at = [], 0
         while at < len(clip.segments):
             numbers = []
             for _ in range(7):
@@ -239,10 +239,13 @@ class Layout:
             was += numbers[0]
             found, was = moved.get(was), was + numbers[1]
             if found is not None:
-                rows += self._segment_row(found, numbers, end)
-                end = found.offset + len(found.payload)
+                rows.append((found, numbers))
+        listed = b""
+        for found, numbers in sorted(rows, key=lambda row: row[0].offset):
+            listed += self._segment_row(found, numbers, end)
+            end = found.offset + len(found.payload)
         cend = moved.get(was + clip.cend_gap + HEADER.size)
-        clip.segments = rows
+        clip.segments = listed
         if cend is not None:
             clip.cend_gap = cend.offset - HEADER.size - end
             clip.cend_length = len(cend.payload)

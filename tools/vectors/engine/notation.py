@@ -29,6 +29,7 @@ FUNCTIONS: dict[str, Callable[[bytes], bytes]] = {
     "": lambda data: data,
     "sized": lambda data: varint(len(data)) + data,
     "deflate": deflate,
+    "packed": lambda data: b"\1" + varint(len(data)) + deflate(data),
     "sha256": lambda data: hashlib.sha256(data).digest(),
     "id": lambda data: hashlib.sha256(data).digest()[:16],
     "crc32": lambda data: struct.pack("<I", zlib.crc32(data)),
