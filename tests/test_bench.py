@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from mcz.bench.tasks import KINDS, Runner, Task, perform
 from mcz.bjontegaard import bd_rate, bd_sqnr
 from mcz.cli.common import run as run_command
 from mcz.codecs.parameters import Dial
+from tests.commands import run
 from tests.motions import smooth
 
 SIZES = (1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
@@ -126,8 +128,12 @@ def test_a_dial_that_does_little_at_first_is_followed() -> None:
 
 
 @pytest.fixture(scope="module")
-def case(samples: Path) -> Case:
-    return Case(str(samples / "walk.amc"))
+def case(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """The first 48 frames of the walk: points at many settings are measured of them."""
+    walk = tmp_path_factory.mktemp("short") / "walk.amc"
+    assert run("convert", samples / "walk.amc", walk, "--frames", "0:48") == 0
+    shutil.copy(samples / "walk.asf", walk.parent)
+    return Case(str(walk))
 
 
 def test_variants(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,7 +74,7 @@ def test_numbers_that_do_not_ascend_count_rows() -> None:
 
 
 def test_an_unknown_rate_is_an_error_that_says_what_to_do() -> None:
-    with pytest.raises(mcz.OptionError, match="say the rate when reading"):
+    with pytest.raises(mcz.OptionError, match="give the rate"):
         _ = markers(4, None).times
     with pytest.raises(mcz.OptionError, match="rate"):
         mcz.times(markers(4, None))
@@ -580,7 +580,7 @@ def test_charts_without_a_joint_are_of_the_first_signal(tmp_path: Path) -> None:
     motion = Motion(Skeleton(()), (Signal(np.zeros((30, 0))), analog), Fraction(50))
     plotted = mcz.plot(motion, tmp_path / "a.svg")
     assert plotted.title.endswith("analog, channels") and len(plotted.tables[0]) == 9
-    assert plotted.notes == ("8 of 12 channels; choose others by name (--channel)",)
+    assert plotted.notes == ("8 of 12 channels; choose others by name (channels=)",)
 
 
 WALK = [*range(51, 91), *range(131, 171)]

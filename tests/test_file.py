@@ -195,20 +195,6 @@ def test_reading_a_closed_file() -> None:
         clip.read()
 
 
-def test_threads_may_share_a_file(tmp_path: Path) -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
-    motion = smooth(400)
-    mcz.write(motion, tmp_path / "a.mcz", segment_frames=20)
-    with mcz.open(tmp_path / "a.mcz") as file, ThreadPoolExecutor(8) as pool:
-        clip = file.clips["smooth"]
-        starts = [n * 7 % 380 for n in range(200)]
-        for start, part in zip(
-            starts, pool.map(lambda s: clip.read((s, s + 20)), starts), strict=True
-        ):
-            np.testing.assert_array_equal(part, motion.values[start : start + 20])
-
-
 @pytest.mark.parametrize("key", ["weather", "", "Subject", "X-a", "x"])
 def test_metadata_that_nobody_registered_are_refused(key: str, tmp_path: Path) -> None:
     motion = smooth(3, metadata={"subject": "7", key: "fair"})

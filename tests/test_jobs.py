@@ -240,7 +240,7 @@ def test_a_file_whose_process_dies_is_reported(
     monkeypatch.setattr(coded_parts, "coded", dies_on_c3d)
     report = mcz.pack(folder, tmp_path / "all.mcz", jobs=2)
     failed = {o.path: o.message for o in report.failures}
-    assert failed["walk.c3d"] == "it died"
+    assert failed["walk.c3d"] == "walk.c3d: it died"
     assert len(failed) == 3
     assert mcz.verify(tmp_path / "all.mcz") == []
 

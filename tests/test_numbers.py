@@ -12,7 +12,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mcz import FormatError, OptionError, SourceError, schema
+from mcz import FormatError, OptionError, SourceError
 from mcz.numbers import (
     GRID,
     Grid,
@@ -25,6 +25,7 @@ from mcz.numbers import (
     scan,
     values_of,
 )
+from mcz.schema import Record, build, field, parse
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 PLAIN = [flag for flag in GridFlag if flag not in (GridFlag.POINT, GridFlag.EXPONENT1)]
@@ -502,24 +503,28 @@ def test_scaled_and_integer() -> None:
         Grid(GridKind.FIXED, 4).bits(np.array([1]))
 
 
+class OfGrid(Record):
+    """A structure that has a grid."""
+
+    grid: Grid = field(GRID, "the grid")
+
+
 @pytest.mark.parametrize("grid", GRIDS, ids=repr)
 def test_schema(grid: Grid) -> None:
-    fields = {"kind": grid.kind, "digits": grid.digits, "flags": grid.flags}
-    wrapped = schema.Struct("grid" / GRID)
-    data = schema.build(wrapped, {"grid": grid}, "test")
-    assert data[:3] == bytes(fields.values())
+    data = build(OfGrid(grid=grid), "test")
+    assert data[:3] == bytes((grid.kind, grid.digits, grid.flags))
     assert len(data) == (11 if grid.kind == GridKind.SCALED else 3)
-    assert schema.parse(wrapped, data, "test").grid == grid
+    assert parse(OfGrid, data, "test").grid == grid
     for length in range(len(data)):
         with pytest.raises(FormatError):
-            schema.parse(wrapped, data[:length], "test")
+            parse(OfGrid, data[:length], "test")
 
 
 @given(st.binary(min_size=3, max_size=11))
 def test_hostile_grids(data: bytes) -> None:
     """Bytes are a grid that works at 0 and at its limit, or a FormatError."""
     try:
-        grid = schema.parse(schema.Struct("grid" / GRID), data, "test").grid
+        grid = parse(OfGrid, data, "test").grid
     except FormatError:
         return
     ends = np.array([0, grid.limit])

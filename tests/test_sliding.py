@@ -138,7 +138,7 @@ def test_without_feet_or_unit_there_are_no_contacts() -> None:
     unknown = markers("lfoot", np.zeros((60, 1, 3)), unit_cm=None)
     found = mcz.compare(unknown, unknown, contacts=True)
     assert found.sliding is None
-    assert any("--unit" in note for note in found.notes)
+    assert any("length unit" in note for note in found.notes)
 
 
 def test_rate_and_up_of_the_other_side() -> None:

@@ -112,7 +112,7 @@ def test_a_lossy_clip_keeps_its_layout(tmp_path: Path) -> None:
     motion = marker_walk()
     source = tmp_path / "walk.trc"
     source.write_bytes(FORMATS["trc"].write(replace(motion, source=None)))
-    mcz.encode(source, tmp_path / "walk.mcz", codec="mrdwt", params={"mean_error_cm": 0.1})
+    mcz.encode(source, tmp_path / "walk.mcz", codec="mrdwt", params={"T_g": 1.0})
     with mcz.open(tmp_path / "walk.mcz") as file:
         text = file.only_clip().source_bytes()
     again = FORMATS["trc"].read(text, "walk")
