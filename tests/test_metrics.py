@@ -231,9 +231,11 @@ def test_virtual_markers_can_be_left_out() -> None:
 
 
 def test_ids_are_those_of_the_manual() -> None:
-    page = Path(__file__).parents[1] / "docs" / "measures.md"
-    section = page.read_text("utf-8").split("## Metrics\n", 1)[1].split("\n## ", 1)[0]
-    listed = [i for cell in re.findall(r"^\| ([^|]+) \|", section, re.M) for i in cell.split(", ")]
+    docs = Path(__file__).parents[1] / "docs"
+    pages = [(docs / name).read_text("utf-8") for name in ("measures.md", "contacts.md")]
+    tables = [page.split("| id | unit | meaning |", 1)[1].split("\n\n", 1)[0] for page in pages]
+    cells = re.findall(r"^\| ([^|]+) \|", "".join(tables), re.M)
+    listed = [i for cell in cells for i in cell.split(", ")]
     ids = {i.strip() for i in listed} - {"id", "signal.NAME.mse"} - {"---"}
     assert ids == set(mcz.compare(smooth(), smooth()).entries())
 
