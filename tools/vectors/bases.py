@@ -136,6 +136,14 @@ def grid_case(name: str) -> Motion:
 
 
 @base
+def many_forces(n_channels: int) -> Motion:
+    """No frames, and a second signal of so many channels of its own."""
+    channels = (Channel("", "c"),) * n_channels
+    own = Signal(np.zeros((0, n_channels)), name="many", channels=channels)
+    return motions.dance(0, signals=(*motions.dance(0).signals, own))
+
+
+@base
 def nothing() -> Base:
     """A file without clips."""
     return Base()

@@ -43,6 +43,8 @@ def _attachments(shelf: Broken) -> None:
         ("part-of-0", "A part of none.", put(payloads.Atta, "n_parts", b"\0")),
         ("parts-differ", "The parts state different counts.", of(1, "n_parts", b"\3")),
         ("hashes-differ", "The parts state different hashes.", of(0, "sha256", b"h" * 32)),
+        ("hash-later", "Part 1 states another hash than the file's.", of(1, "sha256", b"h" * 32)),
+        ("parts-before", "Part 0 states another count than part 1.", of(0, "n_parts", b"\3")),
         ("hash", "A hash that is not that of the parts.", put(payloads.Atta, "sha256", b"h" * 32)),
         ("size", "The parts are shorter than the size.", put(payloads.Atta, "size", b"\x0d")),
         ("part-size", "A part is shorter than it says.", of(1, "part_size", b"\7")),

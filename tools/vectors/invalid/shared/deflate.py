@@ -123,6 +123,11 @@ def _deflate(shelf: Broken) -> None:
             .code(with_match, END),
             b"AA" + b"A" * 258,
         ),
+        "literals-287": (
+            "lengths of 287 literals and lengths, of which there are 286",
+            Bits().dynamic(287, 1, usual, [*head, 1, (18, 19), 0]).symbols(a_code, {}, [65, END]),
+            b"A",
+        ),
         "end-missing": ("a block that does not end", Bits().fixed(*b"abc"), b"abc"),
     }
     for name, (purpose, bits, whole) in cases.items():
