@@ -150,7 +150,7 @@ def parse_content(content: bytes) -> Directory:
     return directory
 
 
-def _add(table: Settings, name: str, row: Any) -> None:
+def _add(table: Settings, name: str, row: object) -> None:
     if name in table:
         raise FormatError(f"INDX: two entries are named {name!r}")
     table[name] = row

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
-from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
@@ -110,7 +109,7 @@ def _refer(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
         )
 
 
-def check_target(fields: Any, where: str, sourced: Collection[tuple[int, bytes]]) -> None:
+def check_target(fields: payloads.Alia, where: str, sourced: Collection[tuple[int, bytes]]) -> None:
     """Check that what an alias stands for is there before it, and can be restored."""
     if (fields.of, bytes(fields.target)) not in sourced:  # GRAM-04
         raise FormatError(f"chunk {where}: nothing before it with a source is {fields.target!r}")

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +64,7 @@ def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
     return ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, rows, chunk)
 
 
-def begin(head: bytes, shared: Shared, row: ClipRow, fields: Any) -> ClipState | None:
+def begin(head: bytes, shared: Shared, row: ClipRow, fields: payloads.Clip) -> ClipState | None:
     """What decodes the frames of the clip that begins; None where its codec needs all of them.
 
     ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError where the clip needs
@@ -87,7 +86,7 @@ def begin(head: bytes, shared: Shared, row: ClipRow, fields: Any) -> ClipState |
     return ClipState(clip, info, None if is_open else shown, len(fields.signals))
 
 
-def opening(head: bytes, shared: Shared, fields: Any) -> bytes:
+def opening(head: bytes, shared: Shared, fields: payloads.Clip) -> bytes:
     """A file as far as the clip with these ``fields``: what it needs, and no more."""
     needed = [shared[key] for key in needs(fields) if key in shared]
     return b"".join([SIGNATURE, head, *needed])
@@ -145,7 +144,7 @@ class ClipState:
         """Take a frame that is shown into the hash."""
         self._digest.update(values[None], None if mask is None else mask[None])
 
-    def check_hash(self, fields: Any) -> None:
+    def check_hash(self, fields: payloads.Cend) -> None:
         """Compare the hash of all frames with that of CEND; raises ChecksumError."""
         hashes = fields.value_sha256
         if len(hashes) != self.n_signals:

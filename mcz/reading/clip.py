@@ -209,12 +209,11 @@ class Clip(StoredClip, Posed):
         return signal
 
     def _source(self, start: int, stop: int, resolution: int, step: int) -> Source | None:
-        info = self.source
-        if info is None or (step > 1 and FORMATS[info.format].states_rate):
+        info, fields = self.source, self._fields.source
+        if info is None or fields is None or (step > 1 and FORMATS[info.format].states_rate):
             return None
         skip = self.signals[0].skip
         frames = range(start + skip, stop + skip, step)
-        fields = self._fields.source
         try:
             if self._row.skeleton != self._fields.skeleton:  # what salvage has in its place
                 raise FormatError("the names of its skeleton are lost")

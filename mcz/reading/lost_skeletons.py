@@ -12,7 +12,6 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import islice, product
 from pathlib import PurePosixPath
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton,
 from mcz.numbers import GridKind
 from mcz.reading.clip import Clip
 from mcz.reading.signal_reader import SignalReader
+from mcz.types import Values
 from mcz.units import UNIT_CM
 
 ASF = FORMATS["asf"]
@@ -165,14 +165,14 @@ def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
                     yield from _payloads(other, None)
 
 
-def _of_zeros(fields: Any, row: ClipRow, source: Source | None) -> Motion:
+def _of_zeros(fields: payloads.Clip, row: ClipRow, source: Source | None) -> Motion:
     """A motion like that of a clip, all of whose values are zero, on a joint of plain channels."""
     signals = []
     for index, own in enumerate(fields.signals):
         grids = tuple(run.grid for run in own.grids for _ in range(run.n_channels))
         is_integer = bool(grids) and all(grid.kind == GridKind.INTEGER for grid in grids)
         shape = row.n_frames * own.samples_per_frame, len(grids)
-        values = np.zeros(shape, np.int64 if is_integer else np.float64)
+        values: Values = np.zeros(shape, np.int64 if is_integer else np.float64)
         plain = tuple(Channel("", f"{column}") for column in range(len(grids)))
         signals.append(
             Signal(

@@ -85,6 +85,7 @@ def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
 def _contradicted(clip: Clip, rate: Fraction) -> tuple[Any, bytes]:
     """The ``contradiction`` of the template of a clip, and the template."""
     source = clip._fields.source
+    assert source is not None
     template = clip.container.template(source.template, source.format)
     name, step = format_by_id(source.format).name, usual_step(clip.frame_numbers)
     return contradiction(name, template, rate, step), template

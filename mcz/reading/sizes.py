@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
+from mcz.container import payloads
 from mcz.container.chunks import FOOT, FRAMING, HEADER
 from mcz.container.directory import SegmentRow
 from mcz.container.packets import CHECK_SIZE, head_size
@@ -140,5 +140,5 @@ def _end_size(n_packets: int) -> int:
     return head_size(n_packets, 0) + CHECK_SIZE if n_packets else 0
 
 
-def _source_fields_size(fields: Any) -> int:
+def _source_fields_size(fields: payloads.Clip) -> int:
     return len(build(fields.source, "source")) if fields.source else 0

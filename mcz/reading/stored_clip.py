@@ -6,7 +6,6 @@ import operator
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +36,11 @@ class StoredClip:
         self.n_frames = row.n_frames
 
     @cached_property
-    def _fields(self) -> Any:
+    def _fields(self) -> payloads.Clip:
         return self.container.clip(self._row)
 
     @cached_property
-    def _cend(self) -> Any:
+    def _cend(self) -> payloads.Cend | None:
         fields = self.container.cend(self._row)
         has_hash = fields is not None and fields.source_sha256 is not None
         if fields is not None and has_hash != (self._fields.source is not None):  # CEND-01

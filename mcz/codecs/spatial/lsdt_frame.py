@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +162,7 @@ def decode(
     return out
 
 
-def _header(header: bytes) -> Any:
+def _header(header: bytes) -> FrameHeader:
     """The fields of FrameHeader; raises FormatError."""
     fields = parse(FrameHeader, header, f"{NAME} header")
     if fields.space.flags & (MEAN | COURSES):  # FRAME-05
