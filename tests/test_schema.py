@@ -76,16 +76,28 @@ def drawn(draw: st.DrawFn, type_: Any, context: construct.Container) -> bytes:
             return varint(draw(st.sampled_from(TRICKY)))
         case construct.FormatField() if type_.length == 1:
             return bytes((draw(st.sampled_from([n for n in TRICKY if n < 256])),))
-        case construct.FormatField():
+        case construct.FormatField() if type_.fmtstr[-1] in "fd":
             return struct.pack(type_.fmtstr, draw(st.floats(width=8 * type_.length)))
+        case construct.FormatField():
+            return draw(st.binary(min_size=type_.length, max_size=type_.length))
         case types.Sized():
             text = draw(st.text(max_size=3)).encode()
             return varint(len(text)) + text
         case construct.Bytes():
-            return draw(st.binary(min_size=type_.length, max_size=type_.length))
+            size = size_of(type_, context)
+            return draw(st.binary(min_size=size, max_size=size))
         case construct.Adapter():
             return drawn(draw, type_.subcon, context)
     return draw(st.binary(max_size=3)) if type_ is construct.GreedyBytes else b""
+
+
+def size_of(type_: construct.Bytes, context: construct.Container) -> int:
+    """The bytes that a field has behind those of ``context``; of many too few."""
+    try:
+        size = type_.length(context) if callable(type_.length) else type_.length
+    except (MczError, TypeError):
+        return 0  # what is before it is at fault
+    return int(size) if size < 2**12 else 3
 
 
 def taken(type_: Any, data: bytes, context: construct.Container, otherwise: Any) -> Any:
