@@ -9,14 +9,13 @@ from typing import Any, BinaryIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.kernels.types import Items as Items
+
 Values: TypeAlias = NDArray[np.float64 | np.int64]
 """Values of a signal: binary64, or int64 where grids are of integers."""
 
 Reals: TypeAlias = NDArray[np.floating]
 """Poses and places as float64 or float32, as a caller asks for them."""
-
-Items: TypeAlias = NDArray[np.generic]
-"""Numbers or words of any type, as a file or a caller has them."""
 
 Params: TypeAlias = Mapping[str, Any]
 """Parameters of a codec by name; its table of parameters has the type of each."""

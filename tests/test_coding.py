@@ -80,7 +80,7 @@ def test_vectors_survive(n_vectors, n, power, share, seed) -> None:
     sizes = np.floor(2.0 ** random.uniform(0, power, (n_vectors, n))).astype(np.int64)
     rows = np.where(random.random((n_vectors, n)) < share, sizes, 0) * random.choice([-1, 1], n)
     fields = prefix.fields_of([rows])
-    codes = prefix.codes_from(type("Fields", (), fields), "test")
+    codes = prefix.codes_from(fields, "test")
     assert codes is not None
     data = prefix.build_vectors(rows, np.array([0, n]), codes)
     found = np.zeros_like(rows)

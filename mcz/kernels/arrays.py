@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.types import Items
+from mcz.kernels.types import Items
 
 Moved = list[tuple[Items, Items]]  # what was given, what was taken for it
 SOUND = 0x1 | 0x100  # flags of an array: contiguous, aligned

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from mcz.container.locks import is_abandoned, lock
 from mcz.container.scan import scan
@@ -41,8 +41,8 @@ def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> 
     where it cannot be written.
     """
     refuse_inputs(target, inputs)
-    if not isinstance(target, (str, bytes, os.PathLike)):
-        yield target
+    if hasattr(target, "write"):
+        yield cast(BinaryIO, target)
         return
     if "://" in str(target):
         with _remote(str(target), force) as stream:

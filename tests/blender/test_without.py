@@ -236,7 +236,7 @@ def test_coarse_clips(tmp_path: Path) -> None:
     assert len(coarse.motion.values) == 116 and not coarse.notes
     mcz.write(acclaim_walk(), path, force=True)
     ((_, fine),) = clips.loaded(path, clips.Wanted(resolution=3))
-    assert len(fine.numbers) == 240 and fine.notes == ("clip 'walk': it has resolutions 0 to 0",)
+    assert len(fine.numbers) == 240 and fine.notes == ("clip 'walk' has resolutions 0 to 0",)
 
 
 def zip_members(data: bytes) -> dict[str, bytes]:
