@@ -70,4 +70,7 @@ def test_rules_have_marks() -> None:
 
 
 def test_few_rules_are_broken_by_hand() -> None:
-    assert len(by_hand.BREAKS) + len(by_hand.CRASH) <= 60
+    """Bounds of declared fields aside, whose check is one statement for all of them."""
+    table = (marks.ROOT / "tests" / "broken" / "by_hand.txt").read_text("utf-8")
+    declared = table.count("- if not self.test(obj")
+    assert len(by_hand.BREAKS) + len(by_hand.CRASH) - declared <= 60
