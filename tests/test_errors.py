@@ -141,7 +141,7 @@ OURS = {kind.__name__ for kind in classes()} | {"Failure", "AmbiguousError"}
 
 
 def decisions(tree: ast.AST) -> Iterator[ast.AST]:
-    """What is decided on, and what takes texts apart."""
+    """Expressions of decisions, and of calls that take texts apart."""
     for node in ast.walk(tree):
         match node:
             case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):

@@ -127,7 +127,7 @@ def changed_bytes(draw: st.DrawFn) -> tuple[str, bytes]:
 
 
 def read(name: str, data: bytes, limits: dict[str, int], compiled_from: int) -> Any:
-    """What ``parse`` gives: fields, or the kind and the message of an error."""
+    """The result of ``parse``: fields, or the kind and the message of an error."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(records, "COMPILED_FROM", compiled_from)
         try:

@@ -39,7 +39,7 @@ def _value(type_: Any, value: Any) -> Any:
 
 
 def _holds(type_: Any) -> bool:
-    """Whether the type has records within."""
+    """Return whether the type has records within."""
     while not isinstance(type_, RecordType | type):
         if not hasattr(type_, "subcon") and not hasattr(type_, "thensubcon"):
             return False
@@ -63,7 +63,7 @@ def empty_context() -> construct.Container:
 
 
 def span(kind: Any, payload: bytes, path: str) -> tuple[int, int]:
-    """Where the field at ``path``, such as "signals.0.codec", begins and ends in ``payload``.
+    """The range in ``payload`` of the field at ``path``, such as "signals.0.codec".
 
     Parses what lies before it, and raises KeyError where there is none.
     """

@@ -87,7 +87,7 @@ def structures() -> dict[str, Any]:
 
 
 def table_name(record: type[schema.Record]) -> str:
-    """How SPEC.md calls a record."""
+    """The name of a record in SPEC.md."""
     name = record.__name__.removesuffix("Fields")
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).upper()
 
@@ -120,7 +120,7 @@ def type_name(field: Any) -> str:
         case RecordType():
             return table_name(field.record)
         case types.Optional():
-            return f"optional {type_name(field.subcon)}"
+            return f"optional {type_name(field.subcon.subcon)}"
         case types.Counted():
             return f"counted {type_name(field.subcon)}"
         case construct.Array():

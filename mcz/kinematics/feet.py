@@ -15,7 +15,7 @@ _BETWEEN = re.compile(r"[\s_.\-]+")
 
 
 def is_foot(name: str) -> bool:
-    """Whether a joint of this name is a part of a foot; docs/contacts.md, lists the names.
+    """Return whether a joint of this name is a part of a foot; docs/contacts.md lists the names.
 
     >>> [is_foot(name) for name in ("lfoot", "LeftToeBase", "Bip01 R Toe0", "foot_L", "lfemur")]
     [True, True, True, True, False]

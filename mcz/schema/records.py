@@ -29,17 +29,17 @@ from itertools import takewhile
 from typing import Any, TypeVar, cast, dataclass_transform
 
 import construct
+from construct.core import CodeGen
 
 from mcz.errors import FormatError, MczError, TruncatedError
-from mcz.schema.types import CheckedBeside, as_construct, field_path
+from mcz.schema.types import CheckedBeside, Exactly, Kind, as_construct, field_path
 
-LOOKS_BACK = (construct.IfThenElse, CheckedBeside)  # types that need the fields before them
 COMPILED_FROM = 4096  # bytes from which a schema is worth compiling, some milliseconds
 # What a value raises that is none of a field: of another type, too large, not there.
 NO_VALUE = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, struct.error)
 
 
-def field(kind: Any, docs: str, *, default: Any = dataclasses.MISSING) -> Any:
+def field(kind: Kind, docs: str, *, default: Any = dataclasses.MISSING) -> Any:
     """A field of a record: its construct type, and its meaning, with units and bounds.
 
     ``kind`` may be a record, too.
@@ -83,7 +83,7 @@ class RecordType(construct.Adapter):
         self.rows = list(takewhile(lambda row: row[0] != before, rows))
         super().__init__(construct.Struct(*(name / item for name, item in self.rows)))
 
-    def made(self, **values: Any) -> Record:
+    def made(self, **values: object) -> Record:
         """The record of these values; of the first fields alone, the others are not there."""
         if self.is_whole:
             return self.record(**values)
@@ -91,17 +91,17 @@ class RecordType(construct.Adapter):
         vars(record).update(values)
         return record
 
-    def _decode(self, obj: Any, context: Any, path: str) -> Record:
+    def _decode(self, obj: construct.Container, context: construct.Container, path: str) -> Record:
         return self.made(**{name: obj[name] for name, _ in self.rows})
 
-    def _encode(self, obj: Record, context: Any, path: str) -> dict[str, Any]:
+    def _encode(self, obj: Record, context: construct.Container, path: str) -> dict[str, object]:
         return {name: getattr(obj, name) for name, _ in self.rows}
 
-    def _emitparse(self, code: Any) -> str:
+    def _emitparse(self, code: CodeGen) -> str:
         """Emit a function that reads the fields, with a context of theirs where one is needed."""
         code.linkedinstances[id(self)] = self.record if self.is_whole else self.made
         lines = [f"def parse_{id(self)}(io, this):"]
-        has_context = any(isinstance(item, LOOKS_BACK) for _, item in self.rows)
+        has_context = any(_looks_back(item) for _, item in self.rows)
         if has_context:
             lines.append("    states = dict(_parsing=True, _building=False, _sizing=False)")
             lines.append("    this = Container(_=this, _params=this['_params'], **states)")
@@ -112,6 +112,13 @@ class RecordType(construct.Adapter):
         lines.append(f"    return linkedinstances[{id(self)}]({names})")
         code.append("\n".join(lines))
         return f"parse_{id(self)}(io, this)"
+
+
+def _looks_back(item: construct.Construct) -> bool:
+    """Return whether a type needs the fields before it."""
+    if isinstance(item, Exactly):
+        return callable(item.length)
+    return isinstance(item, construct.IfThenElse | CheckedBeside)
 
 
 def parse(record: type[R], data: bytes, where: str, limits: Mapping[str, int] | None = None) -> R:
@@ -201,11 +208,6 @@ def _message(error: construct.ConstructError) -> str:
 
 def _place(where: str, error: construct.ConstructError) -> str:
     return ": ".join(filter(None, (where, field_path(error.path or ""))))
-
-
-def docs_of(record: type[Record]) -> list[tuple[str, Any, str]]:
-    """Name, construct type and meaning of each field, as the table of SPEC.md has them."""
-    return [(f.name, f.metadata["construct"], f.metadata["docs"]) for f in _fields(record)]
 
 
 def _fields(record: type[Record]) -> tuple[dataclasses.Field[Any], ...]:

@@ -1,32 +1,34 @@
 """Types of fields that the format has and construct lacks, as classes of construct.
 
-Numbers, arrays, ``If``, ``OneOf``, ``ExprValidator`` and ``this`` are construct's own. Not used are
+Numbers, arrays, ``If`` and ``this`` are construct's own. Not used are
 those of its types that accept malformed bytes: ``GreedyRange``, ``Enum``, ``Flag``, ``Padding``,
 ``VarInt``, ``Compressed``. SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Collection, Sequence
 from itertools import chain
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 import construct
-from construct import Float64l, GreedyBytes, Subconstruct
-from construct.core import stream_read, stream_write
+from construct import Construct, Container, Float64l, GreedyBytes, Subconstruct
+from construct.core import CodeGen, stream_read, stream_write
 
 from mcz.errors import FormatError, LimitError
 from mcz.schema.varints import MAX_COUNT, take_varint, varint
+
+Kind: TypeAlias = "Construct | type"  # a type of construct, or a record
 
 
 class Varint(construct.Construct):
     """Unsigned, up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
 
-    def _parse(self, stream: BinaryIO, context: Any, path: str) -> int:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
         first = stream.read(1)
         return first[0] if first and first[0] < 0x80 else _longer(first, stream, path)
 
-    def _build(self, obj: int, stream: BinaryIO, context: Any, path: str) -> int:
+    def _build(self, obj: int, stream: BinaryIO, context: Container, path: str) -> int:
         _write(stream, varint(obj), path)
         return obj
 
@@ -34,14 +36,15 @@ class Varint(construct.Construct):
 class Exactly(construct.Bytes):
     """So many bytes. A compiled ``Bytes`` would accept fewer at the end of the data."""
 
-    def _emitparse(self, code: Any) -> str:
-        raise NotImplementedError  # compiled schemas then call _parse
+    def _emitparse(self, code: CodeGen) -> str:
+        code.linkedparsers[id(self)] = self._parse
+        return f"linkedparsers[{id(self)}](io, this, '')"
 
 
 class Sized(construct.Construct):
     """A varint length, then that many bytes."""
 
-    def _parse(self, stream: BinaryIO, context: Any, path: str) -> bytes:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> bytes:
         first = stream.read(1)
         size = first[0] if first and first[0] < 0x80 else _longer(first, stream, path)
         data = stream.read(size)
@@ -49,7 +52,7 @@ class Sized(construct.Construct):
             raise construct.StreamError(f"{len(data)} of {size} bytes left", path=path)
         return data
 
-    def _build(self, obj: bytes, stream: BinaryIO, context: Any, path: str) -> bytes:
+    def _build(self, obj: bytes, stream: BinaryIO, context: Container, path: str) -> bytes:
         _write(stream, varint(len(obj)) + bytes(obj), path)
         return obj
 
@@ -57,7 +60,7 @@ class Sized(construct.Construct):
 class Text(Sized):
     """UTF-8 behind a varint length."""
 
-    def _parse(self, stream: BinaryIO, context: Any, path: str) -> str:  # type: ignore[override]
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:  # type: ignore[override]
         data = super()._parse(stream, context, path)
         try:
             return data.decode("utf-8")  # CONV-05, CONV-06
@@ -65,7 +68,7 @@ class Text(Sized):
             raise FormatError(f"not UTF-8: {error}", where=field_path(path)) from None
 
     def _build(  # type: ignore[override]
-        self, obj: str, stream: BinaryIO, context: Any, path: str
+        self, obj: str, stream: BinaryIO, context: Container, path: str
     ) -> str:
         try:
             super()._build(obj.encode("utf-8"), stream, context, path)
@@ -78,18 +81,18 @@ class Text(Sized):
 class Checked(construct.Adapter):
     """A value that passes a test: ``Checked(UVARINT, lambda value: value >= 1)``."""
 
-    def __init__(self, kind: Any, test: Callable[..., bool]) -> None:
+    def __init__(self, kind: Kind, test: Callable[..., bool]) -> None:
         super().__init__(kind)
         self.test = test
 
-    def _decode(self, obj: Any, context: Any, path: str) -> Any:
+    def _decode(self, obj: object, context: Container, path: str) -> object:
         if not self.test(obj):
             raise construct.ValidationError(f"{obj!r} is not allowed", path=path)
         return obj
 
     _encode = _decode
 
-    def _emitparse(self, code: Any) -> str:
+    def _emitparse(self, code: CodeGen) -> str:
         code.linkedinstances[id(self)] = self
         value = self.subcon._compileparse(code)
         return f"linkedinstances[{id(self)}]._decode({value}, this, '')"
@@ -98,7 +101,7 @@ class Checked(construct.Adapter):
 class CheckedBeside(Checked):
     """The same with a test of the value and the fields before it in its record."""
 
-    def _decode(self, obj: Any, context: Any, path: str) -> Any:
+    def _decode(self, obj: object, context: Container, path: str) -> object:
         if not self.test(obj, context):
             raise construct.ValidationError(f"{obj!r} is not allowed", path=path)
         return obj
@@ -110,21 +113,21 @@ class Adapted(construct.Adapter):
     """A value that ``decode`` makes of another one; ``encode`` undoes it."""
 
     def __init__(
-        self, kind: Any, decode: Callable[[Any], Any], encode: Callable[[Any], Any]
+        self, kind: Kind, decode: Callable[[Any], Any], encode: Callable[[Any], Any]
     ) -> None:
         super().__init__(as_construct(kind))
         self.decode, self.encode = decode, encode
 
-    def _decode(self, obj: Any, context: Any, path: str) -> Any:
+    def _decode(self, obj: object, context: Container, path: str) -> object:
         try:
             return self.decode(obj)
         except FormatError as error:
             raise construct.ValidationError(str(error), path=path) from None
 
-    def _encode(self, obj: Any, context: Any, path: str) -> Any:
+    def _encode(self, obj: object, context: Container, path: str) -> object:
         return self.encode(obj)
 
-    def _emitparse(self, code: Any) -> str:
+    def _emitparse(self, code: CodeGen) -> str:
         code.linkedinstances[id(self)] = self
         return f"linkedinstances[{id(self)}].decode({self.subcon._compileparse(code)})"
 
@@ -135,11 +138,11 @@ class Counted(Subconstruct):
     ``kind`` names the items where ``parse`` may be given a limit of how many there are in all.
     """
 
-    def __init__(self, item: Any, most: int = MAX_COUNT, kind: str = "") -> None:
+    def __init__(self, item: Kind, most: int = MAX_COUNT, kind: str = "") -> None:
         super().__init__(as_construct(item))
         self.most, self.kind = most, kind
 
-    def count(self, stream: BinaryIO, context: Any, path: str) -> int:
+    def count(self, stream: BinaryIO, context: Container, path: str) -> int:
         """Read and check the count."""
         count: int = UVARINT._parse(stream, context, path)
         self._check(count, path)
@@ -157,57 +160,58 @@ class Counted(Subconstruct):
         if count > self.most:  # CONV-07
             raise construct.ValidationError(f"{count} are more than {self.most}", path=path)
 
-    def _parse(self, stream: BinaryIO, context: Any, path: str) -> list[Any]:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> list[object]:
         count = self.count(stream, context, path)
         return [self.subcon._parsereport(stream, context, f"{path} -> {i}") for i in range(count)]
 
-    def _build(self, obj: Any, stream: BinaryIO, context: Any, path: str) -> Any:
+    def _build(
+        self, obj: Sequence[object], stream: BinaryIO, context: Container, path: str
+    ) -> Sequence[object]:
         self._check(len(obj), path)
         UVARINT._build(len(obj), stream, context, path)
         for index, item in enumerate(obj):
             self.subcon._build(item, stream, context, f"{path} -> {index}")
         return obj
 
-    def _emitparse(self, code: Any) -> str:
+    def _emitparse(self, code: CodeGen) -> str:
         code.linkedinstances[id(self)] = self
         count = f"linkedinstances[{id(self)}].count(io, this, '')"
         return f"[{self.subcon._compileparse(code)} for _ in range({count})]"
 
 
-class Optional(Counted):
+class Optional(construct.Adapter):
     """A count of 0 or 1, then that many items: None, or the value."""
 
-    def __init__(self, item: Any) -> None:
-        super().__init__(item, 1)
+    def __init__(self, item: Kind) -> None:
+        super().__init__(Counted(item, 1))
         self.flagbuildnone = True
 
-    def _parse(self, stream: BinaryIO, context: Any, path: str) -> Any:
-        return (super()._parse(stream, context, path) or [None])[0]
+    def _decode(self, obj: list[object], context: Container, path: str) -> object:
+        return obj[0] if obj else None
 
-    def _build(self, obj: Any, stream: BinaryIO, context: Any, path: str) -> Any:
-        super()._build([] if obj is None else [obj], stream, context, path)
-        return obj
+    def _encode(self, obj: object, context: Container, path: str) -> list[object]:
+        return [] if obj is None else [obj]
 
-    def _emitparse(self, code: Any) -> str:
-        raise NotImplementedError
+    def _emitparse(self, code: CodeGen) -> str:
+        return f"({self.subcon._compileparse(code)} or [None])[0]"
 
 
-def counted(item: Any, most: int = MAX_COUNT, kind: str = "") -> Counted:
+def counted(item: Kind, most: int = MAX_COUNT, kind: str = "") -> Counted:
     """A varint count of at most ``most``, then that many items, each of a type or a record."""
     return Counted(item, most, kind)
 
 
-def optional(item: Any) -> Optional:
+def optional(item: Kind) -> Optional:
     """A count of 0 or 1, then that many items: None, or the value."""
     return Optional(item)
 
 
-def one_of(kind: Any, values: Container[Any]) -> Checked:
+def one_of(kind: Kind, values: Collection[object]) -> Checked:
     """One of ``values``."""
     return Checked(kind, lambda value: value in values)
 
 
-def bounded(kind: Any, least: float, most: float) -> Checked:
+def bounded(kind: Kind, least: float, most: float) -> Checked:
     """A number from ``least`` to ``most``; NaN is none."""
     return Checked(kind, lambda value: least <= value <= most)
 
@@ -217,7 +221,7 @@ def flags(*names: str) -> Checked:
     return Checked(construct.Int8ul, lambda value: value < 1 << len(names))  # CONV-14
 
 
-def as_construct(kind: Any) -> Any:
+def as_construct(kind: Kind) -> Construct:
     """A construct type; that of a record where ``kind`` is one."""
     return getattr(kind, "construct_type", lambda: kind)()
 

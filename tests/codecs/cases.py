@@ -34,7 +34,7 @@ class Case:
 
     @property
     def of_points(self) -> bool:
-        """Whether points are coded in place of channels."""
+        """Return whether points are coded in place of channels."""
         return self.codec.positions and self.params.get("domain") != "channels"
 
     def length(self, n_frames: int) -> dict[str, Any]:

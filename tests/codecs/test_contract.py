@@ -412,7 +412,7 @@ def test_a_finer_setting_costs_more_and_errs_less(name: str) -> None:
 
 
 def bad_values(range_: str) -> list[Any]:
-    """What a parameter of that range refuses, with the values next to its ends."""
+    """Values that a parameter of that range refuses, those next to its ends among them."""
     numbers = re.fullmatch(r"(\S+) to (\S+)", range_)
     if numbers is None:
         return ["", "nothing", 7, [4]]

@@ -39,7 +39,7 @@ def outcome(coded: Direct, changes: dict[str, Any]) -> str:
 
 @EVERY
 def test_every_prefix_of_a_stream(name: str) -> None:
-    """What is cut may spell other values, of just that many bytes; zeros that are added do not."""
+    """A cut stream may spell other values, of just that many bytes; added zeros do not."""
     coded = small(name)
     meant = outcome(coded, {})
     for place in coded.places():

@@ -73,7 +73,7 @@ class Live:
         return [self.encoder.push(np.nan_to_num(row), known) for row, known in rows]
 
     def values(self) -> Array:
-        """What comes of all frames."""
+        """The answers to all frames."""
         return np.array([self.decoder.push(*packet) for packet in self.pushed()])
 
     def read(self, pushed: Pushed, start: int, stop: int) -> Array:

@@ -143,7 +143,7 @@ def test_generated_skeletons() -> None:
 
 
 def orders_case(skeleton: Skeleton, codes: list[int], source: np.ndarray, noise: float) -> Case:
-    """What Python makes of coded angles that are off by ``noise`` turns; what is asked."""
+    """Angles that Python decodes, coded ``noise`` turns off; the request for them."""
     orders = Orders(codes, skeleton)
     coded = orders.coded(source)
     coded += np.random.default_rng(len(source)).normal(0, noise, coded.shape) * orders.full

@@ -52,7 +52,7 @@ class Case:
         return FORMATS[self.format].read(data, "clip", *self.beside)
 
     def back(self, data: bytes) -> Any:
-        """What the file says; it is written as the same bytes."""
+        """The motion of the file, which is written as the same bytes."""
         found = self.read(data)
         assert FORMATS[self.format].write(found) == data
         return found

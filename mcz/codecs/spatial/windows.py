@@ -52,7 +52,7 @@ class WindowsHeader(Record):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What an encoder has chosen; ``space``: the header's field.
+    """The choices of an encoder; ``space``: the header's field.
 
     A coefficient smaller than ``threshold`` steps becomes 0. ``segment_frames`` may be 0: as many
     windows as make a DATA of the usual size. ``prefix``: coded by prefix codes.

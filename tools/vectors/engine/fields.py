@@ -77,7 +77,7 @@ def _with_copied(payload: bytes, content: bytes) -> bytes:
 
 
 def _inside(schema: Any, path: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """How to read and write the content of a field of bytes behind their length."""
+    """Reader and writer of the content of a field of bytes behind their length."""
 
     def read(payload: bytes) -> bytes:
         start, stop = span(schema, payload, path)

@@ -264,7 +264,7 @@ class Layout:
 
 
 def has_segment(part: Part) -> bool:
-    """Whether the payload of ``part`` is a segment with its table."""
+    """Return whether the payload of ``part`` is a segment with its table."""
     if part.packet is not None:
         return part.packet.kind == SEGMENT
     return part.type == b"DATA" and not part.open
