@@ -209,3 +209,29 @@ def test_every_kernel_is_in_a_unit() -> None:
         assert other_spellings == [], path
     assert found == set(UNIT_OF)
     assert sum(map(len, UNITS.values())) == len(UNIT_OF), "a module is in two units"
+
+
+THREADS = """
+import sys, threading
+from mcz.kernels import lacks_compiled_kernels
+
+sys.setswitchinterval(1e-6)
+start, found = threading.Barrier(16), []
+
+def ask():
+    start.wait()
+    found.append(lacks_compiled_kernels())
+
+threads = [threading.Thread(target=ask) for _ in range(16)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+print(found)
+"""
+
+
+def test_threads_load_a_compiled_module_once() -> None:
+    """Whichever is first; another one that met a module half executed would fail."""
+    done = subprocess.run(
+        [sys.executable, "-c", THREADS], capture_output=True, text=True, check=False
+    )
+    assert (done.stdout, done.stderr) == (f"{[False] * 16}\n", "")

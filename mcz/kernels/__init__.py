@@ -21,6 +21,7 @@ from functools import cache, wraps
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from threading import RLock
 from types import ModuleType
 from typing import ParamSpec, TypeVar, cast
 
@@ -39,6 +40,7 @@ MODE = os.environ.get("MCZ_LOOPS") or COMPILED
 if MODE not in MODES:
     raise ValueError(f"MCZ_LOOPS={MODE}: one of {', '.join(MODES)}")
 PACKAGE = Path(__file__).parents[1]
+_LOADING = RLock()
 SLOW = "kernels run as plain Python, 50 to 500 times slower: "
 
 
@@ -79,8 +81,13 @@ def lacks_compiled_kernels() -> bool:
     return MODE != INTERPRETED and any(_unit(name)[0] is None for name in set(UNIT_OF.values()))
 
 
-@cache
 def _unit(name: str) -> tuple[ModuleType | None, str]:
+    with _LOADING:  # two threads would execute one module, and one of them see half of it
+        return _loaded(name)
+
+
+@cache
+def _loaded(name: str) -> tuple[ModuleType | None, str]:
     return load_unit(PACKAGE / "kernels" / MODE, name)
 
 
