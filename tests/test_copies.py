@@ -82,13 +82,13 @@ def content(data: bytes, *, salvage: bool = False) -> dict[str, object]:
 def test_a_bad_byte_costs_nothing_that_has_a_copy(packed: bytes) -> None:
     whole = content(packed)
     assert len(whole) == 8  # three clips, a signal more, three files, an ASF
-    for number, chunk in enumerate(chunks(packed, *COPIED)):
-        at = (0, 9, 16 + (chunk.length or 0) // 2, chunk.size - 1)[number % 4]
-        bad = changed(packed, chunk.offset + at)
-        with mcz.open(bad, salvage=True) as file:
-            assert re.match(f"{chunk.label}: .*; its copy is used", file.damage[0])
-            assert len(file.damage) == 1
-        assert content(bad, salvage=True) == whole, (chunk, at)
+    for chunk in chunks(packed, *COPIED):
+        for at in (0, 9, 16 + (chunk.length or 0) // 2, chunk.size - 1):
+            bad = changed(packed, chunk.offset + at)
+            with mcz.open(bad, salvage=True) as file:
+                assert re.match(f"{chunk.label}: .*; its copy is used", file.damage[0])
+                assert len(file.damage) == 1
+            assert content(bad, salvage=True) == whole, (chunk, at)
 
 
 def test_all_of_them_may_be_bad_at_once(packed: bytes) -> None:
@@ -100,16 +100,16 @@ def test_all_of_them_may_be_bad_at_once(packed: bytes) -> None:
     assert content(bad, salvage=True) == content(packed)
 
 
-@pytest.mark.parametrize(("codec", "n"), [("lossless", 20), ("raw", 60)])
-def test_bit_rot(folder: Path, codec: str, n: int) -> None:
+@pytest.mark.parametrize("codec", ["lossless", "raw"])
+def test_bit_rot(folder: Path, codec: str) -> None:
     """A byte anywhere: only the DATA that has it is lost, each loss is named, no value wrong."""
     out = io.BytesIO()
     mcz.pack(folder, out, codec=codec)
     data, draw = out.getvalue(), random.Random(codec)
     spans = [(c.offset, c.offset + c.size) for c in chunks(data, b"DATA")]
     truth = signals(data)
-    for number in range(n):
-        at = len(data) * number // n + draw.randrange(len(data) // n)
+    for number in range(60):
+        at = len(data) * number // 60 + draw.randrange(len(data) // 60)
         n_lost = 0
         bad = changed(data, at)
         for name, values in signals(bad, salvage=True).items():

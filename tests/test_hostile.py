@@ -145,7 +145,7 @@ def test_flipped_bits_behind_repaired_checksums(data: bytes) -> None:
 def test_memory_stays_bounded(data: bytes) -> None:
     parts = parts_of(data)
     for which, (_chunk, payload) in enumerate(parts):
-        bad = [flipped(payload, *at) for at in flips(len(payload), 15, seed=100 + which)]
+        bad = [flipped(payload, *at) for at in flips(len(payload), 40, seed=100 + which)]
         files = [joined(replaced(parts, which, changed)) for changed in bad]
         with memory_below(MEMORY):
             for file in files:

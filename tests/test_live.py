@@ -307,7 +307,7 @@ def test_flipped_bits_are_found() -> None:
         row = file.container.directory.clips["live"]
         assert row.cend is not None
         places = range(row.clip.offset + row.clip.size, row.cend.offset)
-    for byte in places[::3]:
+    for byte in places:
         bad = flipped(data, byte, byte % 8)
         assert mcz.verify(bad) != [], byte
         with pytest.raises(mcz.MczError):
@@ -335,7 +335,7 @@ def with_body(data: bytes, frame: int, change: Callable[[bytes], bytes]) -> byte
 def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
     data = live(frames(13))
     for frame in range(13):
-        for at in range(1, 160, 13):
+        for at in range(1, 160, 8):
             for change in (
                 lambda body, at=at: flipped(body, at // 8 % len(body), at % 8) if body else b"x",
                 lambda body, at=at: body[: at % max(1, len(body))] if body else b"\0",

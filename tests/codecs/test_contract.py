@@ -370,7 +370,7 @@ def test_a_c3d_comes_back_with_its_gaps_and_signals(
 @pytest.mark.parametrize(
     ("codec", "params", "n_frames", "least", "error"),
     [
-        ("mrdwt", {"T_g": 0.02}, 300, 1, 1),
+        ("mrdwt", {"T_g": 0.02}, 900, 2, 1),
         ("qbc", {"d2_lmt": 4}, 900, 2, 2),
         ("pca", {"q": 250}, 300, 1, 3),
         ("dwt", {"t_w": 0.02}, 300, 1, 3),
