@@ -14,12 +14,12 @@ from tools.vectors.build.cuts import cut
 from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.source_files import BOTH, path_of, restored, unhashed
 from tools.vectors.build.table_files import MARKERS, ODD_SECTIONS, SPEC, TIMES, VICON
-from tools.vectors.valid.sources.tables import take_table, with_fields
+from tools.vectors.valid.sources.tables import odd_sections, take_table, with_fields
 
 
 def add(shelf: Whole) -> None:
     _hold(shelf, "sections-names", "Names that repeat, anew in each header; bytes above.", _names())
-    odd = take_table(ODD_SECTIONS, "numbers.csv")
+    odd = odd_sections("numbers.csv")
     other = unhashed(replace(odd, frame_numbers=np.array([1, 5, 3])))
     _hold(shelf, "sections-numbers", "A number is not as printed: it is another one.", other)
     times = take_table(TIMES, "hidden.trc")

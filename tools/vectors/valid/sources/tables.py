@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -37,7 +39,6 @@ CSV = {
     "motive-euler": (EULER, "Motive: angles in another order than their columns."),
     "vicon": (VICON, "Vicon: sections of one and two rows a frame, in segments of two frames."),
     "vicon-devices": (DEVICES, "Vicon: devices alone; the motion has no channel."),
-    "vicon-odd": (ODD_SECTIONS, "Vicon: sub frames that do not count, layouts of single rows."),
     "csv": (COLUMNS, "Columns of numbers with names and units, no line end at the end."),
 }
 
@@ -52,6 +53,8 @@ def add(shelf: Whole) -> None:
     _hold(shelf, "trc-times-segments", "The same, in segments.", times, segment_frames=1)
     for name, (text, purpose) in CSV.items():
         _hold(shelf, name, purpose, take_table(text, f"{name}.csv"), segment_frames=2)
+    purpose = "Vicon: sub frames that do not count, layouts of single rows."
+    _hold(shelf, "vicon-odd", purpose, odd_sections("vicon-odd.csv"), segment_frames=2)
     _clocks(shelf)
     _sections(shelf)
     _headers(shelf)
@@ -120,6 +123,20 @@ def _turned(plain: Motion) -> Motion:
     return with_fields(plain, edit)
 
 
+def odd_sections(name: str) -> Motion:
+    """The motion of ODD_SECTIONS with the channel without any value that its last comma makes."""
+    motion = take_table(ODD_SECTIONS.replace(b"118.56,\n", b"118.56,0\n"), name)
+    markers = motion.signals[0]
+    assert markers.mask is not None
+    mask = markers.mask.copy()
+    mask[0, -1] = False  # a reader leaves out a column that is empty throughout
+    motion = replace(motion, signals=(replace(markers, mask=mask), *motion.signals[1:]))
+    assert restored(unhashed(motion)) == ODD_SECTIONS
+    assert motion.source is not None
+    sha256 = hashlib.sha256(ODD_SECTIONS).digest()
+    return replace(motion, source=replace(motion.source, size=len(ODD_SECTIONS), sha256=sha256))
+
+
 def _clocks(shelf: Whole) -> None:
     """Times of frames that have other numbers, and of other clocks."""
     plain = take_table(MARKERS, "clock.trc")
@@ -127,10 +144,10 @@ def _clocks(shelf: Whole) -> None:
     purpose = "Frames that have got other numbers, one of them below 0: their times follow."
     signals = tuple(replace(s, values=np.abs(s.values)) for s in numbers.signals)
     _hold(shelf, "clock-numbers", purpose, replace(numbers, signals=signals))
-    for name, offset, numerator, denominator in (
-        ("down", -1, 1, 3),
-        ("still", 7, 0, 1),
-        ("large", 2**50, 2**30 + 1, 2**31),
+    for name, offset, numerator, denominator, rate in (
+        ("down", -1, 1, 3, 3000),
+        ("still", 7, 0, 1, 60),
+        ("large", 2**50, 2**30 + 1, 2**31, 2000),
     ):
 
         def edit(
@@ -140,7 +157,8 @@ def _clocks(shelf: Whole) -> None:
             update(fields.sections[0].clock, dict(zip(names, given, strict=True)))
 
         purpose = f"A clock that is {name}: its quotients are rounded down."
-        _hold(shelf, f"clock-{name}", purpose, with_fields(plain, edit))
+        at_rate = replace(plain, frame_rate=Fraction(rate))  # of the clock: it stays
+        _hold(shelf, f"clock-{name}", purpose, with_fields(at_rate, edit))
 
 
 def _headers(shelf: Whole) -> None:
