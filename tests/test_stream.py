@@ -23,7 +23,6 @@ from mcz.container.chunks import (
     build_chunk,
     build_foot,
     build_header,
-    chunks_in,
 )
 from mcz.container.packets import (
     END,
@@ -35,6 +34,7 @@ from mcz.container.packets import (
     head_size,
     numbered_frame,
 )
+from mcz.container.repeats import chunks_in
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.container.source import open_source
@@ -135,7 +135,7 @@ def test_what_is_repeated(codec: str) -> None:
     for chunk in repeats:
         payload = data[chunk.payload_offset :][: chunk.length]
         assert payload == opening
-        assert [inner.type for inner in chunks_in(payload, 0)] == [b"HEAD", b"SKEL", b"CLIP"]
+        assert [inner.chunk.type for inner in chunks_in(payload, 0)] == [b"HEAD", b"SKEL", b"CLIP"]
     with mcz.open(data) as file:
         clip = info(file)["clips"][0]
         assert clip["between_bytes"] == sum(chunk.size for chunk in repeats)
@@ -780,8 +780,7 @@ def short(kind: int, sequence: int, number: int) -> Packet:
 def test_behind_a_gap_among_several_signals_numbers_are_not_known(kind: int) -> None:
     opening = pieces(n=1)[0]
     clip = chunks_in(opening.removeprefix(SIGNATURE), 0)[-1]
-    payload = opening[clip.payload_offset + len(SIGNATURE) :][: clip.length]
-    fields = parse(payloads.Clip, payload, "CLIP")
+    fields = parse(payloads.Clip, clip.payload, "CLIP")
     fields.signals.append(fields.signals[0])
     two = build_chunk(b"CLIP", built(payloads.Clip, fields, "CLIP"))
     other = build_segment(SegmentHeader(1, 0, 1), [bytes([2] * 9)])
@@ -830,7 +829,7 @@ def test_what_a_stream_may_repeat() -> None:
     parts = pieces()
     opening = parts[0].removeprefix(SIGNATURE)
     head = chunks_in(opening, 0)[0]
-    for payload in (b"", opening[: head.size], opening[:-1], opening + opening, b"noise"):
+    for payload in (b"", head.data, opening[:-1], opening + opening, b"noise"):
         data = parts[0] + build_chunk(REPEAT, payload, ANCILLARY) + b"".join(parts[1:])
         found, summary = read(data, lost="hold")
         assert states(found) == "d" * 60
@@ -860,10 +859,10 @@ def test_a_model_that_is_lost_comes_again() -> None:
     parts = pieces("lsdt-frame")
     opening = parts[0]
     inner = chunks_in(opening.removeprefix(SIGNATURE), len(SIGNATURE))
-    for chunk in inner:
-        bad = flipped(opening, chunk.offset + 18, 1)
+    for event in inner:
+        bad = flipped(opening, event.offset + 18, 1)
         found, _ = read(b"".join([bad, *parts[1:]]), lost="hold")
-        assert states(found) == "m" * 10 + "d" * 50, chunk.label
+        assert states(found) == "m" * 10 + "d" * 50, event.chunk.label
 
 
 # The post filter ---------------------------------------------------------------------------

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from mcz.container.chunks import FRAMING, chunks_in
+from mcz.container.chunks import FRAMING
+from mcz.container.repeats import chunks_in
 from mcz.errors import FormatError
 
 LEAST_BETWEEN = 2 * FRAMING  # bytes in which a CEND and the next CLIP can have been
@@ -50,10 +51,9 @@ class Bounds:
         ``offset``: where that begins; ``own``: the payload of the CLIP that is open.
         """
         try:
-            clips = [chunk for chunk in chunks_in(payload, offset) if chunk.type == b"CLIP"]
+            held = [c.payload for c in chunks_in(payload, offset) if c.chunk.type == b"CLIP"]
         except FormatError:  # what is no REPT says nothing
             return True
-        held = [payload[c.payload_offset - offset :][: c.length] for c in clips]
         self.doubt = held != [own]
         return not held or held == [own]
 

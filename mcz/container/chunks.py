@@ -5,10 +5,8 @@ SPEC.md, "Chunks" and "FOOT", are normative.
 
 from __future__ import annotations
 
-import re
 import struct
 import zlib
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from mcz.container.source import ByteSource
@@ -41,8 +39,6 @@ FLAGS_OF = {
 }
 REPEATED = (b"HEAD", b"SKEL", b"MODL", b"CLIP")  # the chunks that a REPT holds again
 COPIED = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ALIA", b"CLIP", b"CEND")  # and a COPY
-
-_CANDIDATE = re.compile(rb"(?=[A-Za-z]{4}[\x00-\x03]\x00)")  # looks like the start of a header
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,14 +124,6 @@ def read_chunk(source: ByteSource, offset: int) -> Chunk:
     return chunk
 
 
-def named_chunk(source: ByteSource, offset: int) -> Chunk | None:
-    """The chunk that the header at ``offset`` names, however much of it is there."""
-    try:
-        return parse_header(source.read(offset, HEADER.size), offset)
-    except FormatError:
-        return None
-
-
 def read_payload(source: ByteSource, chunk: Chunk, limit: int) -> bytes:
     """The checked payload of ``chunk``; raises ChecksumError, or LimitError beyond ``limit``."""
     if chunk.length is None:
@@ -152,29 +140,17 @@ def check_chunk(data: bytes, chunk: Chunk) -> bytes:
         raise FormatError(f"chunk {chunk.label} is not whole")
     if (found.type, found.length) != (chunk.type, chunk.length):
         raise FormatError(f"chunk {chunk.label} is not what the index says")
-    (stored,) = CRC.unpack(data[-CRC.size :])
-    computed = zlib.crc32(memoryview(data)[: -CRC.size])
+    check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
+    return data[HEADER.size : -CRC.size]
+
+
+def check_crc(chunk: Chunk, computed: int, crc: bytes) -> None:
+    """Raise ChecksumError where the ``crc`` of a chunk is not the one that was computed."""
+    (stored,) = CRC.unpack(crc)
     if stored != computed:  # CHUNK-03
         raise ChecksumError(
             f"crc of chunk {chunk.label} is {computed:#010x}, stored is {stored:#010x}"
         )
-    return data[HEADER.size : -CRC.size]
-
-
-def chunks_in(payload: bytes, offset: int) -> list[Chunk]:
-    """The chunks in the ``payload`` of a REPT, which begins at ``offset``; raises FormatError."""
-    chunks, at = [], 0
-    while at < len(payload):
-        chunk = parse_header(payload[at : at + HEADER.size], offset + at)
-        check_chunk(payload[at : at + chunk.size], chunk)
-        chunks.append(chunk)
-        at += chunk.size
-    kinds = [chunk.type for chunk in chunks]
-    middle = set(kinds[1:-1]) <= {b"SKEL", b"MODL"}
-    if kinds[:1] != [b"HEAD"] or kinds[-1:] != [b"CLIP"] or not middle:
-        found = " ".join(kind.decode() for kind in kinds)
-        raise FormatError(f"{REPEAT.decode()} before {offset} holds {found or 'nothing'}")
-    return chunks
 
 
 def build_foot(index_offset: int, index_length: int) -> bytes:
@@ -207,7 +183,11 @@ def parse_foot(data: bytes, offset: int) -> Foot | None:
 
 
 def check_signature(source: ByteSource) -> None:
-    data = source.read(0, min(len(SIGNATURE), source.size))
+    check_signature_in(source.read(0, min(len(SIGNATURE), source.size)))
+
+
+def check_signature_in(data: bytes) -> None:
+    """Raise FormatError unless a file that begins with ``data`` begins as it must."""
     if not data:
         raise TruncatedError("the file is empty")
     if data != SIGNATURE[: len(data)]:  # CHUNK-01
@@ -224,49 +204,4 @@ def is_foot_at(source: ByteSource, offset: int) -> bool:
         raise TruncatedError(f"the file ends at {source.size}, in a FOOT at {offset}")
     if parse_foot(source.read(offset, FOOT.size), offset) is None:
         raise FormatError(f"at {offset} there is neither a chunk nor a FOOT")
-    return True
-
-
-def resynchronize(
-    source: ByteSource, start: int, limit: int, spend: Callable[[int], None]
-) -> int | None:
-    """The offset of the next valid chunk or FOOT at or after ``start``, None where there is none.
-
-    A chunk counts when both its header_check and its crc are right. ``spend`` is told how many
-    bytes will be read to find that out, and may raise.
-    """
-    window = 4 * 1024 * 1024
-    overlap = FOOT.size - 1
-    while start < source.size:
-        data = source.read(start, min(window, source.size - start))
-        for at in _candidates(data):
-            if _is_valid(source, start + at, limit, spend):
-                return start + at
-        if start + len(data) == source.size:
-            return None
-        start += len(data) - overlap
-    return None
-
-
-def _candidates(data: bytes) -> Iterator[int]:
-    """Offsets where the header of a chunk, or a FOOT, may begin, in order."""
-    chunks = [m.start() for m in _CANDIDATE.finditer(data)]
-    feet = [m.start() - 24 for m in re.finditer(re.escape(END_MAGIC), data) if m.start() >= 24]
-    return iter(sorted(chunks + feet))
-
-
-def _is_valid(source: ByteSource, offset: int, limit: int, spend: Callable[[int], None]) -> bool:
-    try:
-        if is_foot_at(source, offset):
-            return True
-        chunk = read_chunk(source, offset)
-    except FormatError:
-        return False
-    if chunk.length is None:
-        return True
-    spend(chunk.length)
-    try:
-        read_payload(source, chunk, limit)
-    except FormatError:
-        return False
     return True

@@ -8,11 +8,9 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 
 from mcz.container.limits import check
-from mcz.container.source import ByteSource, Forward
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import take_varint, varint
 
@@ -41,7 +39,7 @@ def numbered_frame(sequence: int, number: int, body: bytes, *, fresh: bool) -> P
 
 def body_check(body: bytes, number: int | None = None) -> bytes:
     """The check of a body; ``number`` is that of the frame in a packet of kind 3."""
-    return _check16(body if number is None else body + struct.pack("<Q", number))
+    return check16(body if number is None else body + struct.pack("<Q", number))
 
 
 def check_number(packet: Packet, number: int) -> None:
@@ -52,7 +50,8 @@ def check_number(packet: Packet, number: int) -> None:
         )
 
 
-def _check16(data: bytes) -> bytes:
+def check16(data: bytes) -> bytes:
+    """The check of the head of a packet, and of a body."""
     return struct.pack("<H", zlib.crc32(data) & 0xFFFF)
 
 
@@ -63,7 +62,7 @@ def _head(kind: int, fresh: bool, sequence: int, length: int) -> bytes:
 def build_packet(packet: Packet) -> bytes:
     head = _head(packet.kind, packet.fresh, packet.sequence, len(packet.body))
     check = body_check(packet.body) if packet.check is None else packet.check
-    return head + _check16(head) + packet.body + check
+    return head + check16(head) + packet.body + check
 
 
 def head_size(sequence: int, length: int) -> int:
@@ -82,7 +81,7 @@ def is_head(data: bytes, kind: int, fresh: bool, length: int) -> bool:
         number = head[1 : 1 + size]
         whole = number[-1] < 0x80 and all(byte >= 0x80 for byte in number[:-1])
         fits = whole and (head[:1], head[1 + size :]) == (first, ending)
-        if fits and _check16(head) == data[-CHECK_SIZE:]:
+        if fits and check16(head) == data[-CHECK_SIZE:]:
             return True
     return False
 
@@ -107,16 +106,6 @@ def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
         sequence += 1
 
 
-def whole_until(source: ByteSource, start: int, limit: int) -> int:
-    """Return where the packets from ``start`` on end that are whole, whatever is in them."""
-    read, end = Forward(source, start), start
-    with suppress(FormatError):
-        for _ in read_packets(read, limit):
-            end = read.at
-        end = read.at
-    return end
-
-
 def read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
     """One packet, whatever its number; raises as ``read_packets`` does."""
     head = bytearray(read(1))
@@ -126,7 +115,7 @@ def read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
         return head[-1]
 
     values = [take_varint(iter(seen, None), "packet") for _ in range(2)]
-    if read(2) != _check16(bytes(head)):  # PACK-03
+    if read(2) != check16(bytes(head)):  # PACK-03
         raise ChecksumError(f"head_check of packet {values[0]} is wrong")
     kind = head[0] & 0x0F
     if kind > NUMBERED or head[0] & 0x70:  # PACK-08, PACK-09

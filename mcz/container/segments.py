@@ -10,7 +10,6 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mcz.container.packets import SHORT, Packet, check_number
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.schema import MAX_COUNT, read_varint, varint
 
@@ -171,19 +170,3 @@ def frame_table(header: SegmentHeader, counts: StreamCounts, size: int) -> Strea
             f"groups and {counts.n_resolutions} resolutions"
         )
     return StreamTable(header, counts, 0, (0,), (size,))
-
-
-def header_of(packet: Packet, start: int, due: int, *, is_known: bool) -> SegmentHeader:
-    """The header of the segment in the packet at ``start``.
-
-    ``due``: the frame that follows those before it; ``is_known``: one of these has told its own.
-    """
-    if packet.kind in SHORT:
-        if not is_known:  # PACK-14
-            raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
-        check_number(packet, due)
-        return SegmentHeader(0, due, 1, flags=FRESH if packet.fresh else 0)  # PACK-12
-    header, _ = parse_header(packet.body)
-    if packet.fresh != bool(header.flags & FRESH):  # PACK-11
-        raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
-    return header

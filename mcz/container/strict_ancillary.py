@@ -21,9 +21,12 @@ def check_ancillary(
     payload: bytes,
     file_bytes: int,
     found: Found,
-    payload_of: Callable[[Chunk], bytes],
+    payload_of: Callable[[Chunk], bytes] | None,
 ) -> None:
-    """Check ``chunk`` of a file of ``file_bytes``; ``found`` lies before it. Raises FormatError."""
+    """Check ``chunk`` of a file of ``file_bytes``; ``found`` lies before it. Raises FormatError.
+
+    Without ``payload_of``, which reads that again, copies are not compared with it.
+    """
     if chunk.type == b"QUAL":
         parse(payloads.Qual, payload, chunk.label)  # QUAL-02
     elif chunk.type == META:
@@ -31,4 +34,6 @@ def check_ancillary(
             raise FormatError(f"chunk {chunk.label} lies before the first clip")
         parse_meta(payload, chunk, file_bytes)
     elif chunk.type == COPY:
-        check_copies(parse_copies(payload, chunk, file_bytes), chunk, found.chunks, payload_of)
+        copies = parse_copies(payload, chunk, file_bytes)
+        if payload_of is not None:
+            check_copies(copies, chunk, found.chunks, payload_of)

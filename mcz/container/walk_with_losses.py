@@ -24,7 +24,6 @@ from mcz.container.chunks import (
     REPEATED,
     SIGNATURE,
     check_chunk,
-    chunks_in,
     parse_header,
 )
 from mcz.container.limits import BASE, MIB, Search, check
@@ -36,8 +35,69 @@ from mcz.container.packets import (
     check_number,
     read_packet,
 )
-from mcz.container.walk_arriving import PipeSource
+from mcz.container.repeats import chunks_in
+from mcz.container.source import ByteSource
 from mcz.errors import FormatError, TruncatedError, UnsupportedError
+from mcz.schema import MAX_COUNT
+
+MOST_AT_ONCE = 64 * 1024  # bytes that are taken from the stream where it has them
+
+
+class PipeSource(ByteSource):
+    """A stream that is read front to back; it need not be seekable, and its end is not known."""
+
+    def __init__(self, stream: BinaryIO, name: str = "stream") -> None:
+        super().__init__(stream, name=name, size=MAX_COUNT)
+        self.block = 0  # nothing is waited for that is not needed yet
+        self._start = 0  # offset of the first byte that is kept
+        self._kept = bytearray()
+
+    def _request(self, offset: int, size: int) -> bytes:
+        stop = offset + size - self._start
+        while len(self._kept) < stop:
+            more = self._more(stop - len(self._kept))
+            if not more:
+                raise TruncatedError(f"the stream ended at {self._start + len(self._kept)}")
+            self._kept += more
+        self.n_requests += 1
+        self.n_bytes += size
+        return bytes(self._kept[offset - self._start : stop])
+
+    def _more(self, wanted: int) -> bytes:
+        """Some of the bytes that come next, waiting for the first of them alone if possible."""
+        if hasattr(self._stream, "read1"):
+            data: bytes = self._stream.read1(MOST_AT_ONCE)
+        else:
+            data = self._stream.read(wanted)
+        return data
+
+    @property
+    def start(self) -> int:
+        """What lies before was let go."""
+        return self._start
+
+    @property
+    def end(self) -> int:
+        """The bytes that have come."""
+        return self._start + len(self._kept)
+
+    def kept(self, at: int) -> bytes:
+        """What has come of the bytes from ``at`` on, which is not before what was let go."""
+        return bytes(self._kept[at - self._start :])
+
+    def forget(self, before: int) -> None:
+        """Let go of what lies before an offset."""
+        del self._kept[: max(0, before - self._start)]
+        self._start = max(self._start, before)
+
+    def has_ended(self, at: int) -> bool:
+        """Whether the stream ends at ``at``; waits until it goes on or ends."""
+        try:
+            self.read(at, 1)
+        except TruncatedError:
+            return True
+        return False
+
 
 TYPES = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ATTA", b"ALIA", b"CLIP", b"DATA", b"CEND")
 KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT, COPY, META, RECOVERY))
@@ -92,15 +152,8 @@ class _Misplaced(FormatError):
 
 def repeated(piece: Piece) -> list[Piece]:
     """The chunks in a REPT; raises FormatError where it has others than it may have."""
-    payload = piece.payload or b""
-    return [
-        Piece(
-            chunk.type,
-            payload[chunk.offset :][: chunk.size],
-            payload[chunk.payload_offset :][: chunk.length],
-        )
-        for chunk in chunks_in(payload, 0)
-    ]
+    found = chunks_in(piece.payload or b"", 0)
+    return [Piece(event.chunk.type, event.data, event.payload) for event in found]
 
 
 class WalkerWithLosses:

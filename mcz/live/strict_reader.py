@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.container.chunks import build_foot
+from mcz.container.directory import SegmentRow
+from mcz.container.events import ChunkEvent, PacketEvent
+from mcz.container.feeding import Stream
 from mcz.container.reader import Container
+from mcz.container.scanner import Scanner
 from mcz.container.segments import FRESH
 from mcz.container.source import ByteSource
-from mcz.container.walk_arriving import Arrival, ArrivingWalker
 from mcz.container.writer import payload_id
 from mcz.errors import FormatError, OptionError
 from mcz.live.clip_state import ClipState, LiveClip, Shared, begin, opening
@@ -52,7 +55,8 @@ class StrictFrames:
     """
 
     def __init__(self, stream: BinaryIO) -> None:
-        self._walker = ArrivingWalker(stream)
+        self._stream = Stream(stream)
+        self.scanner = Scanner(None)
         self.clip: LiveClip | None = None
         self.payload_bytes = 0
         self.is_checked = False
@@ -60,39 +64,43 @@ class StrictFrames:
     @property
     def size(self) -> int:
         """The bytes that came."""
-        return self._walker.pipe.end
+        return self._stream.size
 
     def frames(self) -> Iterator[Frame]:
         """As ``live_frames``."""
         head = b""
         shared: Shared = {}
         clip: ClipState | _Held | None = None
-        for arrival in self._walker.arrivals():
-            kind = arrival.chunk.type if arrival.chunk is not None else b"FOOT"
+        for event in self._stream.events(self.scanner.parser):
+            self.scanner.take(event)
+            if not isinstance(event, (ChunkEvent, PacketEvent)):
+                continue
+            kind = event.chunk.type
             if kind == b"HEAD":
-                head = arrival.data
+                head = event.data
             elif kind in SHARED:
-                shared.setdefault((kind, payload_id(arrival.payload)), arrival.data)
+                shared.setdefault((kind, payload_id(event.payload)), event.data)
             elif kind == b"CLIP":
-                row = self._walker.clip
+                row = self.scanner.clip
                 assert row is not None
-                fields = parse(payloads.Clip, arrival.payload, row.clip.label)
+                fields = parse(payloads.Clip, event.payload, row.clip.label)
                 before = opening(head, shared, fields)
-                clip = begin(head, shared, row, fields) or _Held(before + arrival.data, row.name)
+                clip = begin(head, shared, row, fields) or _Held(before + event.data, row.name)
             elif isinstance(clip, ClipState):
-                yield from self._frame(clip, kind, arrival)
+                if kind == b"CEND":
+                    clip.check_hash(parse(payloads.Cend, event.payload, "CEND"))  # PACK-19
+                    self.is_checked = True
+                for segment in self.scanner.clip.segments if self.scanner.clip else ():
+                    yield from self._frame(clip, segment, event.payload)
             elif clip is not None:
-                yield from clip.take(self, kind, arrival)
+                yield from clip.take(self, kind, event)
+            self.scanner.forget()
             clip = None if kind == b"CEND" else clip
 
-    def _frame(self, clip: ClipState, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
-        row = arrival.segment
-        if kind == b"CEND":
-            clip.check_hash(parse(payloads.Cend, arrival.payload, "CEND"))  # PACK-19
-            self.is_checked = True
-        if row is None or row.header.signal:
+    def _frame(self, clip: ClipState, row: SegmentRow, payload: bytes) -> Iterator[Frame]:
+        if row.header.signal:
             return
-        stream, mask = clip.parts(row.header, row.packet, arrival.payload)
+        stream, mask = clip.parts(row.header, row.packet, payload)
         self.payload_bytes += len(stream)
         frame = row.header.first
         fresh = bool(row.header.flags & FRESH)
@@ -117,8 +125,10 @@ class _Held:
     def __init__(self, data: bytes, name: str) -> None:
         self._parts, self._name = [data], name
 
-    def take(self, reader: StrictFrames, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
-        self._parts.append(arrival.data)
+    def take(
+        self, reader: StrictFrames, kind: bytes, event: ChunkEvent | PacketEvent
+    ) -> Iterator[Frame]:
+        self._parts.append(event.data)
         if kind != b"CEND":
             return
         container = Container(ByteSource(io.BytesIO(b"".join(self._parts) + build_foot(0, 0))))

@@ -14,8 +14,8 @@ import pytest
 
 import mcz
 from mcz import live_frames
-from mcz.container.walk_arriving import ArrivingWalker
 from mcz.formats import FORMATS
+from mcz.live.strict_reader import StrictFrames
 from mcz.live.text_writer import encode_live
 from mcz.writing.entry import Terms
 
@@ -331,12 +331,12 @@ def test_nothing_is_kept_that_was_used() -> None:
     encode_live(
         lines(HEADER + b"".join(LINES) * 500), out, "bvh", Terms("lsdt-frame", {"step": 0.01})
     )
-    follower = ArrivingWalker(io.BytesIO(out.getvalue()))
-    for arrival in follower.arrivals():
-        if arrival.segment is not None:
-            assert follower.clip is not None
-            assert follower.clip.segments == []
-    assert len(follower.found.chunks) <= 1
+    reader = StrictFrames(io.BytesIO(out.getvalue()))
+    for _ in reader.frames():
+        assert reader.scanner.clip is not None
+        assert len(reader.scanner.clip.segments) == 1
+        assert len(reader.scanner.found.chunks) <= 1
+    assert reader.scanner.found.chunks == []
 
 
 def test_frames_that_did_not_come_are_remarked(tmp_path: Path) -> None:

@@ -1,0 +1,58 @@
+"""Drivers of a parser: they read what it needs, from a file or from a stream that goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from mcz.container.events import Event
+from mcz.container.parser import Parser
+from mcz.container.source import ByteSource
+
+MOST_AT_ONCE = 64 * 1024  # bytes that are taken from a stream where it has them
+
+
+def events(source: ByteSource, parser: Parser) -> Iterator[Event]:
+    """The events of a file; bytes that the parser passes over are not read."""
+    while True:
+        event = parser.next()
+        if event is not None:
+            yield event
+        elif parser.is_done:
+            return
+        else:
+            at, size = parser.wants
+            parser.feed(source.read(at, min(max(size, source.block), source.size - at)))
+
+
+class Stream:
+    """A stream that is read front to back; it need not be seekable, and its end is not known.
+
+    ``size`` counts the bytes that came. Nothing is waited for that the parser does not need yet.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+        self.size = 0
+
+    def events(self, parser: Parser) -> Iterator[Event]:
+        """The events of the stream, each as soon as its bytes are there."""
+        while True:
+            event = parser.next()
+            if event is not None:
+                yield event
+            elif parser.is_done:
+                return
+            else:
+                self._feed(parser)
+
+    def _feed(self, parser: Parser) -> None:
+        at, size = parser.wants
+        if hasattr(self._stream, "read1"):
+            data: bytes = self._stream.read1(MOST_AT_ONCE)
+        else:
+            data = self._stream.read(at + size - self.size)
+        if not data:
+            parser.end()
+        self.size += len(data)
+        parser.feed(data[max(0, len(data) - (self.size - at)) :])

@@ -1,0 +1,419 @@
+"""The parser of files: bytes in, events out, whoever reads the bytes.
+
+It follows the table of ``grammar.py``, and says of every break where it is; what to do about it is
+up to those who take the events. SPEC.md, "Chunks", "Grammar", "Open DATA and packets" and
+"Salvage", are normative.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Callable
+
+from mcz.container.chunks import (
+    CRC,
+    END_MAGIC,
+    FOOT,
+    HEADER,
+    SIGNATURE,
+    Chunk,
+    check_crc,
+    check_signature_in,
+    parse_foot,
+    parse_header,
+)
+from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
+from mcz.container.grammar import (
+    BODY,
+    CLIP,
+    CRITICAL,
+    END,
+    END_PACKET,
+    GRAMMAR,
+    INDEX,
+    OPEN_DATA,
+    OTHER,
+    PACKET,
+    PACKETS,
+    START,
+    after_misplaced,
+    misplaced,
+    thing_of,
+)
+from mcz.container.grammar import FOOT as FOOT_THING
+from mcz.container.grammar import SIGNATURE as UNSIGNED
+from mcz.container.limits import BASE, Search, check
+from mcz.container.packets import (
+    CHECK_SIZE,
+    FRAME,
+    NUMBERED,
+    SEGMENT,
+    Packet,
+    body_check,
+    check16,
+    check_number,
+)
+from mcz.container.packets import END as END_KIND
+from mcz.container.packets import FRESH as FRESH_PACKET
+from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.segments import parse_header as parse_segment
+from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
+from mcz.schema import MAX_COUNT, read_varint
+
+BLOCK = 2 * 1024 * 1024  # a chunk that is longer, and not wanted, is checked in parts
+ALL = MAX_COUNT  # of a payload, which is checked then
+PASS = -1  # less than nothing of it: it is not checked at all
+TRY = 256  # bytes that a try in a search counts as, beside those of the chunk
+
+Want = Callable[[Chunk], int]
+
+
+class Short(Exception):
+    """More bytes are needed: those up to ``stop``."""
+
+    def __init__(self, stop: int) -> None:
+        super().__init__()
+        self.stop = stop
+
+
+def everything(chunk: Chunk) -> int:
+    """Want the whole payload of every chunk."""
+    return ALL
+
+
+class Parser:
+    """The state of a parser, which is fed with bytes and asked for events.
+
+    ``size`` is that of the file, None where it is not known until ``end``. ``want`` tells how many
+    bytes of the payload of a chunk its event is to have, ``ALL`` or ``PASS``; with ``check`` the
+    others are read nevertheless, for the checksum.
+
+    The thing at ``at`` is next, in the state ``state`` of the grammar. After a Fault the parser
+    goes on behind what is wrong where its end is known, else with the next thing that is whole.
+    """
+
+    candidate = re.compile(  # looks like the beginning of a chunk, or is that of a FOOT
+        rb"(?=[A-Za-z]{4}[\x00-\x03]\x00|\x00{4}.{20}" + re.escape(END_MAGIC) + b")", re.DOTALL
+    )
+    overlap = FOOT.size - 1  # bytes in which a candidate may begin that is not there as a whole
+    rescans = False  # what follows is looked for in what is not whole, too
+
+    def __init__(
+        self,
+        size: int | None = None,
+        *,
+        at: int = 0,
+        state: str = UNSIGNED,
+        want: Want = everything,
+        check: bool = True,
+    ) -> None:
+        self.size, self.at, self.state = size, at, state
+        self.profile = BASE
+        self.is_done = False
+        self.number: int | None = None  # of the frame that is due, where a packet has told it
+        self._want, self._check, self._name = want, check, "the file"
+        self._start, self._data = at, b""  # what was fed and may be needed
+        self._stop = at + 1  # bytes up to here are needed
+        self._sequence = 0  # of the packet that is due
+        self._index: Chunk | None = None  # an INDX that waits for its FOOT
+        self._chunk: Chunk | None = None  # what lies at ``at``, or the open DATA around it
+        self._parts: tuple[ChunkEvent, int] | None = None  # a chunk in parts, its crc so far
+        self._is_lost = False
+        self._vain = Search()
+        self._tried = 0  # bytes of the chunk that was looked at last
+
+    @property
+    def wants(self) -> tuple[int, int]:
+        """Offset and least number of the bytes that are to be fed next."""
+        end = self._start + len(self._data)
+        return end, self._stop - end
+
+    def feed(self, data: bytes) -> None:
+        """Take the bytes that ``wants`` asks for, or more of them."""
+        used = min(max(0, self.at - self._start), len(self._data))
+        self._start, self._data = self._start + used, self._data[used:] + data
+
+    def end(self) -> None:
+        """Learn that a stream ends behind the bytes that were fed."""
+        self.size, self._name = self._start + len(self._data), "the stream"
+
+    def next(self) -> Event | None:
+        """The next event; None where more bytes are needed for it, or nothing follows."""
+        if self.state == UNSIGNED:
+            return self._signature()
+        begin = self.at if self._parts is None else self._parts[0].offset
+        try:
+            return None if self.is_done else self._found() if self._is_lost else self._thing()
+        except Short as short:
+            self._stop = short.stop
+            return None
+        except FormatError as error:
+            return self._fault(begin, error)
+
+    def search(self, at: int) -> None:
+        """Let the next thing be the first that is whole at ``at`` or behind it."""
+        self._go_to(at)
+        self._is_lost, self._index = True, None
+        self.state = {PACKETS: CLIP, INDEX: BODY}.get(self.state, self.state)
+
+    def _fault(self, begin: int, error: FormatError) -> Fault:
+        """The Fault of what begins at ``begin``, where ``at`` still is unless its end is known."""
+        is_lost = self.at == begin
+        if is_lost:
+            self.search(begin if self.state == PACKETS else begin + 1)
+        return Fault(begin, error, self._chunk, is_lost=is_lost)
+
+    def _found(self) -> Event | None:
+        """What is whole at ``at`` or behind it."""
+        while True:
+            begin = self.at
+            for match in self.candidate.finditer(self._data, begin - self._start):
+                self.at = at = self._start + match.start()
+                self._chunk, self._tried = None, 0
+                state = self.state
+                try:
+                    event = self._thing()
+                except FormatError as error:
+                    if self.at != at:  # it is whole, but not right
+                        self._is_lost = False
+                        return self._fault(at, error)
+                    self.state = state
+                    limit = self._spend(begin)
+                    if limit is not None:
+                        return limit
+                else:
+                    self._is_lost = False
+                    return event
+            end = self._start + len(self._data)
+            if self.size is not None and end >= self.size:
+                self._is_lost, self.at = False, self.size
+                return self._thing()
+            self.at = max(begin, end - self.overlap)
+            raise Short(end + 1)
+
+    def _spend(self, begin: int) -> Fault | None:
+        """Count what was looked at in vain; return the last event where that is too much."""
+        try:
+            came = self._start + len(self._data) if self.size is None else self.size
+            self._vain.spend(self._tried + TRY, came, "a chunk")  # LIVE-04
+        except LimitError as error:
+            self.is_done = True
+            return Fault(begin, error, is_lost=True)
+        return None
+
+    def _go_to(self, at: int) -> None:
+        self.at = at
+        if at > self._start + len(self._data):
+            self._start, self._data = at, b""
+            self._stop = at + 1
+
+    def _pass(self, chunk: Chunk) -> None:
+        """Go on behind a chunk that is not right, unless something is looked for in it."""
+        if self.rescans or self._is_lost:
+            return
+        self._go_to(chunk.offset + chunk.size)  # SALV-01
+        rows = GRAMMAR[CRITICAL.get(chunk.type, OTHER)]
+        if rows.get(self.state) in (BODY, CLIP):
+            self.state = rows[self.state]
+
+    def _position(self, start: int, stop: int, what: str = "a packet") -> int:
+        """Where the byte at ``start`` lies in the buffer, which has all up to ``stop``."""
+        if stop > self._start + len(self._data):
+            if self.size is not None and stop > self.size:
+                raise TruncatedError(f"{self._name} ends at {self.size}, in {what} at {self.at}")
+            raise Short(stop)
+        return start - self._start
+
+    def _thing(self) -> Event | None:
+        """What begins at ``at``; raises FormatError where it is not whole."""
+        if self._parts is not None:
+            return self._continued(*self._parts)
+        if self.state == PACKETS:
+            return self._packet()
+        self._chunk, at = None, self.at
+        if self.size is not None and at >= self.size:
+            self.is_done = True
+            if self.state in GRAMMAR[END]:  # STRICT-01
+                return None
+            return Fault(
+                at, TruncatedError(f"{self._name} ends at {at} without a FOOT"), is_lost=True
+            )
+        pos = self._position(at, at + 1)
+        return self._header(at) if self._data[pos : pos + 1].isalpha() else self._foot(at)
+
+    def _signature(self) -> Event | None:
+        size, data = len(SIGNATURE), self._data
+        if (self.size is None and len(data) < size) or (not data and self.size):
+            self._stop = size
+            return None
+        self.at, self.state = size, START
+        try:
+            check_signature_in(data[:size])
+        except FormatError as error:
+            return Fault(0, error)
+        return self.next()
+
+    def _header(self, at: int) -> Event:
+        pos = self._position(at, at + HEADER.size, "a chunk header")
+        chunk = self._chunk = parse_header(self._data[pos : pos + HEADER.size], at)
+        if chunk.length is None:
+            event = ChunkEvent(chunk, self._data[pos : pos + HEADER.size], OPEN_DATA)
+            self.at = event.end
+            found = self._placed(event)
+            if chunk.flags:  # CHUNK-10, PACK-10
+                error = FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on an open DATA")
+                return Fault(at, error, chunk, event)
+            return found
+        end = self._tried = at + chunk.size
+        if self.size is not None and end > self.size:  # CHUNK-05
+            raise TruncatedError(f"chunk {chunk.label} ends at {end}, {self._name} at {self.size}")
+        return self._payload(chunk, self._want(chunk))
+
+    def _payload(self, chunk: Chunk, wanted: int) -> Event:
+        """The chunk, checked as far as it is read."""
+        assert chunk.length is not None
+        at, end = chunk.offset, chunk.offset + chunk.size
+        kept = chunk.size if wanted == ALL else HEADER.size + min(max(0, wanted), chunk.length)
+        if wanted == ALL or (self._check and wanted != PASS):
+            if chunk.length > self.profile.chunk_bytes:
+                self._pass(chunk)
+                limit = self.profile.chunk_bytes  # CHUNK-04, LIMIT-07
+                raise LimitError(
+                    f"chunk {chunk.label}: {chunk.length} bytes are over the limit of {limit}"
+                )
+            if chunk.size > max(BLOCK, kept) and not self._is_lost:
+                pos = self._position(at, at + kept)
+                event = ChunkEvent(chunk, self._data[pos : pos + kept], "")
+                return self._continued(event, 0)
+            pos = self._position(at, end)
+            data = self._data[pos : pos + chunk.size]
+            self._check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
+            data = data if kept == chunk.size else data[:kept]
+        else:
+            pos = self._position(at, at + kept)
+            data = self._data[pos : pos + kept]
+        self._go_to(end)
+        return self._placed(ChunkEvent(chunk, data, thing_of(chunk)))
+
+    def _check_crc(self, chunk: Chunk, computed: int, stored: bytes) -> None:
+        try:
+            check_crc(chunk, computed, stored)
+        except ChecksumError:
+            self._pass(chunk)
+            raise
+
+    def _continued(self, event: ChunkEvent, crc: int) -> Event:
+        """A large chunk, of which no more is kept than the part that was fed last."""
+        chunk = event.chunk
+        covered = chunk.offset + chunk.size - CRC.size
+        part = self._data[self.at - self._start : covered - self._start]
+        crc = zlib.crc32(part, crc)
+        self.at += len(part)
+        self._parts = event, crc
+        if self.at < covered:
+            raise Short(min(self.at + BLOCK, covered + CRC.size))
+        pos = self._position(covered, covered + CRC.size)
+        self._parts, self.at = None, covered + CRC.size
+        check_crc(chunk, crc, self._data[pos : pos + CRC.size])
+        event.thing = thing_of(chunk)
+        return self._placed(event)
+
+    def _placed(self, event: ChunkEvent) -> Event:
+        """The chunk, or the Fault that it may not stand where it does."""
+        rows, state = GRAMMAR[event.thing], self.state
+        self.state = rows.get(state) or after_misplaced(event.thing, state)
+        self._index = event.chunk if event.thing == "INDX" else None
+        self._sequence, self.number = 0, None
+        if state in rows:  # GRAM-01
+            return event
+        error = misplaced(event.thing, event.chunk.label, state)
+        return Fault(event.offset, error, event.chunk, event, state)
+
+    def _foot(self, at: int) -> Event:
+        pos = self._position(at, at + FOOT.size, "a FOOT")
+        foot = parse_foot(self._data[pos : pos + FOOT.size], at)
+        if foot is None:
+            raise FormatError(f"at {at} there is neither a chunk nor a FOOT")
+        event, state, rows = FootEvent(foot, at, self._index), self.state, GRAMMAR[FOOT_THING]
+        self.at, self.state, self._index = event.end, rows[BODY], None
+        if not event.is_right:  # FOOT-04
+            error = FormatError(f"FOOT at {at} points to {foot}, the index is at {event.place}")
+            return Fault(at, error, None, event, state)
+        if state not in rows:
+            return Fault(at, misplaced(FOOT_THING, f"FOOT at {at}", state), None, event, state)
+        return event
+
+    def _packet(self) -> Event:
+        at, data = self.at, self._data
+        pos = self._position(at, at + 1)
+        try:
+            sequence, here = read_varint(data, pos + 1)
+            length, here = read_varint(data, here)
+        except TruncatedError:
+            self._position(at, self._start + len(data) + 1)
+            raise
+        except FormatError:  # CONV-02, CONV-03
+            raise FormatError(
+                f"packet at {at}: a varint beyond 2^53 - 1, or not shortest"
+            ) from None
+        body = self._start + here + CHECK_SIZE
+        if here + CHECK_SIZE > len(data):
+            self._position(at, body)
+        if data[here : here + CHECK_SIZE] != check16(data[pos:here]):  # PACK-03
+            raise ChecksumError(f"head_check of packet {sequence} is wrong")
+        kind = data[pos] & 0x0F
+        if kind > NUMBERED or data[pos] & 0x70:  # PACK-08, PACK-09
+            raise FormatError(f"packet {sequence}: kind {data[pos]:#04x}")
+        if length > self.profile.packet_bytes:
+            check(f"packet {sequence}", length, self.profile.packet_bytes)
+        if kind == END_KIND and length:  # PACK-05, PACK-07
+            raise FormatError(f"end packet with {length} bytes")
+        self._check_sequence(sequence)
+        here, stop = here + CHECK_SIZE, here + CHECK_SIZE + length
+        if stop + CHECK_SIZE > len(data):
+            self._position(at, body + length + CHECK_SIZE)
+        content, stored = data[here:stop], data[stop : stop + CHECK_SIZE]
+        own = stored if kind == NUMBERED else None
+        packet = Packet(kind, sequence, content, bool(data[pos] & FRESH_PACKET), own)
+        assert self._chunk is not None
+        return self._ordered(PacketEvent(self._chunk, packet, at, body), stored)
+
+    def _check_sequence(self, sequence: int) -> None:
+        if sequence != self._sequence:  # PACK-02
+            raise FormatError(f"packet {sequence} where {self._sequence} is due")
+
+    def _ordered(self, event: PacketEvent, stored: bytes) -> Event:
+        """The packet, its body checked, or the Fault that it is not right."""
+        packet = event.packet
+        self.at, self._sequence = event.end, packet.sequence + 1
+        self.state = GRAMMAR[END_PACKET if packet.kind == END_KIND else PACKET][PACKETS]  # PACK-01
+        if packet.kind != NUMBERED and stored != body_check(packet.body):  # PACK-04, PACK-06
+            is_frame = packet.kind == FRAME
+            self.number = self.number + 1 if is_frame and self.number is not None else None
+            event.is_sound = False
+            error = ChecksumError(f"body_check of packet {packet.sequence} is wrong")
+            return Fault(event.offset, error, event.chunk, event)
+        try:
+            event.header = self._segment(packet, event.body)
+        except FormatError as error:
+            return Fault(event.offset, error, event.chunk, event)
+        return event
+
+    def _segment(self, packet: Packet, start: int) -> SegmentHeader | None:
+        """The header of the segment in a packet whose body is at ``start``; raises FormatError."""
+        number = self.number
+        if packet.kind == END_KIND:
+            return None
+        if packet.kind == SEGMENT:
+            self.number = None
+            header, _ = parse_segment(packet.body)
+            self.number = header.stop if header.signal == 0 else number
+            if packet.fresh != bool(header.flags & FRESH):  # PACK-11
+                raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
+            return header
+        if number is None:  # PACK-14
+            raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
+        self.number = number + 1
+        check_number(packet, number)
+        return SegmentHeader(0, number, 1, flags=FRESH if packet.fresh else 0)  # PACK-12

@@ -1,0 +1,246 @@
+"""A strict scan: what the events of a file say, checked and gathered, up to the first fault.
+
+SPEC.md, "Grammar" and "Strict reading", are normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from mcz.container import payloads, strict
+from mcz.container.chunks import (
+    HEADER,
+    META,
+    Chunk,
+)
+from mcz.container.directory import (
+    AttachmentRow,
+    ClipRow,
+    Found,
+    SegmentRow,
+    parse_head,
+    signal_rows,
+)
+from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
+from mcz.container.grammar import CRITICAL, OTHER
+from mcz.container.limits import check, index_limit
+from mcz.container.parser import ALL, PASS, Parser
+from mcz.container.segments import parse_header
+from mcz.container.strict_ancillary import check_ancillary
+from mcz.container.writer import payload_id
+from mcz.errors import FormatError
+from mcz.schema import parse
+
+PEEK = 64  # enough for the fields of a segment before its table
+
+Payloads = Callable[[Chunk], bytes]
+
+
+class Scanner:
+    """A strict scan, which takes the events of its parser.
+
+    ``size`` is that of the file, None where it comes as a stream: what was read is let go then, and
+    INDX and COPY are not compared with it. ``payload_of`` reads what lies before.
+    """
+
+    def __init__(
+        self, size: int | None, *, whole: bool = True, payload_of: Payloads | None = None
+    ) -> None:
+        self.parser = Parser(size, want=self._wanted, check=whole)
+        self.found = Found()
+        self.strict = whole
+        self.clip: ClipRow | None = None
+        self.first: list[int] = []  # the next frame of each signal of the open clip
+        self._size, self._whole, self._payload_of = size, whole, payload_of
+        self._templates: dict[bytes, int] = {}  # the source format of each SRCE
+        self._model_bytes = 0
+        self._sourced: set[tuple[int, bytes]] = set()  # what aliases may stand for
+        self._handlers: dict[str, Callable[[Chunk, bytes], None]] = {
+            "HEAD": self._head,
+            "SKEL": self._shared,
+            "MODL": self._shared,
+            "SRCE": self._shared,
+            "ATTA": self._attachment,
+            "ALIA": self._alias,
+            "CLIP": self._begin_clip,
+            "DATA": self._data,
+            "CEND": self._end_clip,
+            "INDX": self._index,
+            OTHER: self._ancillary,
+        }
+
+    def _wanted(self, chunk: Chunk) -> int:
+        if self._whole:
+            return ALL
+        if chunk.type == b"DATA":
+            return PEEK
+        return ALL if chunk.type in CRITICAL else PASS
+
+    def take(self, event: Event) -> None:
+        """Take an event in; raises FormatError for a Fault, and for what breaks another rule."""
+        try:
+            if isinstance(event, Fault):
+                raise event.error
+            self._take(event)
+        except FormatError as error:
+            chunk = getattr(event, "chunk", None)
+            error.offset = (event.offset if chunk is None else chunk.offset) or None
+            raise
+
+    def _take(self, event: ChunkEvent | PacketEvent | FootEvent) -> None:
+        if isinstance(event, PacketEvent):
+            self._packet(event)
+        elif isinstance(event, FootEvent):
+            self.found.feet.append(event.offset)
+            self.found.directory.end = event.end
+        elif event.chunk.length is not None:
+            self._handlers[event.thing](event.chunk, event.payload)
+            self.found.chunks.append(event.chunk)
+
+    def finish(self) -> None:
+        """Learn that nothing follows."""
+
+    def forget(self) -> None:
+        """Let go of where chunks and segments lie, as is of no use in a stream."""
+        self.found.chunks.clear()
+        self.found.ends.clear()
+        if self.clip is not None:
+            self.clip.segments.clear()
+
+    def _head(self, chunk: Chunk, payload: bytes) -> None:
+        self.parser.profile = parse_head(payload)
+        self.found.directory.head = payload
+
+    def _shared(self, chunk: Chunk, payload: bytes) -> None:
+        id_ = payload_id(payload)
+        if self.strict:
+            self._check_shared(chunk, id_, payload)
+        self.found.directory.shared.setdefault((chunk.type, id_), chunk)  # GRAM-05
+
+    def _check_shared(self, chunk: Chunk, id_: bytes, payload: bytes) -> None:
+        if chunk.type == b"SKEL":
+            directory = self.found.directory
+            # ALIA-01
+            if strict.check_skeleton(
+                payload, chunk.label, directory, self._templates, self.parser.profile
+            ):
+                self._sourced.add((payloads.OF_SKELETON, id_))
+        elif chunk.type == b"SRCE":
+            self._templates[id_] = strict.check_template(payload, chunk.label, self.parser.profile)
+        else:
+            parse(payloads.Modl, payload, chunk.label)
+            self._model_bytes += len(payload)
+            # LIMIT-06
+            check(
+                f"chunk {chunk.label}: all models",
+                self._model_bytes,
+                self.parser.profile.model_bytes,
+            )
+
+    def _attachment(self, chunk: Chunk, payload: bytes) -> None:
+        fields = parse(payloads.Atta, payload, chunk.label)
+        rows = self.found.directory.attachments
+        if self.strict:
+            strict.check_path(fields.name, chunk.label)
+        # ATTA-01, GRAM-07
+        row = rows.get(fields.name) or AttachmentRow(fields.name, fields.size, [])
+        follows = row.parts and row.parts[-1].offset + row.parts[-1].size == chunk.offset
+        if (
+            fields.part != len(row.parts)  # ATTA-01
+            or fields.size != row.size  # ATTA-02
+            or (fields.part and not follows)  # ATTA-01
+        ):
+            raise FormatError(f"chunk {chunk.label}: part {fields.part} is out of order")
+        if fields.part >= fields.n_parts:  # ATTA-01
+            raise FormatError(f"chunk {chunk.label}: part {fields.part} of {fields.n_parts}")
+        row.parts.append(chunk)
+        rows[fields.name] = row
+        self._sourced.add((payloads.OF_ATTACHMENT, fields.name.encode()))
+
+    def _alias(self, chunk: Chunk, payload: bytes) -> None:
+        fields = parse(payloads.Alia, payload, chunk.label)
+        if fields.name in self.found.directory.aliases:  # GRAM-08
+            raise FormatError(f"chunk {chunk.label}: a second alias {fields.name!r}")
+        if self.strict:
+            strict.check_path(fields.name, chunk.label)
+            strict.check_target(fields, chunk.label, self._sourced)
+        self.found.directory.aliases[fields.name] = (fields.of, fields.target)
+
+    def _begin_clip(self, chunk: Chunk, payload: bytes) -> None:
+        fields = parse(payloads.Clip, payload, chunk.label)
+        if not fields.name or fields.name in self.found.directory.clips:  # CLIP-01, GRAM-06
+            raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
+        if not fields.signals:  # CLIP-05
+            raise FormatError(f"chunk {chunk.label}: a clip without a signal")
+        if self.strict and strict.check_clip(
+            fields, chunk.label, self.found.directory, self._templates
+        ):  # ALIA-02
+            self._sourced.add((payloads.OF_CLIP, fields.name.encode()))
+        signals = signal_rows(fields, chunk.label)
+        rate = fields.rate_numerator, fields.rate_denominator
+        self.clip = ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
+        self.first = [0] * len(signals)
+
+    def _data(self, chunk: Chunk, payload: bytes) -> None:
+        assert chunk.length is not None
+        header, _ = parse_header(payload)
+        self._segment(SegmentRow(chunk.payload_offset, chunk.length, header))
+
+    def _packet(self, event: PacketEvent) -> None:
+        packet, header = event.packet, event.header
+        if header is not None:
+            self._segment(SegmentRow(event.body, len(packet.body), header, packet.kind))
+            return
+        self.found.ends[event.chunk.offset] = event.end
+        self.found.chunks.append(event.chunk)
+
+    def _segment(self, row: SegmentRow) -> None:
+        header, at = row.header, row.offset - HEADER.size
+        assert self.clip is not None
+        if header.signal >= len(self.first):
+            raise FormatError(f"DATA at {at}: signal {header.signal}")  # DATA-06
+        due = self.first[header.signal]
+        if not self._may_follow(header.first, due):  # DATA-08
+            raise FormatError(f"DATA at {at}: first frame {header.first}, {due} is due")
+        self.first[header.signal] = header.stop  # DATA-08
+        self.clip.segments.append(row)
+
+    def _may_follow(self, first: int, due: int) -> bool:
+        return first == due
+
+    def _end_clip(self, chunk: Chunk, payload: bytes) -> None:
+        assert self.clip is not None
+        fields = parse(payloads.Cend, payload, chunk.label)
+        self.clip.n_frames, self.clip.cend = fields.n_frames, chunk
+        for error in self._close_clip():
+            raise error
+
+    def _close_clip(self) -> list[FormatError]:
+        """Let the open clip end here; return what is wrong with its signals."""
+        clip, self.clip = self.clip, None
+        assert clip is not None
+        self.found.directory.clips[clip.name] = clip
+        stored = [row.stored(clip.n_frames) for row in clip.signals]
+        return [
+            FormatError(f"clip {clip.name!r}: signal {signal} has {frames} of {due} frames")
+            for signal, (frames, due) in enumerate(zip(self.first, stored, strict=True))
+            if frames != due
+        ]
+
+    def _index(self, chunk: Chunk, payload: bytes) -> None:
+        if self.strict and self._size is not None:  # STRICT-04
+            limit = index_limit(self._size)
+            strict.check_index(payload, chunk, self.found.directory, limit)  # INDX-02, STRICT-04
+
+    def _ancillary(self, chunk: Chunk, payload: bytes) -> None:
+        if self.strict:
+            self._check_ancillary(chunk, payload)
+        if self.clip is None and self.found.directory.clips:
+            last = next(reversed(self.found.directory.clips))
+            self.found.directory.clips[last].ancillary.append(chunk)
+
+    def _check_ancillary(self, chunk: Chunk, payload: bytes) -> None:
+        if chunk.type == META and self.clip is not None:  # META-02
+            raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
+        size = chunk.offset + chunk.size if self._size is None else self._size
+        check_ancillary(chunk, payload, size, self.found, self._payload_of)
