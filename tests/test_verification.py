@@ -153,11 +153,11 @@ def _with(directory: object, name: str, table: dict) -> object:
 
 def test_blocks_end_anywhere(packed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is read at a time does not change what is found; memory is bounded by it."""
-    from mcz.container import checksums
+    from mcz.container import parser
 
     open_ones = live()
     whole = checked(packed), checked(open_ones)
-    monkeypatch.setattr(checksums, "BLOCK", 70_000)  # a packet may have 64 KiB
+    monkeypatch.setattr(parser, "BLOCK", 70_000)  # a packet may have 64 KiB
     assert (checked(packed), checked(open_ones)) == whole
     assert whole[0].indexed
     assert whole[1].n_packets == 20

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from mcz.container.chunks import Chunk, check_chunk
 from mcz.container.directory import parse_head
-from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
+from mcz.container.events import ChunkEvent, Event, Fault, PacketEvent
 from mcz.container.feeding import events
 from mcz.container.grammar import INDEX, START
 from mcz.container.index import parse_index
@@ -73,14 +73,14 @@ class _Check:
 
     def take(self, event: Event) -> None:
         """Take an event in; raises UnsupportedError."""
-        if isinstance(event, Fault):
+        if isinstance(event, PacketEvent):
+            self._packet(event)
+        elif isinstance(event, Fault):
             self._fault(event)
         elif isinstance(event, ChunkEvent):
             self._chunk(event)
-        elif isinstance(event, FootEvent):
-            self._index, self._end = event.index, event.end
         else:
-            self._packet(event)
+            self._index, self._end = event.index, event.end
 
     def _note(self, at: int, text: str) -> None:
         self.seen.faults.append((at, text))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from mcz.container.chunks import FOOT, HEADER, Chunk, Foot
 from mcz.container.packets import CHECK_SIZE, Packet, build_packet
-from mcz.container.segments import SegmentHeader
+from mcz.container.segments import FRESH, SegmentHeader
 from mcz.errors import FormatError
 
 
@@ -32,7 +31,7 @@ class ChunkEvent:
     @property
     def payload(self) -> bytes:
         """Its payload, or the beginning of it that was wanted."""
-        length: Any = self.chunk.length
+        length = self.chunk.length or 0
         return self.data[HEADER.size : HEADER.size + length]
 
 
@@ -40,7 +39,8 @@ class ChunkEvent:
 class PacketEvent:
     """A packet of the open DATA ``chunk``, whose body begins at ``body``.
 
-    ``header`` is that of the segment in it: None in an end packet, and where it is not known.
+    ``number`` is that of the frame in a packet without a segment of its own, ``segment`` the header
+    of the one in another: None in an end packet, and where they are not known.
     ``is_sound``: whether its body has the check that it states, as far as that needs no number.
     """
 
@@ -48,8 +48,17 @@ class PacketEvent:
     packet: Packet
     offset: int
     body: int
-    header: SegmentHeader | None = None
+    number: int | None = None
+    segment: SegmentHeader | None = None
     is_sound: bool = True
+
+    @property
+    def header(self) -> SegmentHeader | None:
+        """The header of its segment, also of one that is not spelled out."""
+        if self.number is None:
+            return self.segment
+        flags = FRESH if self.packet.fresh else 0
+        return SegmentHeader(0, self.number, 1, flags=flags)  # PACK-12
 
     @property
     def end(self) -> int:

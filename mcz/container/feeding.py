@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import BinaryIO
 
 from mcz.container.events import Event
 from mcz.container.parser import Parser
@@ -31,7 +31,7 @@ class Stream:
     ``size`` counts the bytes that came. Nothing is waited for that the parser does not need yet.
     """
 
-    def __init__(self, stream: Any) -> None:
+    def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
         self.size = 0
 

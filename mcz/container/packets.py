@@ -21,7 +21,7 @@ CHECK_SIZE = 2  # bytes of head_check, and of body_check
 MOST_NUMBER = 8  # bytes of a sequence number
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Packet:
     """A packet; ``check`` is its body_check where the body alone does not tell it: in kind 3."""
 

@@ -56,7 +56,7 @@ from mcz.container.packets import (
 )
 from mcz.container.packets import END as END_KIND
 from mcz.container.packets import FRESH as FRESH_PACKET
-from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.segments import FRESH
 from mcz.container.segments import parse_header as parse_segment
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
 from mcz.schema import MAX_COUNT, read_varint
@@ -395,25 +395,26 @@ class Parser:
             error = ChecksumError(f"body_check of packet {packet.sequence} is wrong")
             return Fault(event.offset, error, event.chunk, event)
         try:
-            event.header = self._segment(packet, event.body)
+            self._tell(event)
         except FormatError as error:
             return Fault(event.offset, error, event.chunk, event)
         return event
 
-    def _segment(self, packet: Packet, start: int) -> SegmentHeader | None:
-        """The header of the segment in a packet whose body is at ``start``; raises FormatError."""
-        number = self.number
+    def _tell(self, event: PacketEvent) -> None:
+        """Tell which frames are in a packet; raises FormatError."""
+        packet, number = event.packet, self.number
         if packet.kind == END_KIND:
-            return None
+            return
         if packet.kind == SEGMENT:
             self.number = None
-            header, _ = parse_segment(packet.body)
+            event.segment = header = parse_segment(packet.body)[0]
             self.number = header.stop if header.signal == 0 else number
             if packet.fresh != bool(header.flags & FRESH):  # PACK-11
-                raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
-            return header
+                event.segment = None
+                raise FormatError(f"packet at {event.body}: its segment differs in starting fresh")
+            return
         if number is None:  # PACK-14
-            raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
+            raise FormatError(f"packet at {event.body}: none before it in its DATA tells its frame")
         self.number = number + 1
         check_number(packet, number)
-        return SegmentHeader(0, number, 1, flags=FRESH if packet.fresh else 0)  # PACK-12
+        event.number = number
