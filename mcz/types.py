@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any, BinaryIO, TypeAlias
 
@@ -25,6 +25,9 @@ JsonObject: TypeAlias = dict[str, Any]
 
 Settings: TypeAlias = dict[str, Any]
 """Parameters or options by name, as they are put together."""
+
+Progress: TypeAlias = Callable[[int, int, str], None]
+"""A listener to long work: what is done, of how much, and a name."""
 
 Target: TypeAlias = str | PathLike[str] | bytes | BinaryIO
 """A file: a path, an address that fsspec knows, its bytes, or a stream."""

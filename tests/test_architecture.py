@@ -79,7 +79,7 @@ ALLOWED = {
     "reading": JOINT | {"jobs", "recovery", "poses", "queries", "tables"},
     "bags": GROUND | {"reading"},
     "datasets": JOINT | {"poses", "reading"},
-    "writing": JOINT | {"metrics", "reading", "tables"},
+    "writing": JOINT | {"jobs", "metrics", "reading", "tables"},
     # What other libraries hold: with the names, tables and drawings that the public has.
     "adapters": MODEL
     | {"conversion", "formats", "kinematics", "pictures", "poses", "reading", "tables", "units"},
@@ -319,6 +319,33 @@ def test_modules_stay_short() -> None:
         return n * (n > 420)
 
     assert not faults(too_long)
+
+
+MOST_PARAMETERS = 8
+
+
+def test_functions_have_few_parameters() -> None:
+    """But for public functions with keywords, commands of click, and kernels."""
+    public = {(home.replace(".", "/"), name) for name, home in mcz._HOME_OF.items()}
+    public |= {("mcz/dask/packing", "pack"), ("mcz/datasets/collecting", "dataset")}
+    public.add(("mcz/live/writer", "__init__"))
+
+    def crowded(path: Path) -> list[str]:
+        if path.stem.endswith("kernels") or path.stem == "best_numbers":
+            return []
+        home = path.relative_to(PACKAGE.parent).with_suffix("").as_posix()
+        found = []
+        for node in ast.walk(tree_of(path)):
+            if not isinstance(node, ast.FunctionDef) or (home, node.name) in public:
+                continue
+            if any(ast.unparse(call).startswith("click.") for call in node.decorator_list):
+                continue
+            given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            if len(given) - (bool(given) and given[0].arg in ("self", "cls")) > MOST_PARAMETERS:
+                found.append(node.name)
+        return found
+
+    assert not faults(crowded)
 
 
 @pytest.mark.parametrize("module", ["mcz", "mcz.cli.info", "mcz.cli.main"])

@@ -14,7 +14,8 @@ import pytest
 import mcz
 from mcz import SkeletonWarning, SourceError
 from mcz.live.text_writer import encode_live
-from mcz.writing.entry import Terms
+from mcz.reading.source_options import SourceOptions
+from mcz.writing.options import EncodingOptions
 from tests.commands import Call
 
 ASF = b""":name small
@@ -268,8 +269,9 @@ def test_live(tmp_path: Path) -> None:
     put(tmp_path, "walk", a="fits", b="dofs", c="foreign")
 
     def coded(name: str, sink: io.BytesIO) -> tuple[str, ...]:
-        terms = Terms("lsdt-frame", {"step": 0.01}, tmp_path / f"{name}.asf", rate=120)
-        return encode_live(AMC.splitlines(keepends=True), sink, "amc", terms).remarks
+        options = SourceOptions(skeleton=tmp_path / f"{name}.asf", rate=120)
+        encoding = EncodingOptions("lsdt-frame", {"step": 0.01})
+        return encode_live(AMC.splitlines(keepends=True), sink, "amc", options, encoding).remarks
 
     sink = io.BytesIO()
     assert coded("a", sink) == ()

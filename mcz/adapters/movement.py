@@ -14,7 +14,7 @@ from mcz.extras import import_extra
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.numbers import Grid, GridKind
 from mcz.poses import point_names, positions
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_options import SourceOptions
 from mcz.types import JsonObject, Reals, Values
 from mcz.units import UNIT_CM
 
@@ -108,7 +108,7 @@ def from_movement(
     up = up or (facts.get("up_axis") if facts.get("up_axis") in ("x", "y", "z") else None)
     skeleton = Skeleton(joints, angle_unit="")
     motion = Motion(skeleton, tuple(signals), None, name=name, frame_numbers=numbers)
-    motion = with_facts(replace(motion, frame_rate=rate), None, unit, up)
+    motion = SourceOptions(unit=unit, up=up).applied_to(replace(motion, frame_rate=rate))
     if rate is None or dataset.attrs.get("time_unit", "seconds") != "seconds":
         return motion
     return motion.at_times(Timeline(times.copy(), rate))

@@ -24,7 +24,7 @@ from mcz.motion import (
     Skeleton,
     check_poses,
 )
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_options import SourceOptions
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,8 @@ def from_pybvh(bvh: Any, *, unit: str | None = None, up: str | None = None) -> M
     signal = Signal(values, mask=None if known.all() else known)
     skeleton = Skeleton(tuple(joints), angle_unit="rad")
     name = Path(bvh.source_path).stem if bvh.source_path else "motion"
-    return with_facts(Motion(skeleton, (signal,), rate, exact, name), None, unit, up)
+    motion = Motion(skeleton, (signal,), rate, exact, name)
+    return SourceOptions(unit=unit, up=up).applied_to(motion)
 
 
 def to_pybvh(motion: Motion) -> Any:

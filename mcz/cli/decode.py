@@ -224,7 +224,7 @@ def _check_plain(file: str, wanted: Wanted) -> None:
 def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made]:
     """The outputs of a clip as it is wanted, and what is to be said of how they were made."""
     from mcz.conversion import left_out
-    from mcz.reading.source_files import with_facts
+    from mcz.reading.source_options import SourceOptions
 
     target, made = wanted.target, Made()
     part = _part(clip, wanted)
@@ -238,7 +238,7 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
         elif target in ("amc", "bvh"):
             _check_moves(clip)
         unit = wanted.unit if motion.skeleton.unit_cm is None else None
-        motion = with_facts(motion, None, unit, wanted.up)
+        motion = SourceOptions(unit=unit, up=wanted.up).applied_to(motion)
         rate = None if wanted.filtered else wanted.rate
         made.notes = _corrected(clip, rate)
         if wanted.is_scene:

@@ -153,9 +153,10 @@ class _Wanted:
 
     def told(self, motion: Motion) -> Motion:
         """``motion`` with what it does not say itself."""
-        from mcz.reading.source_files import told
+        from mcz.reading.source_options import SourceOptions
 
-        return told(motion, self.rate, self.unit, self.up)
+        said = SourceOptions(rate=self.rate, unit=self.unit, up=self.up)
+        return said.completing(motion)
 
 
 @dataclass(frozen=True, slots=True)

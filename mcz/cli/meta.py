@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from mcz.editing.describing import Said
     from mcz.reading.clip import Clip
     from mcz.reading.file import File
+
+    Rows = Callable[[File], tuple[dict[str, dict[str, str]], list[str]]]  # by clip; unknown ones
 
 
 def _to_pairs(
@@ -110,10 +113,14 @@ def command(
     if not (pairs or removed or table or rate):
         with opened(file) as held:
             return _show(held, _chosen(held, clips, where, of_file), as_json)
-    changes, unknown = _changes(
-        file, clips, where, of_file, dict.fromkeys(removed) | pairs, table, match, take,
-        skip_unknown,
-    )  # fmt: skip
+    rows = None
+    if table is not None:
+        from mcz.editing.tables_of_clips import from_table
+
+        columns = None if take is None else [name.strip() for name in take.split(",")]
+        rows = partial(from_table, table, match=match, take=columns, skip_unknown=skip_unknown)
+    said = dict.fromkeys(removed) | pairs
+    changes, unknown = _changes(file, clips, where, of_file, said, rows)
     if unknown:
         from mcz.reading.names import listed
 
@@ -154,22 +161,14 @@ def _changes(
     where: str | None,
     of_file: bool,
     said: Said,
-    table: str | None,
-    match: str | None,
-    take: str | None,
-    skip_unknown: bool,
+    rows: Rows | None,
 ) -> tuple[dict[str, dict[str, str | None]], list[str]]:
     """What is to be said of each clip, and the rows of the table without one."""
-    from mcz.editing.tables_of_clips import from_table
-
     changes: dict[str, dict[str, str | None]] = {}
     unknown: list[str] = []
     with opened(file) as held, about(file):
-        if table is not None:
-            columns = None if take is None else [name.strip() for name in take.split(",")]
-            found, unknown = from_table(
-                table, held, match=match, take=columns, skip_unknown=skip_unknown
-            )
+        if rows is not None:
+            found, unknown = rows(held)
             wanted = {clip.name for clip in held.chosen(clips or None, where)}
             changes = {name: dict(row) for name, row in found.items() if name in wanted}
         if said:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -53,21 +52,17 @@ def moving_of(
     path: str,
     *,
     name: str | None,
-    rate: Fraction | None,
-    unit: str | None,
-    up: str | None,
-    skeleton: str | None,
-    arrays: str | None,
-    model: str | None,
     max_decoded: int | None,
+    **said: Any,
 ) -> Iterator[Motion | Clip]:
     """The motion of a source file, or a clip of an .mcz that stays open; errors name the file.
 
-    What is told of a clip is not in it: whoever draws it is told the same.
+    ``said`` are fields of ``SourceOptions``. They change a source file alone: whoever draws a clip
+    is given the same.
     """
     import mcz
     from mcz.reading.file import is_mcz
-    from mcz.reading.source_files import told
+    from mcz.reading.source_options import SourceOptions
 
     if path == "-" or is_mcz(path):
         with opened(path, max_decoded=max_decoded) as file, about(path):
@@ -75,8 +70,8 @@ def moving_of(
         return
     existing(path)
     with about(path):
-        motion = mcz.read(path, skeleton=skeleton, arrays=arrays, model=model)
-        yield told(motion, rate, unit, up)
+        read = {name: said.pop(name) for name in ("skeleton", "arrays", "model")}
+        yield SourceOptions(**said).completing(mcz.read(path, **read))
 
 
 def cut_of(frames: tuple[int, int | None] | None, moving: Motion | Clip) -> tuple[int, int] | None:

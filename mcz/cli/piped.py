@@ -103,7 +103,8 @@ def encode_lines(
 ) -> None:
     """Encode standard input frame by frame to ``target``, - or None being standard output."""
     from mcz.live.text_writer import begin_live
-    from mcz.writing.entry import Terms
+    from mcz.reading.source_options import SourceOptions
+    from mcz.writing.options import encoding_options
 
     for name in ("verbatim", "archive", "copies", "effort"):
         if options.pop(name):
@@ -111,8 +112,9 @@ def encode_lines(
     stream = live_input()
     name = format_name or ("bvh" if skeleton is None else "amc")
     with about(NAME), live_output(target, force) as sink:
-        terms = Terms(skeleton=skeleton, **options)
-        live = begin_live(iter(stream.readline, b""), sink, name, terms)
+        encoding = encoding_options(options.pop("codec"), None, options.pop("params"))
+        told = SourceOptions(skeleton=skeleton, **options)
+        live = begin_live(iter(stream.readline, b""), sink, name, told, encoding)
         with live.writer, aborting(live.writer):
             live.push_all()
     for remark in live.remarks:

@@ -18,7 +18,7 @@ from mcz.formats import FORMATS
 from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.motion import Motion
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_options import SourceOptions
 
 __all__ = [
     "TARGETS",
@@ -59,7 +59,7 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     if to not in TARGETS:
         scene = "; mcz.to_glb writes scenes" if to in ("glb", "gltf") else ""
         raise OptionError(f"no conversion to {to!r}, but to {', '.join(TARGETS)}{scene}")
-    motion = with_facts(motion, rate, None)
+    motion = SourceOptions(rate=rate).applied_to(motion)
     same = to == "c3d" and point_set(motion.skeleton) == "markers"
     same = same or (FORMATS[to].is_table and not needs_rate(motion, to))
     if to != "amc" and not same and motion.frame_rate is None:

@@ -8,7 +8,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from mcz.codecs import chosen
 from mcz.dask.cluster import Cluster, connected
 from mcz.dask.sources import FarAsk, Found, coded_there, listed, skeletons_beside
 from mcz.editing.archive import write_in_turn
@@ -17,12 +16,12 @@ from mcz.editing.folders import NO_MOTION, motion_files
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.jobs import Answer
-from mcz.types import Params, Target
+from mcz.reading.source_options import SourceOptions
+from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
-from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry, Terms
-from mcz.writing.file import profile_of
+from mcz.writing.entry import Entry
+from mcz.writing.options import EncodingOptions, WritingOptions, encoding_options, profile_of
 
 
 def pack(
@@ -57,33 +56,30 @@ def pack(
     root = os.fspath(root)
     found, others = listed(root, target)
     taken, left = _chosen(found, keep_all)
-    coded = chosen(codec, effort)
-    verbatim = verbatim or keep_all
-    params = None if params is None else dict(params)
-    terms = Terms(
-        coded,
-        params,
+    options = SourceOptions(
         rate=rate,
         force_rate=force_rate,
         unit=unit,
-        verbatim=verbatim,
         up=up,
         arrays=arrays,
         model=model,
+        verbatim=verbatim or keep_all,
         flat=True,
     )
+    encoding = encoding_options(codec, effort, params)
     paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
-    inputs = (*paths, *(params or {}).values())
-    report, profile = Report(), profile_of(archive)
+    inputs = (*paths, *encoding.params.values())
+    report, writing = Report(), WritingOptions(force, profile_of(archive), copies)
     skeletons = [one.name for one in found if one.name.lower().endswith(".asf")]
+    beside = {one.name: skeletons_beside(one.name, skeletons) for one in taken}
     asks = (
-        FarAsk(root, one.name, skeletons_beside(one.name, skeletons), terms, profile)
+        FarAsk(root, one.name, beside[one.name], options, encoding, writing.profile)
         for one in taken
     )
     with connected(client) as used, replacing(target, force=force, inputs=inputs) as stream:
-        draft = Draft(stream, profile, copies=copies)
+        draft = Draft(stream, writing.profile, copies=writing.copies)
         with closing(Cluster(used).in_order(coded_there, asks, None)) as answers:
-            entries = _entries(root, taken, terms, answers)
+            entries = _entries(root, taken, (options, encoding), answers)
             write_in_turn(draft, entries, len(taken), report, progress, {})
         draft.finish()
     report.size = draft.writer.offset
@@ -101,8 +97,11 @@ def _chosen(found: Sequence[Found], keep_all: bool) -> tuple[list[Found], list[O
 
 
 def _entries(
-    root: str, found: Sequence[Found], terms: Terms, answers: Iterator[Answer[Any] | None]
+    root: str,
+    found: Sequence[Found],
+    options: tuple[SourceOptions, EncodingOptions],
+    answers: Iterator[Answer[Any] | None],
 ) -> Iterator[Entry]:
     for one, answer in zip(found, answers, strict=True):
         assert answer is not None  # every file was asked for
-        yield Far(Entry(Path(root, one.name), one.name, terms), answer, one.size)
+        yield Far(Entry(Path(root, one.name), one.name, *options), answer, one.size)

@@ -18,8 +18,9 @@ from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, MczError, OptionError, SourceError
 from mcz.formats import wants_skeleton
 from mcz.hints import Remark
+from mcz.reading.source_options import SourceOptions
 from mcz.types import Target
-from mcz.writing.entry import Terms
+from mcz.writing.options import EncodingOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,8 @@ class FarAsk:
     root: str
     name: str
     beside: tuple[str, ...]
-    terms: Terms
+    options: SourceOptions
+    encoding: EncodingOptions
     profile: Profile
 
 
@@ -102,7 +104,8 @@ def coded_there(state: object, ask: FarAsk) -> Part:
             root = str(Path(own, "root"))  # around it there is nothing that may be taken for an ASF
             _fetch(ask, Path(root))
         try:
-            part = coded(state, Ask(Path(root, ask.name), ask.name, ask.terms, ask.profile))
+            near = Ask(Path(root, ask.name), ask.name, ask.options, ask.encoding, ask.profile)
+            part = coded(state, near)
         except MczError as error:
             if error.path is not None:
                 error.path = _named(error.path, root, ask.root)

@@ -18,8 +18,8 @@ from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
 from mcz.reading.source_rates import stating_rate
-from mcz.types import Params, Settings
-from mcz.writing.clip_writer import Amend, Progress
+from mcz.types import Params, Progress, Settings
+from mcz.writing.clip_writer import Amend
 from mcz.writing.tuning import write_tuned
 
 OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may not be there

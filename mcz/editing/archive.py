@@ -8,7 +8,6 @@ from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
-from mcz.codecs import chosen
 from mcz.container import payloads
 from mcz.container.metadata import Record
 from mcz.editing.appending import growing
@@ -32,17 +31,15 @@ from mcz.editing.superseding import superseding
 from mcz.errors import MczError, OptionError, SourceError, remark_of
 from mcz.formats import wants_skeleton
 from mcz.hints import split_hint
-from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
-from mcz.threads import limited
-from mcz.types import Params, Settings, Target
+from mcz.reading.source_options import SourceOptions
+from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
-from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry, Terms
-from mcz.writing.file import profile_of
+from mcz.writing.entry import Entry
 from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_name
+from mcz.writing.options import WritingOptions, encoding_options, profile_of
 
 
 def pack(
@@ -87,28 +84,23 @@ def pack(
     if not keep_all:
         paths, left = motion_files(paths)
         others += [left_out(path, root) for path in left]
-    verbatim = verbatim or keep_all
-    coded = chosen(codec, effort)
-    terms = Terms(
-        coded,
-        params,
+    options = SourceOptions(
         rate=rate,
         force_rate=force_rate,
         unit=unit,
-        verbatim=verbatim,
         up=up,
         arrays=arrays,
         model=model,
+        verbatim=verbatim or keep_all,
         flat=True,
     )
-    entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
-    inputs = (*paths, *(params or {}).values())
-    with (
-        limited(threads),
-        jobs_limited(jobs),
-        replacing(target, force=force, inputs=inputs) as stream,
-    ):
-        draft = Draft(stream, profile_of(archive), copies=copies)
+    encoding = encoding_options(codec, effort, params)
+    writing = WritingOptions(force, profile_of(archive), copies, threads, jobs)
+    named = [(path, path.relative_to(root).as_posix()) for path in paths]
+    entries = [Entry(path, name, options, encoding) for path, name in named]
+    inputs = (*paths, *encoding.params.values())
+    with writing.in_force(), replacing(target, force=force, inputs=inputs) as stream:
+        draft = Draft(stream, writing.profile, copies=writing.copies)
         report = _write_entries(draft, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
         if mtimes:
@@ -185,16 +177,24 @@ def append(
     itself.
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
-    coded = chosen(codec, effort)
-    said: Settings = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
-    terms = Terms(coded, params, skeleton, force_rate=force_rate, verbatim=verbatim, **said)
+    options = SourceOptions(
+        skeleton=skeleton,
+        rate=rate,
+        force_rate=force_rate,
+        unit=unit,
+        up=up,
+        arrays=arrays,
+        model=model,
+        verbatim=verbatim,
+    )
+    encoding = encoding_options(codec, effort, params)
+    writing = WritingOptions(threads=threads, jobs=jobs)
     held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in held]
     named, others = sources_named(files, root, target)
-    entries = [Entry(path, name, terms) for path, name in named]
+    entries = [Entry(path, name, options, encoding) for path, name in named]
     with (
-        limited(threads),
-        jobs_limited(jobs),
+        writing.in_force(),
         superseding(Path(target), named if replace else ()) as grown,
         growing(grown, salvage=salvage, force=force) as growth,
     ):

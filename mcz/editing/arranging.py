@@ -34,8 +34,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where, getter_of
 from mcz.reading.file import File, open
 from mcz.reading.names import clips_meant, listed
-from mcz.types import Target
-from mcz.writing.clip_writer import Progress
+from mcz.types import Progress, Target
 from mcz.writing.names import check_name
 
 FOLDER = "folder"  # split by the first part of the names

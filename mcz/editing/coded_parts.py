@@ -26,9 +26,11 @@ from mcz.jobs import ONE, Answer, useful
 from mcz.jobs.pool import answers
 from mcz.reading.file import open
 from mcz.reading.sharing import only_own
+from mcz.reading.source_options import SourceOptions
 from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry, Terms
+from mcz.writing.entry import Entry
 from mcz.writing.names import check_name, clip_name
+from mcz.writing.options import EncodingOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +51,18 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Which file is to be coded, on which terms, for a file of which limits."""
+    """A file that is to be coded, for a file of which limits."""
 
     path: Path
     name: str
-    terms: Terms
+    options: SourceOptions
+    encoding: EncodingOptions
     profile: Profile
 
 
 def coded(state: object, ask: Ask) -> Part:
     """The part of a file; raises as ``Entry.write`` does."""
-    entry, sink = Entry(ask.path, ask.name, ask.terms), io.BytesIO()
+    entry, sink = Entry(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
     draft = Draft(sink, ask.profile)
     result = entry.write(draft)
     draft.finish()
@@ -75,7 +78,7 @@ class Joined(Entry):
     can_be_read = True  # here, too
 
     def __init__(self, entry: Entry, answer: Answer[Part]) -> None:
-        super().__init__(entry.path, entry.name, entry.terms)
+        super().__init__(entry.path, entry.name, entry.options, entry.encoding)
         self.inputs = entry.inputs  # which its owner asks for
         self._answer = answer
 
@@ -160,7 +163,8 @@ def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask 
             yield None
             continue
         sent.add(digest)
-        yield Ask(entry.path, entry.name, entry.terms, draft.writer.profile)
+        profile = draft.writer.profile
+        yield Ask(entry.path, entry.name, entry.options, entry.encoding, profile)
 
 
 @contextmanager

@@ -23,8 +23,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.rate_notes import states_rate
-from mcz.types import Target
-from mcz.writing.clip_writer import Progress
+from mcz.types import Progress, Target
 
 Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more
 

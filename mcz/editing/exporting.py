@@ -19,7 +19,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.sharing import shared_out
-from mcz.reading.source_files import told
+from mcz.reading.source_options import SourceOptions
 from mcz.tables.files import EXPORTS, table_of
 from mcz.types import Target
 from mcz.writing.atomic import replacing
@@ -99,7 +99,8 @@ def _converted(
     """The files that the clip ``name`` becomes."""
     file, (to, rate, unit, key_error) = shared
     clip = file.clips[name]
-    return list(_files(clip, to, told(clip.motion(), rate, unit), key_error))
+    motion = SourceOptions(rate=rate, unit=unit).completing(clip.motion())
+    return list(_files(clip, to, motion, key_error))
 
 
 def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Made]:

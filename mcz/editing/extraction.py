@@ -53,9 +53,9 @@ from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
-from mcz.types import Params, Target
+from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing_file
-from mcz.writing.clip_writer import Amend, Progress
+from mcz.writing.clip_writer import Amend
 
 
 @dataclass(frozen=True, slots=True)

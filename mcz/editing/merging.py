@@ -32,9 +32,8 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.names import listed
 from mcz.schema import parse
-from mcz.types import Target
+from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
-from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
 
 CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"

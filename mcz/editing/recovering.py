@@ -27,8 +27,7 @@ from mcz.recovery.field import Ints
 from mcz.recovery.making import Step, made
 from mcz.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
 from mcz.recovery.shape import HASH, Shape
-from mcz.types import Target
-from mcz.writing.clip_writer import Progress
+from mcz.types import Progress, Target
 
 MOST_SHIFTS = 16
 MOST_SETS = 4  # that may protect the same bytes

@@ -22,9 +22,8 @@ from mcz.editing.salvage_copier import Repair as Repair
 from mcz.editing.salvaging import write_whole
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.reading.file import File, file_of, reached
-from mcz.types import Target
+from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing, rereadable
-from mcz.writing.clip_writer import Progress
 
 Content = set[tuple[object, ...]]
 

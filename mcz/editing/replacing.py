@@ -39,9 +39,8 @@ from mcz.errors import (
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.schema import build, parse
-from mcz.types import Target, Values
+from mcz.types import Progress, Target, Values
 from mcz.writing.atomic import replacing_file
-from mcz.writing.clip_writer import Progress
 from mcz.writing.quality import CHUNK, figures, texts_of
 
 RECODED = "edit-recoded"

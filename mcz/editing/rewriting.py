@@ -38,9 +38,8 @@ from mcz.errors import (
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
 from mcz.schema import parse
-from mcz.types import Target
+from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
-from mcz.writing.clip_writer import Progress
 
 Shared = tuple[bytes, bytes]  # type and id of a SKEL, MODL or SRCE
 Step = Callable[[str], None]  # is told the name of each clip that was carried over

@@ -26,7 +26,7 @@ from mcz.reading.file import File
 from mcz.reading.quick_check import Problem
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build
-from mcz.writing.clip_writer import Progress
+from mcz.types import Progress
 
 Run = tuple[int, int]  # frames a <= f < b
 NOTE = "lost: the template of the source file was damaged"

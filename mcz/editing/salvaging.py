@@ -35,7 +35,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File
 from mcz.reading.report import Problem, clip_problems, validate
 from mcz.reading.signal_reader import SignalReader
-from mcz.writing.clip_writer import Progress
+from mcz.types import Progress
 
 # Chunks without content of their own, or of a clip that is named.
 TOLD = (b"HEAD", b"INDX", b"DATA", b"CEND", COPY, RECOVERY)

@@ -23,9 +23,8 @@ from mcz.reading.file import File, open
 from mcz.reading.names import listed
 from mcz.reading.rate_notes import text_notes
 from mcz.reading.sharing import shared_out
-from mcz.types import Settings, Target
+from mcz.types import Progress, Settings, Target
 from mcz.writing.atomic import replacing
-from mcz.writing.clip_writer import Progress
 
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
 

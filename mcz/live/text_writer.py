@@ -15,9 +15,11 @@ from mcz.motion import Skeleton
 from mcz.reading.skeletons import NONE, how_given
 from mcz.reading.skeletons import NOTE as SKELETON_NOTE
 from mcz.reading.source_files import read_skeleton
+from mcz.reading.source_options import SourceOptions
 from mcz.types import Params
 from mcz.units import facing, in_unit
-from mcz.writing.entry import Terms, rate_notes
+from mcz.writing.entry import rate_notes
+from mcz.writing.options import EncodingOptions
 
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 
@@ -51,23 +53,35 @@ class LiveText:
             self.remarks = (*self.remarks, remark)
 
 
-def encode_live(lines: Iterable[bytes], sink: Sink, source_format: str, terms: Terms) -> LiveText:
+def encode_live(
+    lines: Iterable[bytes],
+    sink: Sink,
+    source_format: str,
+    options: SourceOptions,
+    encoding: EncodingOptions,
+) -> LiveText:
     """Write the motion that ``lines`` spell to ``sink``, each frame before the next line is read.
 
-    ``source_format`` is ``bvh`` or ``amc``; an AMC needs the ``skeleton`` of ``terms``, the path of
-    its ASF. Raises SourceError at text that is none of the format, at a last line without a line
+    ``source_format`` is ``bvh`` or ``amc``; an AMC needs the ``skeleton`` of ``options``, its
+    ASF. Raises SourceError at text that is none of the format, at a last line without a line
     end, and where fewer frames came than are declared; the clip has all frames before that and no
     end then. Otherwise raises as ``LiveWriter`` does.
     """
-    live = begin_live(lines, sink, source_format, terms)
+    live = begin_live(lines, sink, source_format, options, encoding)
     with live.writer:
         live.push_all()
     return live
 
 
-def begin_live(lines: Iterable[bytes], sink: Sink, source_format: str, terms: Terms) -> LiveText:
+def begin_live(
+    lines: Iterable[bytes],
+    sink: Sink,
+    source_format: str,
+    options: SourceOptions,
+    encoding: EncodingOptions,
+) -> LiveText:
     """The same up to the first frame; the caller uses the writer as a context manager."""
-    arriving, base = _arriving(_whole_lines(lines), source_format, terms)
+    arriving, base = _arriving(_whole_lines(lines), source_format, options)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
     if base is not None:
@@ -75,16 +89,16 @@ def begin_live(lines: Iterable[bytes], sink: Sink, source_format: str, terms: Te
         metadata[SKELETON_NOTE] = "; ".join(filter(None, found))
     writer = LiveWriter(
         sink,
-        facing(in_unit(arriving.skeleton, terms.unit), terms.up),
-        terms.codec,
-        terms.params or {},
-        frame_rate=arriving.frame_rate if terms.rate is None else Fraction(terms.rate),
-        frame_rate_exact=arriving.frame_rate_exact if terms.rate is None else True,
+        facing(in_unit(arriving.skeleton, options.unit), options.up),
+        encoding.codec,
+        encoding.params,
+        frame_rate=arriving.frame_rate if options.rate is None else Fraction(options.rate),
+        frame_rate_exact=arriving.frame_rate_exact if options.rate is None else True,
         metadata=metadata,
         first_number=arriving.first_number,
         base=base,
     )
-    return LiveText(arriving, writer, _remark(arriving, terms))
+    return LiveText(arriving, writer, _remark(arriving, options))
 
 
 def _whole_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
@@ -96,7 +110,7 @@ def _whole_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def _arriving(
-    lines: Iterable[bytes], source_format: str, terms: Terms
+    lines: Iterable[bytes], source_format: str, options: SourceOptions
 ) -> tuple[Arriving, Skeleton | None]:
     """What comes line by line, and the skeleton that it needs beside it."""
     found = FORMATS.get(source_format)
@@ -105,19 +119,19 @@ def _arriving(
         raise OptionError(f"format {source_format!r} cannot come line by line; these can: {able}")
     base = None
     if found.wants_skeleton:
-        if terms.skeleton is None or terms.skeleton == NONE:
+        if options.skeleton is None or options.skeleton == NONE:
             raise OptionError(f"{source_format} that comes line by line needs its skeleton file")
-        base = in_unit(read_skeleton(terms.skeleton), terms.unit)
+        base = in_unit(read_skeleton(options.skeleton), options.unit)
     arriving: Arriving = found.arrive(iter(lines), base)
     return arriving, base
 
 
-def _remark(arriving: Arriving, terms: Terms) -> tuple[str, ...]:
+def _remark(arriving: Arriving, options: SourceOptions) -> tuple[str, ...]:
     """Remarks on the skeleton and the rate that were given."""
-    notes = tuple(rate_notes(arriving.frame_rate, terms))
+    notes = tuple(rate_notes(arriving.frame_rate, options))
     if SKELETON_NOTE not in arriving.metadata:
         return notes
-    return (f"{terms.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}", *notes)
+    return (f"{options.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}", *notes)
 
 
 def codes_live(codec: str, params: Params) -> bool:

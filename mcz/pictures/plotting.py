@@ -17,7 +17,7 @@ from mcz.pictures.error_charts import error_chart
 from mcz.pictures.rendering import Progress, checked_size
 from mcz.poses.moving import Frames, Moving, frame_range
 from mcz.reading.clip import Clip
-from mcz.reading.source_files import told
+from mcz.reading.source_options import SourceOptions
 
 KINDS = ("channels", "spectrum", "error", "bytes", "rate-distortion")
 CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, unless others are asked for
@@ -75,7 +75,7 @@ def plot(
         raise OptionError(f"a plot of {what} is of all joints, not of {one!r}")
     size = checked_size(size)
     cut = frame_range(moving, frames)
-    facts = (rate, unit, up)
+    facts = SourceOptions(rate=rate, unit=unit, up=up)
     chart = _chart(moving, what, other, wanted, cut, codecs, facts, progress or (lambda *_: None))
     save(chart, path, theme=theme, size=size, force=force)
     tables = tuple(tuple(map(tuple, table.rows)) for table in chart.tables)
@@ -89,7 +89,7 @@ def _chart(
     wanted: Wanted,
     cut: tuple[int, int],
     codecs: Sequence[str],
-    facts: Any,
+    facts: SourceOptions,
     progress: Progress,
 ) -> Chart:
     if what == "bytes":
@@ -99,7 +99,7 @@ def _chart(
     motion = _motion(moving, cut, facts)
     if other is not None:
         theirs = _motion(other, cut if other.n_frames == moving.n_frames else None, facts)
-        return error_chart(motion, theirs, facts[2], cut[0])
+        return error_chart(motion, theirs, facts.up, cut[0])
     if what == "rate-distortion":
         return rate_chart(motion, codecs, progress)
     if what == "spectrum":
@@ -107,7 +107,7 @@ def _chart(
     return channel_chart(motion, wanted, cut[0])
 
 
-def _motion(moving: Moving, cut: tuple[int, int] | None, facts: Any) -> Motion:
+def _motion(moving: Moving, cut: tuple[int, int] | None, facts: SourceOptions) -> Motion:
     """These frames as a motion, with what it does not say itself."""
     if isinstance(moving, Motion):
         motion = moving
@@ -116,4 +116,4 @@ def _motion(moving: Moving, cut: tuple[int, int] | None, facts: Any) -> Motion:
     else:
         clip: Any = moving
         motion = clip.motion(cut)
-    return told(motion, *facts)
+    return facts.completing(motion)

@@ -22,7 +22,7 @@ from mcz.kinematics.marker_motion import SEPARATOR
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.decimation import decimated_rows
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_options import SourceOptions
 from mcz.reading.source_rates import stating_rate
 from mcz.transforms.post_filter import PostFilter, filter_rows
 from mcz.types import Values
@@ -44,7 +44,7 @@ def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
     Raises MotionError where there are other joints than markers, OptionError where the length unit
     or the frame rate is unknown.
     """
-    motion = with_facts(motion, rate, None)
+    motion = SourceOptions(rate=rate).applied_to(motion)
     first = motion.signals[0]
     _check_markers(motion.name, motion.skeleton, first.channels)
     settings = _settings(motion.name, motion.skeleton, motion.frame_rate, first.samples_per_frame)

@@ -11,7 +11,8 @@ from mcz.errors import OptionError, SkeletonWarning
 from mcz.motion import Motion, Skeleton
 from mcz.reading.file import is_mcz, open
 from mcz.reading.skeletons import take
-from mcz.reading.source_files import load, with_facts
+from mcz.reading.source_files import load
+from mcz.reading.source_options import SourceOptions
 
 
 def read(
@@ -50,4 +51,5 @@ def read(
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
         motion = taken.motion
-    return with_facts(motion, rate, unit, up, arrays, model)
+    said = SourceOptions(rate=rate, unit=unit, up=up, arrays=arrays, model=model)
+    return said.applied_to(motion)

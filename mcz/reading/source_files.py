@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +21,7 @@ from mcz.formats import (
     has_known_suffix,
     likely_formats,
 )
-from mcz.formats.arrays.kinds import with_kinds
-from mcz.formats.arrays.shaped import with_model
 from mcz.motion import Motion, Skeleton
-from mcz.units import facing, in_unit
 
 
 def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
@@ -103,56 +99,3 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise SourceError(reason_of(error), path=path) from None
-
-
-def with_facts(
-    motion: Motion,
-    rate: Fraction | float | None,
-    unit: str | None,
-    up: str | None = None,
-    arrays: str | None = None,
-    model: str | os.PathLike[str] | None = None,
-) -> Motion:
-    """``motion`` with a frame rate, a length unit and an axis that points up, None: as they are.
-
-    ``arrays`` says what plain arrays are, ``model`` how long the bones of a body are, see
-    ``mcz.read``. Raises OptionError, and MotionError for arrays of another shape.
-    """
-    if arrays is not None:
-        motion = with_kinds(motion, arrays)
-    if model is not None:
-        motion = with_model(motion, model)
-    if rate is not None:
-        motion = replace(motion, frame_rate=checked_rate(rate), frame_rate_exact=True)
-    if unit is not None:
-        motion = replace(motion, skeleton=in_unit(motion.skeleton, unit))
-    if up is not None:
-        motion = replace(motion, skeleton=facing(motion.skeleton, up))
-    return motion
-
-
-def checked_rate(rate: Fraction | float) -> Fraction:
-    """``rate`` as a Fraction; raises OptionError where it is no positive number."""
-    try:
-        exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
-        value = exact.limit_denominator(2**52)
-    except (TypeError, ValueError, OverflowError):
-        raise OptionError(f"frame rate {rate!r} is not a number") from None
-    if value <= 0:
-        raise OptionError(f"frame rate {rate} is not positive")
-    return value
-
-
-def told(
-    motion: Motion,
-    rate: Fraction | float | None = None,
-    unit: str | None = None,
-    up: str | None = None,
-) -> Motion:
-    """``motion`` with those of the facts that it does not say itself; raises OptionError."""
-    return with_facts(
-        motion,
-        rate if motion.frame_rate is None else None,
-        unit if motion.skeleton.unit_cm is None else None,
-        None if motion.skeleton.up_axis else up,
-    )

@@ -28,7 +28,7 @@ from mcz.formats.find import skeletons_around
 from mcz.hints import PYTHON_HINTS, Words, worded
 from mcz.motion import Motion
 from mcz.reading.file import reached
-from mcz.reading.source_files import told
+from mcz.reading.source_options import SourceOptions
 from mcz.types import Params
 from mcz.viewing.contents import Contents, FarAway, OnDisk
 
@@ -223,7 +223,9 @@ class Shelf:
 
     def told(self, motion: Motion) -> Motion:
         """``motion`` with what is said of files that do not say it; raises OptionError."""
-        return told(motion, *map(self.said.get, FACTS))
+        rate, unit, up = map(self.said.get, FACTS)
+        options = SourceOptions(rate=rate, unit=unit, up=up)
+        return options.completing(motion)
 
     def given(self) -> list[tuple[int, Shelved]]:
         """The files that were there from the beginning, with their numbers."""

@@ -23,7 +23,7 @@ from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_options import SourceOptions
 from mcz.types import JsonObject, Params
 from mcz.viewing.multipart import Readable, boundary_of, save_files
 from mcz.viewing.requests import Refused, object_of, params_of, text_of
@@ -123,7 +123,7 @@ class Work:
         by_name(codec).options(params)
         refuse_files(params)
         unit = None if asked.get("unit") is None else text_of(asked, "unit")
-        motion = with_facts(self._motion(asked), None, unit)
+        motion = SourceOptions(unit=unit).applied_to(self._motion(asked))
         quality: dict[str, str] = {}
 
         def make(out: BinaryIO) -> None:

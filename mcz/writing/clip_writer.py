@@ -25,13 +25,12 @@ from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
-from mcz.types import JsonObject, Params, Values
+from mcz.types import JsonObject, Params, Progress, Values
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, as_stored
 from mcz.writing.sources import with_source_hash
 
 BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
-Progress = Callable[[int, int, str], None]
 # (entries of a quality record, decoded values of each signal) -> its entries
 Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
 

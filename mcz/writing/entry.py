@@ -3,81 +3,39 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 from mcz.clock import SAME_RATE
-from mcz.codecs import DEFAULT, by_name
 from mcz.container.limits import BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError, remark_of
 from mcz.formats import Format, format_of, wants_skeleton
-from mcz.formats.arrays.kinds import kinds_of
 from mcz.hints import Hint, Remark
 from mcz.kinematics.rest import height_note
 from mcz.motion import Motion, Skeleton
 from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
-from mcz.reading.source_files import (
-    checked_rate,
-    content_note,
-    read_bytes,
-    read_skeleton,
-    with_facts,
-)
+from mcz.reading.source_files import content_note, read_bytes, read_skeleton
+from mcz.reading.source_options import SourceOptions, checked_rate
 from mcz.reading.source_rates import stating_rate
-from mcz.types import Params
-from mcz.units import facing, in_unit, unit_cm_of
-from mcz.writing.clip_writer import Progress, write_skeleton
+from mcz.types import Progress
+from mcz.units import in_unit
+from mcz.writing.clip_writer import write_skeleton
 from mcz.writing.draft import Draft
 from mcz.writing.names import alias_once, check_name, clip_name
+from mcz.writing.options import EncodingOptions
 from mcz.writing.tuning import write_tuned
-
-
-@dataclass(frozen=True)
-class Terms:
-    """On which terms source files are taken: how they are coded, and what is said of them.
-
-    ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit`` and
-    ``up``, the axis that points up, say what the file does not; ``force_rate``: the rate holds also
-    where the file states one. ``verbatim``: one that cannot be parsed is kept as an attachment.
-    ``keep_skeleton``: an ASF is restored as well, under its own name. ``flat``: a file for which
-    several skeletons around may be meant is kept without one. ``arrays`` says what plain arrays
-    are, ``model`` how long the bones of bodies are. Raises OptionError for an unknown codec, unit,
-    axis or kind of arrays.
-    """
-
-    codec: str = DEFAULT
-    params: Params | None = None
-    skeleton: str | os.PathLike[str] | None = None
-    rate: Fraction | float | None = None
-    force_rate: bool = True
-    unit: str | None = None
-    verbatim: bool = False
-    keep_skeleton: bool = False
-    up: str | None = None
-    arrays: str | None = None
-    model: str | os.PathLike[str] | None = None
-    flat: bool = False
-
-    def __post_init__(self) -> None:
-        by_name(self.codec)
-        if self.rate is not None:
-            checked_rate(self.rate)
-        if self.unit is not None:
-            unit_cm_of(self.unit)
-        facing(Skeleton(()), self.up)
-        if self.arrays is not None:
-            kinds_of(self.arrays)
 
 
 class Entry:
     """One source file on its way into an MCZ file, under the relative path ``name``."""
 
-    def __init__(self, path: Path, name: str, terms: Terms) -> None:
-        self.path, self.name, self.terms = path, name, terms
+    def __init__(
+        self, path: Path, name: str, options: SourceOptions, encoding: EncodingOptions
+    ) -> None:
+        self.path, self.name, self.options, self.encoding = path, name, options, encoding
         self.reason = ""  # why it was kept verbatim
         self.remark = ""  # of the skeleton, where that may be another's
         self.notes: tuple[str, ...] = ()  # what its reader noticed
@@ -106,7 +64,7 @@ class Entry:
             with draft.step():
                 result = self._parsed(draft.writer, data, given, progress)
         except (SourceError, MotionError, LimitError) as error:
-            if not self.terms.verbatim:
+            if not self.options.verbatim:
                 raise
             self.reason, self.remark, self.notes = remark_of(error), "", ()
             with draft.step():
@@ -117,7 +75,7 @@ class Entry:
 
     def _given_skeleton(self, data: bytes) -> Given:
         """The skeleton that was asked for; that it cannot be read is not the source's fault."""
-        given = self.terms.skeleton
+        given = self.options.skeleton
         if given is None or given == NONE or not wants_skeleton(self.path, data):
             return None if given is None else NONE
         self.inputs.append(Path(given))
@@ -127,30 +85,25 @@ class Entry:
         source_format = format_of(self.path, data)
         if source_format.is_skeleton:
             self.notes = tuple(filter(None, [content_note(self.path, source_format)]))
-            id_ = write_skeleton(writer, in_unit(read_skeleton(self.path), self.terms.unit))
+            id_ = write_skeleton(writer, in_unit(read_skeleton(self.path), self.options.unit))
             alias_once(writer, self.name, id_)
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
-        taken = take(self.path, given, self.terms.unit, data, flat=self.terms.flat)
+        taken = take(self.path, given, self.options.unit, data, flat=self.options.flat)
         self._note(taken)
-        terms = self.terms
-        stated = taken.motion.frame_rate
-        rate = terms.rate if terms.force_rate or stated is None else None
-        facts = rate, terms.unit, terms.up, terms.arrays, terms.model
-        motion = with_facts(taken.motion, *facts)
-        self.notes += tuple(
-            filter(None, [*rate_notes(stated, terms), height_note(motion.skeleton)])
-        )
+        motion = self.options.applied_to(taken.motion)
+        notes = rate_notes(taken.motion.frame_rate, self.options)
+        self.notes += tuple(filter(None, [*notes, height_note(motion.skeleton)]))
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
         if taken.skeleton is not None:
             motion = self._based(writer, motion, taken.skeleton)
         name = clip_name(self.name, writer.directory)
         motion = replace(motion, name=name)
-        codec, params = by_name(self.terms.codec), self.terms.params or {}
+        codec = self.encoding.found
         if not codec.lossless:  # the file does not come back: what comes states its rate
             motion = stating_rate(motion)
-        self.quality = write_tuned(writer, motion, codec, params, progress)
+        self.quality = write_tuned(writer, motion, codec, self.encoding.params, progress)
         return "parsed"
 
     def _note(self, taken: Taken) -> None:
@@ -168,7 +121,7 @@ class Entry:
         One that faces up otherwise than the ASF says is derived, too: the ASF stays as it is.
         """
         id_ = write_skeleton(writer, skeleton)
-        if self.terms.keep_skeleton:
+        if self.options.keep_skeleton:
             path = skeleton.source.path if skeleton.source is not None else ""
             alias_once(writer, path or f"{skeleton.name}.asf", id_)
         if motion.skeleton.base is None and motion.skeleton.up_axis == skeleton.up_axis:
@@ -176,14 +129,14 @@ class Entry:
         return replace(motion, skeleton=replace(motion.skeleton, base=id_))
 
 
-def rate_notes(stated: Fraction | None, terms: Terms) -> Iterator[str]:
+def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]:
     """A note where the frame rate that a file states is not the one that was asked for."""
-    if stated is None or terms.rate is None:
+    if stated is None or options.rate is None:
         return
-    asked = float(checked_rate(terms.rate))
+    asked = float(checked_rate(options.rate))
     if abs(float(stated) / asked - 1) <= SAME_RATE:
         return
-    if terms.force_rate:
+    if options.force_rate:
         yield f"its {float(stated):g} frames a second are kept as {asked:g}, as was asked for"
     else:
         text = f"it states {float(stated):g} frames a second, {asked:g} are asked for"

@@ -12,20 +12,19 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-from mcz.codecs import by_name, chosen
-from mcz.container.limits import ARCHIVE, BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.formats import is_table
 from mcz.motion import Motion
+from mcz.reading.source_options import SourceOptions
 from mcz.threads import limited
-from mcz.types import JsonObject, Params, Target
+from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
-from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry, Terms
+from mcz.writing.entry import Entry
 from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_metadata, name_skeleton
+from mcz.writing.options import encoding_options, profile_of
 from mcz.writing.sources import with_true_sources
 from mcz.writing.tuning import write_tuned
 from mcz.writing.written import Written, written
@@ -60,7 +59,7 @@ def write(
     if not isinstance(motion, Motion):
         raise OptionError(f"a motion is written to a target, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
-    named = by_name(chosen(codec, effort))
+    named = encoding_options(codec, effort, params).found
     motion = with_true_sources(motion, lossless=named.lossless)
     with limited(threads), replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive), copies=copies)
@@ -68,10 +67,6 @@ def write(
         quality = write_tuned(writer, motion, named, params, progress)
         writer.finish()
     return written(writer.directory, writer.offset, quality)
-
-
-def profile_of(archive: bool) -> Profile:
-    return ARCHIVE if archive else BASE
 
 
 def encode(
@@ -108,10 +103,17 @@ def encode(
         raise OptionError(
             "a skeleton alone is kept as it is; say the up axis of its AMC", path=path
         )
-    coded = chosen(codec, effort)
-    said: JsonObject = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
-    terms = Terms(coded, params, skeleton, verbatim=verbatim, keep_skeleton=True, **said)
-    entry = Entry(path, path.name, terms)
+    options = SourceOptions(
+        skeleton=skeleton,
+        rate=rate,
+        unit=unit,
+        up=up,
+        arrays=arrays,
+        model=model,
+        verbatim=verbatim,
+        keep_skeleton=True,
+    )
+    entry = Entry(path, path.name, options, encoding_options(codec, effort, params))
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
         short = is_table(path) or (path.exists() and path.stat().st_size <= SHORT)

@@ -19,9 +19,9 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics import positions_of
 from mcz.motion import Motion
-from mcz.types import JsonObject, Params
+from mcz.types import JsonObject, Params, Progress
 from mcz.writing.bounding import REFINEMENT, bounded
-from mcz.writing.clip_writer import Amend, Progress, asked, write_clip
+from mcz.writing.clip_writer import Amend, asked, write_clip
 from mcz.writing.positions import as_codec_wants, check_bones
 from mcz.writing.trials import Target, Trials
 from mcz.writing.weighing import QUALITY, Limits, weighted

@@ -17,7 +17,8 @@ from mcz import live_frames
 from mcz.formats import FORMATS
 from mcz.live.strict_reader import StrictFrames
 from mcz.live.text_writer import encode_live
-from mcz.writing.entry import Terms
+from mcz.reading.source_options import SourceOptions
+from mcz.writing.options import EncodingOptions
 
 ROOT = Path(mcz.__file__).parent.parent
 HEADER = (
@@ -279,8 +280,9 @@ def test_bad_amc(asf: Path, data: bytes, match: str) -> None:
         FORMATS["amc"].arrive(lines(data))
 
 
-def in_channels(asf: Path) -> Terms:
-    return Terms("lsdt-frame", {"step": 0.01, "domain": "channels"}, skeleton=asf)
+def in_channels(asf: Path) -> tuple[SourceOptions, EncodingOptions]:
+    encoding = EncodingOptions("lsdt-frame", {"step": 0.01, "domain": "channels"})
+    return SourceOptions(skeleton=asf), encoding
 
 
 def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
@@ -288,7 +290,7 @@ def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
     whole = FORMATS["amc"].read(data, "x", mcz.read_skeleton(asf))
     np.testing.assert_array_equal(arrived("amc", data, mcz.read_skeleton(asf)), whole.values)
     out = io.BytesIO()
-    report = encode_live(lines(data), out, "amc", in_channels(asf))
+    report = encode_live(lines(data), out, "amc", *in_channels(asf))
     assert report.remarks == ("frame 4 comes where 3 is due; the clip counts on",)
     with mcz.open(out.getvalue()) as file:
         found = file.clips["live"].read()
@@ -299,7 +301,7 @@ def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
 def test_other_channels_than_the_asf(asf: Path) -> None:
     data = b":RADIANS\n5\nroot 1 2 3 4 5 6\nknee 7 8 9\n6\nroot 1 2 3 4 5 6\nknee 7 8 9\n"
     out = io.BytesIO()
-    encode_live(lines(data), out, "amc", in_channels(asf))
+    encode_live(lines(data), out, "amc", *in_channels(asf))
     with mcz.open(out.getvalue()) as file:
         clip = file.clips["live"]
         assert clip.skeleton.n_channels == 9
@@ -317,7 +319,8 @@ def test_real_clips_live(data: Path) -> None:
     text = b"".join(amc.read_bytes().splitlines(keepends=True)[: 3 + 30 * 50])
     motion = FORMATS["amc"].read(text, "17_10", mcz.read_skeleton(asf))
     out = io.BytesIO()
-    encode_live(lines(text), out, "amc", Terms("lsdt-frame", {"step": 0.05}, skeleton=asf))
+    encoding = EncodingOptions("lsdt-frame", {"step": 0.05})
+    encode_live(lines(text), out, "amc", SourceOptions(skeleton=asf), encoding)
     with mcz.open(out.getvalue()) as file:
         found = file.clips["live"].read().reshape(motion.n_frames, -1, 3)
     distances = np.sqrt(((found - mcz.positions(motion)) ** 2).sum(axis=2))
@@ -328,8 +331,9 @@ def test_real_clips_live(data: Path) -> None:
 
 def test_nothing_is_kept_that_was_used() -> None:
     out = io.BytesIO()
+    text = HEADER + b"".join(LINES) * 500
     encode_live(
-        lines(HEADER + b"".join(LINES) * 500), out, "bvh", Terms("lsdt-frame", {"step": 0.01})
+        lines(text), out, "bvh", SourceOptions(), EncodingOptions("lsdt-frame", {"step": 0.01})
     )
     reader = StrictFrames(io.BytesIO(out.getvalue()))
     for _ in reader.frames():

@@ -16,7 +16,7 @@ from mcz.conversion.scenes.usda import usda
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.motion import Motion
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_options import SourceOptions
 from mcz.version import VERSION
 
 KEY_ERROR_MM = 0.1
@@ -63,7 +63,7 @@ def to_scene(
     """``motion`` as a file of the format ``to``, "glb" or "usda"; see those."""
     if to not in WRITERS:
         raise OptionError(f"no scene as {to!r}, but as {', '.join(WRITERS)}")
-    motion = with_facts(motion, rate, unit, up)
+    motion = SourceOptions(rate=rate, unit=unit, up=up).applied_to(motion)
     if motion.timeline is None:
         raise OptionError(
             f"its frame rate is unknown, and {to.upper()} states times",
