@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mcz.errors import FormatError, LimitError
-from mcz.kernels.types import Bytes, Ints
+from mcz.formats.text_items import Items
 from mcz.schema import (
     SIZED,
     SVARINT,
@@ -34,8 +34,6 @@ MAX_GAPS = 2**20  # of a template, and of a detail (SRC-07)
 MAX_RUNS = 2**18  # of a template, and of a detail
 MAX_WIDTH = 255  # SRC-12
 MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
-
-WORDS, FULL, BLANKS, FREE = -1, 0, 1, 2  # what the tokens of a row are: text_kernels.match_rows
 
 
 # SRC-12
@@ -98,17 +96,6 @@ class Run:
     column: int
     n_columns: int = 1
     width: int = 0
-
-
-class Items(NamedTuple):
-    """A pattern as parallel arrays, one entry an item: where its gap lies in ``gaps``, its column
-    (-1: the frame number), its width. The last gap is the tail."""
-
-    gaps: Bytes
-    gap_start: Ints
-    gap_stop: Ints
-    columns: Ints
-    widths: Ints
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,17 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.layout import (
-    FRAME_NUMBER,
-    MAX_PATTERNS,
-    MAX_ROW_GAPS,
-    WORDS,
-    Items,
-    Pattern,
-    runs_of,
-)
+from mcz.formats.layout import FRAME_NUMBER, MAX_PATTERNS, MAX_ROW_GAPS, Pattern, runs_of
 from mcz.formats.notes import FRAME_NUMBER_TEXT, RowNotes
 from mcz.formats.padding import find_widths, padding
+from mcz.formats.text_items import WORDS, Items
 
 Ints = NDArray[np.int64]
 Token = tuple[int, int, int]  # start, stop, column

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from mcz.errors import SourceError
 from mcz.formats.csv_text import BLANK_CELLS, cell_spans
-from mcz.formats.layout import BLANKS, FRAME_NUMBER, FREE, FULL, MAX_WIDTH, Pattern, runs_of
+from mcz.formats.layout import FRAME_NUMBER, MAX_WIDTH, Pattern, runs_of
 from mcz.formats.rows import DENSE, Rows, Token, line_of, read_rows
 from mcz.formats.text_columns import TextColumn, odd_cells, refuse_commas, split_text
+from mcz.formats.text_items import BLANKS, FREE, FULL
 from mcz.numbers import scan
 
 Bools = NDArray[np.bool_]

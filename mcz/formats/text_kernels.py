@@ -5,7 +5,7 @@ Blanks are the bytes up to 0x20.
 
 from __future__ import annotations
 
-from mcz.formats.layout import BLANKS, FREE, WORDS, Items
+from mcz.formats.text_items import BLANKS, FREE, WORDS, Items
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Ints, Ints2
 
