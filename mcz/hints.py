@@ -22,6 +22,7 @@ class Hint(StrEnum):
     KEY_ERROR = "key-error"
     MAX_DECODED = "max-decoded"
     NAME_CODEC = "name-codec"
+    OLD_FORMAT = "old-format"
     PAGE = "page"
     PORTABLE_NAMES = "portable-names"
     RATE = "rate"
@@ -51,6 +52,7 @@ PYTHON_HINTS: Words = {
     Hint.KEY_ERROR: "allow more (key_error_mm=)",
     Hint.MAX_DECODED: "max_decoded raises it",
     Hint.NAME_CODEC: "name a codec to code it anew",
+    Hint.OLD_FORMAT: "version 0.9 of package mcz reads it, and tools/migrate_0_9 converts it",
     Hint.PAGE: "choose clips, name a lossy codec, or allow more bytes",
     Hint.PORTABLE_NAMES: "names='portable' keeps both",
     Hint.RATE: "give the rate (rate=)",

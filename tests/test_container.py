@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import mcz
+from conformance.run import VECTORS
 from mcz.codecs import by_name
 from mcz.container import chunks, payloads
-from mcz.container.chunks import ANCILLARY, FOOT, SAFE_TO_COPY, build_chunk, build_foot
+from mcz.container.chunks import ANCILLARY, FOOT, HEADER, SAFE_TO_COPY, build_chunk, build_foot
 from mcz.container.packets import (
     END,
     FRAME,
@@ -24,7 +25,6 @@ from mcz.container.packets import (
     numbered_frame,
     read_packets,
 )
-from mcz.container.payloads import FORMAT_MINOR
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import (
@@ -34,6 +34,7 @@ from mcz.container.segments import (
     parse_table,
 )
 from mcz.container.source import ByteSource, open_source
+from mcz.container.versions import FORMAT
 from mcz.container.writer import Writer
 from mcz.errors import (
     ChecksumError,
@@ -135,7 +136,7 @@ def test_unknown_ancillary_chunk_is_skipped() -> None:
         (build_chunk(b"NEWS", b""), UnsupportedError),
         (build_chunk(b"NEWS", b"", 4), FormatError),
         (build_chunk(b"SK3L", b""), FormatError),
-        (build_chunk(b"HEAD", b"\0\x02\0\x02\0"), FormatError),
+        (build_chunk(b"HEAD", b"\0\x63\0\x63\0"), FormatError),
         (build_chunk(b"CEND", b"\0\0\0"), FormatError),
         (build_chunk(b"DATA", b"\0" * 20), FormatError),
         (build_chunk(b"ALIA", b"\x01a\x00\x01b", ANCILLARY), FormatError),
@@ -146,7 +147,7 @@ def test_chunks_out_of_place(chunk: bytes, error: type[Exception]) -> None:
         use(with_chunk(written("a"), chunk))
 
 
-@pytest.mark.parametrize("needed", [(0, 1), (0, FORMAT_MINOR + 1), (1, 0), (1, 2)])
+@pytest.mark.parametrize("needed", [(0, 9), (FORMAT[0], FORMAT[1] + 1), (FORMAT[0] + 2, 0)])
 def test_another_version_is_unsupported(needed: tuple[int, int]) -> None:
     parts = parts_of(written())
     parts[0] = (parts[0][0], bytes((*needed, *needed, 0)))
@@ -301,6 +302,18 @@ def test_salvage_goes_on_behind_garbage() -> None:
         for clip in file.clips.values():
             assert clip.read().shape == (30, 10)
         assert len(file.damage) == 1
+
+
+def test_salvage_takes_nothing_of_another_version_for_its_own() -> None:
+    """A file of 0.9 is refused where HEAD is whole; its clips where HEAD is not."""
+    data = (VECTORS / "uncommon/container/format-0-9.mcz").read_bytes()
+    for salvage in (False, True):
+        with pytest.raises(UnsupportedError, match=r"needs format 0\.9, .* mcz reads it"):
+            mcz.open(data, salvage=salvage)
+    head = data.index(b"HEAD") + HEADER.size
+    with mcz.open(data[:head] + b"\1" + data[head + 1 :], salvage=True) as file:
+        assert not file.clips
+        assert any("needs format 1.97" in text for text in file.damage)
 
 
 def test_nothing_to_salvage() -> None:

@@ -14,7 +14,7 @@ from mcz.codecs import CODECS
 from mcz.codecs.basis_models import name_of
 from mcz.container import limits, packets
 from mcz.container.chunks import FLAGS_OF
-from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR
+from mcz.container.versions import FORMAT_NAME
 from mcz.container.walk_with_losses import KNOWN
 from mcz.formats import FORMATS
 from mcz.motion import CHANNEL_KINDS
@@ -53,7 +53,7 @@ def test_a_table_that_is_gone_is_missed(mark: str) -> None:
 
 
 def test_version() -> None:
-    assert FOUND["format_version"] == f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
+    assert FOUND["format_version"] == FORMAT_NAME
 
 
 def test_chunk_types() -> None:

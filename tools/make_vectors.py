@@ -22,10 +22,10 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
-from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR  # noqa: E402 - needs the path
+from mcz.container.versions import FORMAT_NAME  # noqa: E402 - needs the path
 from tools.vectors import invalid, uncommon, valid  # noqa: E402 - needs the path
 from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402
-from tools.vectors.contents import codecs_of, formats_of, since  # noqa: E402
+from tools.vectors.contents import codecs_of, formats_of  # noqa: E402
 from tools.vectors.engine.tables import Row, tables  # noqa: E402
 from tools.vectors.engine.tables import rows as table_rows  # noqa: E402
 from tools.vectors.faults import Fault, faults  # noqa: E402
@@ -33,7 +33,6 @@ from tools.vectors.requirements import requirements  # noqa: E402
 
 CONFORMANCE = ROOT / "conformance"
 GROUPS = (valid, uncommon, invalid)
-FORMAT_VERSION = f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
 
 
 def vectors(without: Collection[ModuleType] = ()) -> list[Vector]:
@@ -66,7 +65,7 @@ def row(vector: Vector, ids: Sequence[str] = (), fault: Fault | None = None) -> 
         "spec": list(vector.spec),
         "requirements": list(ids),
         "purpose": vector.purpose,
-        "since": since(vector),
+        "since": vector.since,
         "codecs": codecs_of(vector),
         "licence": "CC0-1.0",
         "sha256": _hash(vector.data),
@@ -138,7 +137,7 @@ def files_of(names: Collection[str]) -> dict[str, bytes]:
 def _manifest(listed: Sequence[dict[str, Any]]) -> str:
     """A line a vector, so that the file stays small and a change shows what it changes."""
     head = {
-        "format_version": FORMAT_VERSION,
+        "format_version": FORMAT_NAME,
         "licence": "CC0-1.0",
         "zlib": zlib.ZLIB_RUNTIME_VERSION,
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mcz.hints import Hint, Words, worded
+from mcz.hints import PYTHON_HINTS, Hint, Words, worded
 
 OPTION_HINTS: Words = {
     Hint.ARCHIVE: "--archive allows more",
@@ -18,6 +18,7 @@ OPTION_HINTS: Words = {
     Hint.KEY_ERROR: "allow more (--key-error)",
     Hint.MAX_DECODED: "--max-decoded raises it",
     Hint.NAME_CODEC: "--codec codes it anew",
+    Hint.OLD_FORMAT: PYTHON_HINTS[Hint.OLD_FORMAT],
     Hint.PAGE: "--clip takes some clips alone, --codec lossy makes them smaller, "
     "--max-size allows more",
     Hint.PORTABLE_NAMES: "--names portable keeps both",

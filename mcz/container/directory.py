@@ -197,16 +197,17 @@ class Directory:
 def parse_head(payload: bytes) -> Profile:
     """The profile of the file; raises UnsupportedError where it needs a newer reader."""
     head = parse(payloads.Head, payload, "HEAD")
-    ours = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
-    needed = head.needs_major, head.needs_minor  # HEAD-04
-    if not payloads.LEAST_NEEDED <= needed <= ours:  # HEAD-01, HEAD-02, HEAD-03
-        raise UnsupportedError(
-            f"HEAD: the file needs format {needed[0]}.{needed[1]}, "
-            f"this reader knows {ours[0]}.{ours[1]}"
-        )
     if head.profile not in PROFILES:
         raise UnsupportedError(f"HEAD: profile {head.profile} is unknown")  # CONV-16
     return PROFILES[head.profile]
+
+
+def parse_clip(payload: bytes, head: bytes, where: str) -> payloads.Clip:
+    """The fields of CLIP, which needs no more than ``head``, the payload of HEAD, says."""
+    needed, stated = tuple(payload[:2]), tuple(head[2:4])
+    if stated and needed > stated:  # CLIP-22
+        raise FormatError(f"it needs format {needed}, more than HEAD says: {stated}", where=where)
+    return parse(payloads.Clip, payload, where)
 
 
 @dataclass(slots=True)

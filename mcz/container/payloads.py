@@ -12,6 +12,7 @@ from itertools import groupby
 
 from construct import GreedyBytes, If, Int8ul, this
 
+from mcz.container.versions import FORMAT, NEEDS_MINOR
 from mcz.numbers import GRID, Grid
 from mcz.schema import (
     EXTENSION,
@@ -30,9 +31,6 @@ from mcz.schema import (
     optional,
 )
 
-FORMAT_MAJOR, FORMAT_MINOR = 0, 9
-LEAST_NEEDED = 0, 2  # 0.1 had another CLIP and INDX
-
 ID = Exactly(16)
 SHA256 = Exactly(32)
 VECTOR = FINITE[3]
@@ -42,10 +40,14 @@ Vector = list[float] | tuple[float, float, float]
 class Head(Record):
     """HEAD, the first chunk."""
 
-    major: int = field(Int8ul, "format version of the writer, major")
-    minor: int = field(Int8ul, "format version of the writer, minor")
-    needs_major: int = field(Int8ul, "least format version that reads the container, major")
-    needs_minor: int = field(Int8ul, "least format version that reads the container, minor")
+    major: int = field(Int8ul, "format version of the writer, major", default=FORMAT[0])
+    minor: int = field(Int8ul, "format version of the writer, minor", default=FORMAT[1])
+    needs_major: int = field(
+        Int8ul, "least format version that reads the file, major", default=FORMAT[0]
+    )
+    needs_minor: int = field(
+        NEEDS_MINOR, "least format version that reads the file, minor", default=FORMAT[1]
+    )
     profile: int = field(Int8ul, "profile id: 0 base, 1 archive")
     extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
 
@@ -264,6 +266,14 @@ def metadata_pairs(records: Sequence[Metadata]) -> dict[str, str]:
 class Clip(Record):
     """CLIP, all that is known of a clip before its data."""
 
+    needs_major: int = field(
+        Int8ul, "least format version that reads the clip, major", default=FORMAT[0]
+    )
+    needs_minor: int = field(
+        NEEDS_MINOR,  # CLIP-23
+        "least format version that reads the clip, minor",
+        default=FORMAT[1],
+    )
     name: str = field(TEXT, "name of the clip, unique in the file, not empty")
     flags: int = field(
         flags(*CLIP_FLAGS), "bit 0: n_frames is open; 1: the frame rate is rounded", default=0

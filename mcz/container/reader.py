@@ -33,6 +33,7 @@ from mcz.container.directory import (
     ClipRow,
     Directory,
     SegmentRow,
+    parse_clip,
     parse_head,
     signal_rows,
 )
@@ -253,7 +254,7 @@ class Container:
 
     def clip(self, row: ClipRow) -> payloads.Clip:
         """The fields of CLIP, compared with what the index says of them."""
-        fields = parse(payloads.Clip, self.payload(row.clip), row.clip.label)
+        fields = parse_clip(self.payload(row.clip), self.directory.head, row.clip.label)
         signals = signal_rows(fields, row.clip.label)
         rate = fields.rate_numerator, fields.rate_denominator
         n_frames = fields.n_frames  # CLIP-17

@@ -19,7 +19,7 @@ from mcz.container.repeats import chunks_in
 from mcz.container.scanner import Scanner
 from mcz.container.source import ByteSource
 from mcz.container.writer import payload_id
-from mcz.errors import FormatError, LimitError, TruncatedError
+from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 
 
 def scan(
@@ -78,6 +78,9 @@ class Salvager(Scanner):
                 else:
                     self._take(event)
             except FormatError as error:
+                of_head = getattr(getattr(event, "chunk", None), "type", b"") == b"HEAD"
+                if of_head and isinstance(error, UnsupportedError):
+                    raise  # nothing is known of a file of another version
                 self._note(error)  # SALV-03
                 self._leave(event)
             else:

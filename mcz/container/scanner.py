@@ -18,6 +18,7 @@ from mcz.container.directory import (
     ClipRow,
     Found,
     SegmentRow,
+    parse_clip,
     parse_head,
     signal_rows,
 )
@@ -167,7 +168,7 @@ class Scanner:
         self.found.directory.aliases[fields.name] = (fields.of, fields.target)
 
     def _begin_clip(self, chunk: Chunk, payload: bytes) -> None:
-        fields = parse(payloads.Clip, payload, chunk.label)
+        fields = parse_clip(payload, self.found.directory.head, chunk.label)
         if not fields.name or fields.name in self.found.directory.clips:  # CLIP-01, GRAM-06
             raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
         if not fields.signals:  # CLIP-05

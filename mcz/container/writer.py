@@ -64,14 +64,7 @@ def payload_id(payload: bytes) -> bytes:
 
 def build_head(profile: Profile) -> bytes:
     """The payload of a HEAD that this writer writes."""
-    head = payloads.Head(
-        major=payloads.FORMAT_MAJOR,
-        minor=payloads.FORMAT_MINOR,
-        needs_major=payloads.FORMAT_MAJOR,
-        needs_minor=payloads.FORMAT_MINOR,
-        profile=profile.id,
-    )
-    return build(head, "HEAD")
+    return build(payloads.Head(profile=profile.id), "HEAD")
 
 
 UNINDEXED = 8192  # bytes of a short file that is walked as fast as its index is read

@@ -17,10 +17,8 @@ import mcz
 from mcz.cli.common import run
 from mcz.cli.info import command as info_command
 from mcz.cli.main import COMMANDS
-from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR
+from mcz.container.versions import FORMAT_NAME as VERSION
 from tests.commands import Call, fails
-
-VERSION = f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
 
 CLIP_KEYS = {
     "name",

@@ -3,6 +3,7 @@
 import { ByteReader, count, hex } from "./bytes.js";
 import { Refused } from "./errors.js";
 import { INTEGER, parseGrid } from "./grids.js";
+import { readNeeds } from "./head.js";
 import { within } from "./limits.js";
 import { checkSourceFormat } from "./registry.js";
 import { checkPath } from "./shared.js";
@@ -57,12 +58,14 @@ const GROUPS_LISTED = 3;
 /**
  * @param {Uint8Array} payload of CLIP
  * @param {number} offset of the chunk in the file
- * @param {{limits: object, clips: Map, skeletons: Map, templates: Map}} file what comes before it
+ * @param {{head: Uint8Array?, limits: object, clips: Map, skeletons: Map, templates: Map}} file what comes before it
  * @returns {Clip}
  * @throws {Refused}
  */
 export function readClip(payload, offset, file) {
   const reader = new ByteReader(payload, "CLIP");
+  if (file.head) checkNeeds(payload, file.head);
+  readNeeds(reader);
   const name = reader.text();
   if (name === "") reader.refuse("a clip without a name");
   if (file.clips.has(name)) reader.refuse(`a second clip ${name}`);
@@ -94,6 +97,12 @@ export function readClip(payload, offset, file) {
     source,
     signals,
   };
+}
+
+/** A clip needs no more than its file says. */
+function checkNeeds(payload, head) {
+  const more = payload[0] - head[2] || payload[1] - head[3];
+  if (more > 0) throw new Refused(`CLIP: it needs version ${payload[0]}.${payload[1]}, HEAD less`);
 }
 
 function readMetadata(reader) {

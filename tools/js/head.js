@@ -5,11 +5,28 @@ import { Unsupported } from "./errors.js";
 import { profile } from "./limits.js";
 
 const MAJOR = 0;
-const LEAST_MINOR = 2; // CLIP and INDX of 0.1 were others
-const GREATEST_MINOR = 9;
+const MINOR = 99; // the draft of 1.0, which is read by itself alone
 
 /** The version of SPEC.md that this decoder follows. */
-export const VERSION = `${MAJOR}.${GREATEST_MINOR}`;
+export const VERSION = `${MAJOR}.${MINOR}`;
+
+/**
+ * The version that a file or a clip needs, major x 256 + minor.
+ *
+ * @param {ByteReader} reader
+ * @throws {Unsupported} where it is not read here
+ */
+export function readNeeds(reader) {
+  const major = reader.u8();
+  const minor = reader.u8();
+  if (major > MAJOR || (major === MAJOR && minor > MINOR)) {
+    throw new Unsupported(`${reader.what}: it needs version ${major}.${minor}`);
+  }
+  if (major === 0 && !(MAJOR === 0 && minor === MINOR)) {
+    throw new Unsupported(`${reader.what}: it needs version ${major}.${minor}, which mcz 0.9 reads`);
+  }
+  return major * 256 + minor;
+}
 
 /**
  * @param {Uint8Array} payload of HEAD
@@ -19,12 +36,8 @@ export const VERSION = `${MAJOR}.${GREATEST_MINOR}`;
 export function readHead(payload) {
   const reader = new ByteReader(payload, "HEAD");
   reader.take(2); // the version of the writer
-  const needsMajor = reader.u8();
-  const needsMinor = reader.u8();
+  readNeeds(reader);
   const profileId = reader.u8();
   reader.rest();
-  if (needsMajor !== MAJOR || needsMinor < LEAST_MINOR || needsMinor > GREATEST_MINOR) {
-    throw new Unsupported(`a file that needs version ${needsMajor}.${needsMinor}`);
-  }
   return profile(profileId);
 }

@@ -10,7 +10,7 @@ import { restored } from "./restoring.js";
 import { Scan, placeKey } from "./scan.js";
 import { directoryFrom } from "./walked.js";
 
-const BASE_HEAD = Uint8Array.of(0, 9, 0, 2, 0); // of a file that has lost its own
+const BASE_HEAD = Uint8Array.of(0, 99, 0, 99, 0); // of a file that has lost its own
 
 /**
  * @param {Ranges} ranges

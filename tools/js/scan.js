@@ -18,6 +18,7 @@ import { frameNumbers } from "./clip.js";
 import { COPIED, copiesIn } from "./copies.js";
 import { Damage } from "./damage.js";
 import { Refused } from "./errors.js";
+import { readNeeds } from "./head.js";
 import { within } from "./limits.js";
 import { supplied } from "./missing.js";
 import { Packets, passPacket } from "./packets.js";
@@ -240,6 +241,7 @@ export class Scan extends Walk {
   readClip(chunk) {
     const { payload } = chunk;
     const reader = new ByteReader(payload, "CLIP");
+    this.checkNeeds(reader);
     const name = reader.text();
     reader.skip(1);
     const skeleton = hex(reader.take(ID_SIZE));
@@ -254,6 +256,15 @@ export class Scan extends Walk {
     this.lostClip = null;
     Object.assign(this.clip, { payload, damage: [], end: null });
     for (const signal of this.clip.signals) signal.mayLack = true;
+  }
+
+  /** Refuses a clip of another version, and no other. */
+  checkNeeds(reader) {
+    try {
+      readNeeds(reader);
+    } catch (error) {
+      this.refuse(error.message);
+    }
   }
 
   /** Takes in a SKEL that only a REPT behind its clip has. */

@@ -24,6 +24,7 @@ export class SharedChunks {
   constructor(ranges, directory, limits, inflateLimit, salvage) {
     this.ranges = ranges;
     this.directory = directory;
+    this.head = directory.head;
     this.limits = limits;
     this.inflateLimit = inflateLimit;
     this.read = new Map(); // by type and id

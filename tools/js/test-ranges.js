@@ -5,7 +5,7 @@ import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 
 import { readAnnex } from "./annex-node.js";
-import { MczError, Refused } from "./errors.js";
+import { MczError, Refused, Unsupported } from "./errors.js";
 import { analogValues, decode, fromBytes, list, open, setAnnex, sources } from "./mcz.js";
 import { c3dRecording } from "./recording.js";
 
@@ -153,6 +153,17 @@ test("a lost segment is told with its frames", async () => {
   assert.ok(Number.isNaN(values[frames[0] * nChannels]));
   assert.equal(mask[frames[1] * nChannels], 1);
   await assert.rejects((await (await open(fromBytes(bytes))).clip(0)).read(), Refused);
+});
+
+test("a clip of format 0.9 is no clip of this one", async () => {
+  const bytes = bytesOf("uncommon/container/format-0-9.mcz").slice();
+  for (const salvage of [false, true]) {
+    await assert.rejects(open(fromBytes(bytes), { salvage }), Unsupported);
+  }
+  bytes[24] ^= 1; // HEAD
+  const file = await open(fromBytes(bytes), { salvage: true });
+  assert.equal(file.clips.length, 0);
+  assert.ok(file.damage.some(({ text }) => text.includes("needs version 1.97")));
 });
 
 test("no clip gets frames of the next one, where bytes between them are lost", async () => {

@@ -42,6 +42,7 @@ from mcz.container.packets import (
 )
 from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.value_hash import canonical
+from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer, payload_id
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import deflate, inflate, parse, varint
@@ -60,7 +61,7 @@ class Vector:
     ``name`` is its path below vectors/ without the suffix; ``arrays`` are rows of the contract
     with the bytes behind them, ``sources`` pairs of path and bytes; ``modes`` are the calls that
     are made: "arrays", "sources". ``parts`` are (arguments, arrays) of partial reads. ``seed``
-    is that of a file made at random, ``since`` a format version that the bytes do not tell.
+    is that of a file made at random, ``since`` the version of the format that first had it.
     """
 
     name: str
@@ -73,7 +74,7 @@ class Vector:
     modes: tuple[str, ...] = ("arrays",)
     parts: tuple[tuple[tuple[str, ...], tuple[tuple[dict[str, Any], bytes], ...]], ...] = ()
     seed: int | None = None
-    since: str = ""
+    since: str = FORMAT_NAME
 
 
 class Crafter(Writer):

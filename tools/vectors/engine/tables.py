@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from mcz.container.versions import FORMAT_NAME
 from tools.vectors.bases import Base, base_bytes, base_of
 from tools.vectors.build.files import OK, REFUSED, Vector, arrays, partial
 from tools.vectors.engine.edits import edited
@@ -84,7 +85,7 @@ class Row:
             sources=held.sources if "sources" in modes else (),
             modes=modes,
             parts=tuple(_part(held, text) for text in fields.get("parts", ())),
-            since=fields.get("since", ""),
+            since=fields.get("since", FORMAT_NAME),
         )
 
 

@@ -394,9 +394,7 @@ def _needs_more(shelf: Whole) -> None:
         ("unknown-codec", "Codecs", "A codec id beyond the registry.", finished(crafters[0])),
         ("newer-codec", "Codecs", "A later version of a known codec.", finished(crafters[1])),
         ("unknown-critical", "Chunks", "A critical chunk of unknown type.", finished(crafters[2])),
-        ("newer-minor", "HEAD", "A later minor version.", file_of(dance(), HEAD=at(3, b"\xff"))),
-        ("older-minor", "HEAD", "Minor version 1 of 0.", file_of(dance(), HEAD=at(3, b"\1"))),
-        ("newer-major", "HEAD", "Another major version.", file_of(dance(), HEAD=at(2, b"\1\0"))),
+        ("newer-major", "HEAD", "A later major version.", file_of(dance(), HEAD=at(2, b"\2\0"))),
         ("unknown-profile", "HEAD", "A later profile.", file_of(dance(), HEAD=at(4, b"\7"))),
     )
     for name, spec, purpose, data in cases:
@@ -424,8 +422,8 @@ def _other_index(shelf: Whole) -> None:
     crafter.clip(dance())
     purpose = "A critical chunk of unknown type, and an INDX that this version cannot read."
     shelf.add("unknown-critical-index", "Chunks; INDX", purpose, finished(crafter), exit=shelf.exit)
-    data = file_of(dance(), HEAD=at(2, b"\1\0"), INDX=edit)
-    purpose = "Another major version, and an INDX that this one cannot read."
+    data = file_of(dance(), HEAD=at(2, b"\2\0"), INDX=edit)
+    purpose = "A later major version, and an INDX that this one cannot read."
     shelf.add("newer-major-index", "HEAD; INDX", purpose, data, exit=shelf.exit)
 
 

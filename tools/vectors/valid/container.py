@@ -173,12 +173,8 @@ def _names(shelf: Whole) -> None:
 
 def _versions(shelf: Whole) -> None:
     data = file_of(dance(), HEAD=at(0, b"\x09\xff"))
-    purpose = "A file that version 9.255 wrote and version 0.9 reads."
+    purpose = "A file that version 9.255 wrote and this version reads."
     shelf.hold("newer-writer", "HEAD", purpose, data, dance())
-    for minor in (2, 3, 5):
-        data = file_of(dance(), HEAD=at(2, bytes((0, minor))))
-        purpose = f"A file that needs version 0.{minor}."
-        shelf.hold(f"needs-0-{minor}", "HEAD; Versions", purpose, data, dance())
 
 
 def _unknown(shelf: Whole) -> None:

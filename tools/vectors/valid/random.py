@@ -21,6 +21,7 @@ from mcz.container.limits import ARCHIVE, BASE
 from mcz.container.packets import END, SEGMENT, Packet, build_packet
 from mcz.container.segments import FRESH, SegmentHeader
 from mcz.container.value_hash import value_hash
+from mcz.container.versions import FORMAT
 from mcz.motion import Motion
 from mcz.schema import deflate, varint
 from mcz.writing.clip_writer import write_skeleton
@@ -119,8 +120,8 @@ class _Maker:
 
     def head(self) -> Callable[[bytes], bytes]:
         """Versions that are read, and an extension."""
-        needs = self.chance.choice((2, 3, 4, 5, 8, 9))
-        versions = bytes((0, self.chance.randrange(needs, 256), 0, needs))
+        least = self.chance.choice((2, 3, 4, 5, 8, 9))
+        versions = bytes((0, self.chance.randrange(least, 256), *FORMAT))
         more = self.bytes() if self.says("an extension of HEAD", 0.2) else b""
         return lambda payload: versions + payload[4:] + more
 
