@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -115,6 +115,17 @@ def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
         return value
 
     return Rule(words, form)
+
+
+def one_of(choices: Collection[str]) -> Rule:
+    """The rule of a field that is one of some words."""
+
+    def form(value: Any) -> str:
+        if value not in choices:
+            raise ValueError
+        return str(value)
+
+    return Rule(f"one of {', '.join(filter(None, choices))}", form)
 
 
 def several(rule: Rule, words: str) -> Rule:

@@ -21,15 +21,16 @@ from numpy.typing import NDArray
 from mcz.errors import OptionError
 from mcz.hints import Hint
 from mcz.numbers import Grid, GridKind
-from mcz.skeleton import Channel, Skeleton
+from mcz.skeleton import Channel
 from mcz.source import SourceClock
+from mcz.types import Values
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 START = "start-time"  # of the registry
-PER_SECOND = {"": 1.0, "s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # units of a column of times
-NAMES = ("time", "times", "timestamp", "timestamps")  # of a signal of times
+TIMES = "times"  # the role of a signal of times
+PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # units of a signal of times
 JITTER = 1e-6  # of a step: binary times that are off by less are uniform
 EXACT = 1e-10  # seconds: the most by which two times of one clock differ
 SAME_RATE = 1e-5  # relative: frame rates that differ by less are one
@@ -42,7 +43,7 @@ class Timeline:
     """The times of frames in seconds, as their source has them.
 
     ``times`` float64 (n_frames,), never falling. ``rounding`` is how far each may be from the one
-    that was meant, as of printed decimals. ``note`` tells of times in the source that do not count.
+    that was meant, as of printed decimals. ``note`` tells what is odd about them.
     """
 
     times: Floats
@@ -157,43 +158,31 @@ class Timed(Protocol):
     """A signal, of a Motion or a Clip, that may be one of times."""
 
     @property
-    def name(self) -> str: ...
+    def role(self) -> str | None: ...
     @property
     def channels(self) -> tuple[Channel, ...] | None: ...
     @property
     def samples_per_frame(self) -> int: ...
 
 
-def has_times(skeleton: Skeleton) -> bool:
-    """Return whether the first column of a motion is the time, as of a STO or MOT that was read."""
-    channels = skeleton.joints[0].channels if skeleton.joints else ()
-    return (
-        len(channels) == 1
-        and skeleton.joints[0].name.lower() == "time"
-        and not channels[0].kind
-        and channels[0].unit in PER_SECOND
-    )
+def times_place(signals: Sequence[Timed]) -> int | None:
+    """The index of the signal of times, None where there is none."""
+    return next((k for k, signal in enumerate(signals) if signal.role == TIMES), None)
 
 
-def is_time(signal: Timed) -> bool:
-    """Return whether a signal holds the time of every frame."""
+def unit_of_times(signal: Timed) -> str:
+    """The unit of a signal of times."""
+    return (signal.channels or ())[0].unit
+
+
+def times_form_fault(signal: Timed) -> str:
+    """Why a signal cannot be one of times by its form, "" where it can."""
     own = signal.channels or ()
-    return (
-        signal.name in NAMES
-        and signal.samples_per_frame == 1
-        and len(own) == 1
-        and not own[0].kind
-        and own[0].unit in PER_SECOND
-        and own[0].unit != ""
-    )
-
-
-def times_place(skeleton: Skeleton, signals: Sequence[Timed]) -> tuple[int, str] | None:
-    """The signal whose first column is the time, and its unit; None where there is none."""
-    first, index = signals[0], time_signal(signals)
-    if first.channels is None and first.samples_per_frame == 1 and has_times(skeleton):
-        return 0, skeleton.channels[0].unit
-    return None if index is None else (index, (signals[index].channels or ())[0].unit)
+    if signal.samples_per_frame != 1 or len(own) != 1:  # ROLE-03
+        return f"{len(own)} channels of its own, {signal.samples_per_frame} rows a frame"
+    if own[0].kind or own[0].unit not in PER_SECOND:  # ROLE-03
+        return f"kind {own[0].kind!r}, unit {own[0].unit!r}"
+    return ""
 
 
 def column_of(numbers: NDArray[np.generic], grid: Grid, unit: str) -> Column:
@@ -232,20 +221,18 @@ def timeline_of(
     """
     note = ""
     numbers, rate, step = counting
-    if column is not None:
-        note = _fault(column.times)
-        if not note:
-            return Timeline(column.times, rate, column.rounding)
+    if column is not None and not times_fault(column.times):  # what salvage found may have one
+        return Timeline(column.times, rate, column.rounding)
     if clock is not None:
         told = clock.times(numbers, rate and rate * step)
-        if told is not None and not _fault(told):
-            return Timeline(told, rate, clock.rounding(rate and rate * step), note)
+        if told is not None and not times_fault(told):
+            return Timeline(told, rate, clock.rounding(rate and rate * step))
     if rate is None:
         return None
     places = numbers.astype(np.float64)  # beyond 64 bits, too
     since = (numbers - numbers[:1]).astype(np.uint64)
     if not _ascend(numbers):
-        note = note or "the frame numbers do not ascend: rows are counted"
+        note = "the frame numbers do not ascend: rows are counted"
         since = np.arange(len(numbers), dtype=np.uint64) * np.uint64(step)
         places = places[:1] + since
     start = metadata.get(START, "") if clock is None else ""
@@ -258,13 +245,12 @@ def _ascend(numbers: Ints) -> bool:
     return bool((numbers[1:] > numbers[:-1]).all())
 
 
-def _fault(times: Floats) -> str:
-    """Why times do not count, "" where they do."""
+def times_fault(times: Values) -> str:
+    """Why numbers are no times, "" where they are."""
     if not np.isfinite(times).all():
-        frame = int(np.flatnonzero(~np.isfinite(times))[0])
-        return f"the times do not count: that of frame {frame} is unknown"
+        return f"that of frame {int(np.flatnonzero(~np.isfinite(times))[0])} is unknown"
     falls = np.flatnonzero(np.diff(times) < 0)
-    return f"the times do not count: they fall at frame {falls[0] + 1}" if len(falls) else ""
+    return f"they fall at frame {falls[0] + 1}" if len(falls) else ""
 
 
 def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
@@ -325,8 +311,3 @@ def numbers_or_rows(numbers: Ints | None, n_frames: int) -> Ints:
 def usual_step(numbers: Ints | None) -> int:
     """The usual step from a frame number to the next."""
     return 1 if numbers is None or len(numbers) < 2 else int(np.median(np.diff(numbers)))
-
-
-def time_signal(signals: Sequence[Timed]) -> int | None:
-    """The index of the first signal of times behind the motion, None where there is none."""
-    return next((k for k, signal in enumerate(signals) if k and is_time(signal)), None)

@@ -60,7 +60,7 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
     """
     a, b = original.skeleton, other.skeleton
     for motion in (original, other):
-        if motion.signals[0].channels is not None:
+        if not motion.signals[0].has_poses:
             raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     if original.signals[0].n_rows != other.signals[0].n_rows:
         raise MotionError(f"{original.n_frames} and {other.n_frames} frames")

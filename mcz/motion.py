@@ -5,7 +5,7 @@ Nothing here reads or writes files. SPEC.md, "CLIP", has the stored form.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -28,6 +28,7 @@ from mcz.checks import (
 )
 from mcz.clock import (
     START,
+    TIMES,
     Counting,
     Timeline,
     column_of,
@@ -36,7 +37,9 @@ from mcz.clock import (
     numbers_or_rows,
     parts_need_start,
     timeline_of,
-    times_place,
+    times_fault,
+    times_form_fault,
+    unit_of_times,
 )
 from mcz.displays import html_of
 from mcz.errors import MotionError, OutOfRangeError
@@ -76,6 +79,7 @@ def frame_rate_of(rate: Any, name: str) -> Fraction:
     raise MotionError(f"frame rate {rate!r}", clip=name)
 
 
+MOTION_ROLE, RESIDUALS = "motion", "residuals"
 MOTION = {
     "name": TEXT,
     "skeleton": of_type(Skeleton, "a Skeleton"),
@@ -123,6 +127,7 @@ class Motion:
                     f"but the skeleton has {self.skeleton.n_channels} channels",
                     clip=self.name,
                 )
+        self._check_roles()
         counts = {signal.n_frames for signal in self.signals}
         if len(counts) > 1:
             raise MotionError(f"signals of {sorted(counts)} frames", clip=self.name)
@@ -133,9 +138,45 @@ class Motion:
         if self.number_step < 1:
             raise MotionError(f"a number step of {self.number_step}", clip=self.name)
 
+    def _check_roles(self) -> None:
+        """Give signals that have no role theirs; what SPEC.md asks of roles holds."""
+        if any(signal.role is None for signal in self.signals):
+            given = (
+                replace(signal, role="" if index else MOTION_ROLE)
+                if signal.role is None
+                else signal
+                for index, signal in enumerate(self.signals)
+            )
+            object.__setattr__(self, "signals", tuple(given))
+        roles = [signal.role for signal in self.signals]
+        if MOTION_ROLE in roles[1:]:
+            raise MotionError("a motion that is not its first signal", clip=self.name)
+        if roles.count(TIMES) > 1:
+            raise MotionError("two signals of times", clip=self.name)
+        for index, signal in enumerate(self.signals):
+            if (signal.role == RESIDUALS) != (signal.of is not None):
+                raise MotionError(
+                    f"signal {signal.name!r}: ``of`` is for residuals", clip=self.name
+                )
+            if signal.of is not None and (signal.of == index or not 0 <= signal.of < len(roles)):
+                raise MotionError(f"residuals of signal {signal.of}", clip=self.name)
+            if signal.role == TIMES:
+                fault = times_form_fault(signal) or times_fault(signal.masked()[:, 0])
+                if fault:
+                    raise MotionError(f"signal {signal.name!r}: no times: {fault}", clip=self.name)
+
+    @property
+    def motion_signal(self) -> Signal | None:
+        """The signal with the role "motion", which is the first; None where there is none."""
+        return self.signals[0] if self.signals[0].role == MOTION_ROLE else None
+
+    def signals_of(self, role: str) -> tuple[Signal, ...]:
+        """The signals of a role, one of ``mcz.signal.ROLES``."""
+        return tuple(signal for signal in self.signals if signal.role == role)
+
     @property
     def values(self) -> Values:
-        """The motion signal, (n_frames, n_channels), NaN where invalid."""
+        """The first signal, which is the motion, (n_frames, n_channels), NaN where invalid."""
         return self.signals[0].masked()
 
     @property
@@ -197,10 +238,8 @@ class Motion:
     def timeline(self) -> Timeline | None:
         """The times of all frames, None where neither times nor a rate are known."""
         column = None
-        place = times_place(self.skeleton, self.signals)
-        if place is not None:
-            signal = self.signals[place[0]]
-            column = column_of(signal.masked()[:, 0], signal.grids[0], place[1])
+        for signal in self.signals_of(TIMES):
+            column = column_of(signal.masked()[:, 0], signal.grids[0], unit_of_times(signal))
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
         clock = self.source.clock if self.source is not None else None
         counting = Counting(numbers, self.frame_rate, self.number_step)
@@ -220,9 +259,9 @@ class Motion:
 
         Where its source prints the frame numbers, they are kept, and it gets a signal ``time``.
         """
-        if self.number_step == 1:
-            return self
         motion, timeline = replace(self, number_step=1), self.timeline
+        if self.number_step == 1 or self.signals_of(TIMES):
+            return motion if self.number_step > 1 else self
         if self.source is None or timeline is None:
             return motion.at_times(timeline)
         return motion._with_time_signal(timeline)
@@ -247,5 +286,21 @@ class Motion:
 
     def _with_time_signal(self, timeline: Timeline) -> Motion:
         channels = (Channel("", "time", "s"),)
-        signal = Signal(timeline.times[:, None].copy(), name="time", channels=channels)
-        return replace(self, signals=(*self.signals, signal))
+        times = timeline.times[:, None].copy()
+        signal = Signal(times, name="time", channels=channels, role=TIMES)
+        others = (replace(s, role="") if s.role == TIMES else s for s in self.signals)
+        return replace(self, signals=(*others, signal))
+
+    def with_signals(self, kept: Sequence[int]) -> Motion:
+        """The same motion with these of its signals alone, in the order given.
+
+        Residuals of a signal that is left out lose their role.
+        """
+        place = {old: new for new, old in enumerate(kept)}
+        signals = []
+        for signal in (self.signals[index] for index in kept):
+            if signal.of is not None:
+                of = place.get(signal.of)
+                signal = replace(signal, of=of, role="" if of is None else signal.role)
+            signals.append(signal)
+        return replace(self, signals=tuple(signals))

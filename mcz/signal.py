@@ -18,6 +18,7 @@ from mcz.checks import (
     array_of,
     check_fields,
     of_type,
+    one_of,
     optional,
     several,
 )
@@ -29,6 +30,17 @@ from mcz.numbers.scaling import Scaling
 from mcz.skeleton import CHANNELS, Channel
 from mcz.types import Values
 
+ROLES = (
+    "",
+    "motion",
+    "times",
+    "residuals",
+    "analog",
+    "outputs",
+    "rotations",
+    "confidence",
+)  # by id
+
 
 class Sampled(Protocol):
     """The facts of a signal, in memory or in a file, that say whether its rows are poses."""
@@ -37,11 +49,13 @@ class Sampled(Protocol):
     def channels(self) -> tuple[Channel, ...] | None: ...
     @property
     def samples_per_frame(self) -> int: ...
+    @property
+    def has_poses(self) -> bool: ...
 
 
 def check_poses(name: str, signal: Sampled) -> None:
-    """Raise MotionError where the rows of the motion signal of ``name`` are no poses of frames."""
-    if signal.channels is not None:
+    """Raise MotionError where the rows of the first signal of ``name`` are no poses of frames."""
+    if not signal.has_poses:
         raise MotionError("its channels are not those of its skeleton", clip=name)
     if signal.samples_per_frame != 1:
         raise MotionError(
@@ -69,6 +83,8 @@ SIGNAL = {
     "ordinals": optional(array_of("i8", 2, "int64 of two dimensions")),
     "scaling": optional(of_type(Scaling, "a Scaling")),
     "stored": optional(VALUES),
+    "role": optional(one_of(ROLES)),
+    "of": optional(INTEGER),
 }
 
 
@@ -84,6 +100,10 @@ class Signal:
     Where the file stores other numbers than it means (words of a converter), ``scaling`` says what
     they mean, ``values`` are binary64 in units, and ``stored`` are the numbers of the file, which
     grids, grid changes, exceptions and ordinals speak of. Elsewhere ``stored`` are the values.
+
+    ``role`` is one of ``ROLES``, names of the registry in the order of their ids; None until the
+    signal is in a Motion, whose first signal then is its "motion" and any other has none, "".
+    ``of`` is the index of the signal whose "residuals" these are.
     """
 
     values: Values
@@ -97,6 +117,8 @@ class Signal:
     ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
     scaling: Scaling | None = None
     stored: Values = None  # type: ignore[assignment]  # set below where it is not given
+    role: str | None = None
+    of: int | None = None
 
     __repr__ = brief.signal_text
 
@@ -163,6 +185,11 @@ class Signal:
                 is_text[(channels == channel) & (rows >= row)] = grid.is_text
             if not is_text.all():
                 raise MotionError(f"signal {self.name!r}: exceptions on a grid without text")
+
+    @property
+    def has_poses(self) -> bool:
+        """Whether it is a motion whose channels are those of the skeleton."""
+        return self.role == "motion" and self.channels is None
 
     @property
     def n_rows(self) -> int:

@@ -74,7 +74,9 @@ def motions(draw: st.DrawFn) -> Motion:
         samples = draw(st.lists(integers, min_size=n_frames * rate, max_size=n_frames * rate))
         analog = np.array(samples, np.int64).reshape(n_frames * rate, 1)
         channels = (Channel("", "emg", "V"),)
-        signals.append(Signal(analog, name="analog", samples_per_frame=rate, channels=channels))
+        signals.append(
+            Signal(analog, name="analog", role="analog", samples_per_frame=rate, channels=channels)
+        )
     name = draw(st.text(min_size=1, max_size=8).filter(_encodable))
     rate = draw(st.one_of(st.none(), st.fractions(Fraction(1, 1000), 10_000, max_denominator=1001)))
     return Motion(bones, tuple(signals), frame_rate=rate, name=name)

@@ -419,7 +419,9 @@ def test_rerun_has_samples_between_frames(take: Path, monkeypatch: pytest.Monkey
     mask = np.ones((36, 2), np.bool_)
     mask[7, 1] = False
     names = (Channel("", "EMG 1", "V"), Channel("", "b/c"))
-    analog = Signal(samples, name="analog", samples_per_frame=4, mask=mask, channels=names)
+    analog = Signal(
+        samples, name="analog", role="analog", samples_per_frame=4, mask=mask, channels=names
+    )
     motion = replace(motion, signals=(*motion.signals, analog))
     monkeypatch.setattr(adapter, "BLOCK", 40)  # frames by twos
     recording = rerun.RecordingStream("test", recording_id="a")

@@ -39,7 +39,9 @@ def stored(motion: Motion) -> Motion:
 
 
 def times_signal(values: list[float], unit: str = "s") -> Signal:
-    return Signal(np.array(values)[:, None], name="time", channels=(Channel("", "time", unit),))
+    return Signal(
+        np.array(values)[:, None], name="time", role="times", channels=(Channel("", "time", unit),)
+    )
 
 
 def near(found: object, wanted: object) -> None:
@@ -82,7 +84,11 @@ def test_an_unknown_rate_is_an_error_that_says_what_to_do() -> None:
 
 def test_samples_lie_evenly_from_each_frame_on() -> None:
     analog = Signal(
-        np.zeros((8, 1)), name="analog", samples_per_frame=4, channels=(Channel("", "f"),)
+        np.zeros((8, 1)),
+        name="analog",
+        role="analog",
+        samples_per_frame=4,
+        channels=(Channel("", "f"),),
     )
     motion = markers(2, 50, frame_numbers=np.array([11, 13]))
     motion = replace(motion, signals=(*motion.signals, analog))
@@ -576,7 +582,9 @@ def test_charts_of_signals_by_channel(tmp_path: Path) -> None:
 def test_charts_without_a_joint_are_of_the_first_signal(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     channels = tuple(Channel("", f"f{k}", "N") for k in range(12))
-    analog = Signal(np.zeros((60, 12)), name="analog", samples_per_frame=2, channels=channels)
+    analog = Signal(
+        np.zeros((60, 12)), name="analog", role="analog", samples_per_frame=2, channels=channels
+    )
     motion = Motion(Skeleton(()), (Signal(np.zeros((30, 0))), analog), Fraction(50))
     plotted = mcz.plot(motion, tmp_path / "a.svg")
     assert plotted.title.endswith("analog, channels") and len(plotted.tables[0]) == 9

@@ -33,7 +33,7 @@ def markers(n: int, rate: Fraction | None = Fraction(100), **facts: object) -> M
 
 def irregular() -> Motion:
     times = np.array([0.5, 0.511, 0.519, 0.531, 1.25])[:, None]
-    signal = Signal(times, name="time", channels=(Channel("", "time", "s"),))
+    signal = Signal(times, name="time", role="times", channels=(Channel("", "time", "s"),))
     motion = markers(5)
     return replace(motion, signals=(*motion.signals, signal))
 
@@ -198,6 +198,7 @@ def test_rerun_has_the_times(source: str, tmp_path: Path) -> None:
     analog = Signal(
         np.arange(72.0).reshape(-1, 1),
         name="analog",
+        role="analog",
         samples_per_frame=8,
         channels=(Channel("", "f", "N"),),
     )

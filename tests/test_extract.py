@@ -92,6 +92,7 @@ def rich(n_frames: int = 40) -> mcz.Motion:
     analog = Signal(
         np.arange(2 * n_frames, dtype=np.int64).reshape(-1, 1) ** 2,
         name="analog",
+        role="analog",
         samples_per_frame=2,
         channels=(mcz.Channel("", "emg", "V"),),
     )

@@ -45,6 +45,7 @@ def rich() -> bytes:
     analog = mcz.Signal(
         np.arange(24, dtype=np.int64).reshape(24, 1),
         name="analog",
+        role="analog",
         samples_per_frame=2,
         channels=(mcz.Channel("", "emg", "V"),),
     )

@@ -39,7 +39,11 @@ def shapes() -> dict[str, mcz.Motion]:
     scalars = mcz.Skeleton(tuple(mcz.Joint(c.name, channels=(c,)) for c in SCALARS))
     still = mcz.Skeleton((mcz.Joint("a"), mcz.Joint("b", 0, (0, 1, 0))))
     analog = mcz.Signal(
-        np.zeros((24, 2), np.int64), name="analog", samples_per_frame=3, channels=SCALARS[:2]
+        np.zeros((24, 2), np.int64),
+        name="analog",
+        role="analog",
+        samples_per_frame=3,
+        channels=SCALARS[:2],
     )
     bones = plain.skeleton
     found = {

@@ -139,6 +139,7 @@ def test_signals_beside_the_motion_count() -> None:
     analog = Signal(
         random.astype(np.int64),
         name="analog",
+        role="analog",
         samples_per_frame=2,
         channels=(Channel("", "emg", "V"),),
     )

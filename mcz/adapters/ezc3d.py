@@ -17,8 +17,8 @@ from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.recording import ANALOG, recording
 
-Held = dict[str, tuple[NDArray[np.float64], NDArray[np.bool_]]]
-OUTPUTS = "outputs"  # the signal of what models gave, which ezc3d has among the points
+Held = dict[str | None, tuple[NDArray[np.float64], NDArray[np.bool_]]]
+OUTPUTS = "outputs"  # the role of the signal of what models gave, which ezc3d has among the points
 REFUSED = (OSError, ValueError, RuntimeError, LookupError)  # what ezc3d raises
 NOTE = "numbers that binary32 cannot hold: without the events and parameters of its C3D"
 
@@ -68,8 +68,8 @@ def to_ezc3d(motion: Motion) -> Any:
             raise MotionError(f"ezc3d cannot read it: {error}", clip=motion.name) from error
     held = _held(made, FORMATS["c3d"].read(data, motion.name))
     for signal in plain.signals:
-        if signal.name in held:
-            array, chosen = held[signal.name]
+        if signal.role in held:
+            array, chosen = held[signal.role]
             there, values = array[chosen], signal.masked().T
             if there.size != values.size:
                 raise MotionError(
@@ -82,7 +82,7 @@ def to_ezc3d(motion: Motion) -> Any:
 
 
 def _held(c3d: Any, motion: Motion) -> Held:
-    """By the names of signals of ``motion``, an array of ezc3d, time last, and which rows count.
+    """By the roles of signals of ``motion``, an array of ezc3d, time last, and which rows count.
 
     Residuals are none of them: they are as ezc3d has read or written them.
     """
@@ -94,7 +94,7 @@ def _held(c3d: Any, motion: Motion) -> Held:
             f"ezc3d has {len(places)} points, and the C3D {len(is_point)}", clip=motion.name
         )
     return {
-        motion.signals[0].name: (places, is_point),
+        "motion": (places, is_point),
         OUTPUTS: (places, ~is_point),
         ANALOG: (samples, np.ones(len(samples), np.bool_)),
     }
@@ -102,9 +102,9 @@ def _held(c3d: Any, motion: Motion) -> Held:
 
 def _exact(signal: Signal, held: Held) -> Signal:
     """``signal``, in binary64 where it has not the numbers that ezc3d holds."""
-    if signal.name not in held or not signal.values.size:
+    if signal.role not in held or not signal.values.size:
         return signal
-    array, chosen = held[signal.name]
+    array, chosen = held[signal.role]
     rows = array[chosen]
     values = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T, np.float64)
     if np.array_equal(signal.masked(), values, equal_nan=True):
@@ -116,4 +116,6 @@ def _exact(signal: Signal, held: Held) -> Signal:
         samples_per_frame=signal.samples_per_frame,
         mask=None if known.all() else known,
         channels=signal.channels,
+        role=signal.role,
+        of=signal.of,
     )

@@ -100,7 +100,8 @@ def from_movement(
         sure = _ordered(dataset["confidence"], (DIMS[0], *DIMS[2:])).values.transpose(0, 2, 1)
         if np.isfinite(sure).any():
             of_points = tuple(Channel("", each) for each in names)
-            signals.append(_signal(sure.reshape(len(sure), -1), CONFIDENCE, of_points))
+            made = _signal(sure.reshape(len(sure), -1), CONFIDENCE, of_points)
+            signals.append(replace(made, role=CONFIDENCE))
     times = np.asarray(found["time"].values, np.float64)
     rate, numbers = _frames(dataset, times, name)
     facts = dataset.attrs
@@ -129,7 +130,7 @@ def _grid_of(names: tuple[str, ...], name: str) -> tuple[list[str], list[str]]:
 def _confidence(motion: Motion, places: Reals) -> Floats:
     """Of every point in every frame."""
     for signal in motion.signals[1:]:
-        if signal.name == CONFIDENCE and signal.n_channels == places.shape[1] * places.shape[2]:
+        if signal.role == CONFIDENCE and signal.n_channels == places.shape[1] * places.shape[2]:
             return np.asarray(signal.masked(), np.float64)
     return np.asarray(np.isfinite(places).all(axis=3), np.float64)
 

@@ -61,10 +61,11 @@ def view_of(moving: Moving, entity: str) -> Any:
     log = _Log(import_extra("rerun", "rerun"), None, moving, entity)
     origin = str(log.path())
     figure = [blueprint.Spatial3DView(origin=origin, name=entity)] if log.figure else []
+    residuals = {each.name for each in moving.signals if each.role == "residuals"}
     curves = [
         blueprint.TimeSeriesView(origin=str(log.path(signal)), name=f"{entity} {signal}")
         for signal, _, _, _ in log.series
-        if signal != "residuals"
+        if signal not in residuals
     ]
     beside = [blueprint.Vertical(*curves)] if curves else []
     return blueprint.Horizontal(*figure, *beside, name=entity)
@@ -193,7 +194,7 @@ class _Figure:
 
 def _figure_of(moving: Moving) -> _Figure | None:
     """None where the skeleton has no kinematics."""
-    if moving.signals[0].channels is not None or not moving.skeleton.joints:
+    if not moving.signals[0].has_poses or not moving.skeleton.joints:
         return None
     try:
         figure = _Figure(moving.skeleton)

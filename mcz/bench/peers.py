@@ -47,7 +47,7 @@ def measure(loaded: Loaded) -> list[Record]:
     """One record a peer and what it codes; zfp also with bounds on the error of a value."""
     motion = loaded.motion
     values = np.asarray(motion.signals[0].masked(), np.float64)
-    if motion.signals[0].channels is None:
+    if motion.signals[0].has_poses:
         values = unwrap(values, motion.skeleton)
     matrix = np.ascontiguousarray(np.nan_to_num(values), np.float32)
     records = []

@@ -296,7 +296,9 @@ def _codec(name: str, signal: JsonObject) -> str:
     counts = ", ".join(
         plural(signal[key], key.removesuffix("s")) for key in ("segments", "groups", "resolutions")
     )
-    return f"  codec      {name} version {signal['version']}{header}, {signal['signal']}: {counts}"
+    of = signal["signal"]
+    of += f" ({signal['role']})" if signal["role"] not in ("", of) else ""
+    return f"  codec      {name} version {signal['version']}{header}, {of}: {counts}"
 
 
 def _source(clip: JsonObject) -> Iterator[str]:

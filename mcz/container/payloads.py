@@ -218,6 +218,7 @@ class Groups(Record):
 
 
 OWN_CHANNELS = 1
+MOTION, TIMES, RESIDUALS = 1, 2, 3  # roles that rules speak of; the registry has all
 
 
 class Signal(Record):
@@ -226,6 +227,12 @@ class Signal(Record):
     name: str = field(TEXT, "name of the signal")
     flags: int = field(
         flags("own channels"), "bit 0: has channels of its own, not the skeleton's", default=0
+    )
+    role: int = field(Int8ul, "role of the registry; 0: none", default=0)
+    of: int | None = field(
+        If(this.role == RESIDUALS, UVARINT),
+        "index of the signal whose residuals these are; only where role is 3",
+        default=None,
     )
     channels: list[Channel] | None = field(
         If(this.flags & OWN_CHANNELS, counted(Channel)), "the signal's own channels", default=None
@@ -286,7 +293,7 @@ class Clip(Record):
     source: ClipSource | None = field(
         optional(ClipSource), "0 or 1: how to restore the source file", default=None
     )
-    signals: list[Signal] = field(counted(Signal), "the signals, at least 1, the motion first")
+    signals: list[Signal] = field(counted(Signal), "the signals, at least 1")
     extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
 
 

@@ -55,7 +55,7 @@ def _check(motion: Motion) -> None:
     roots = [joint.name for joint in skeleton.joints if joint.parent < 0]
     if len(roots) != 1:
         raise MotionError(f"ASF has one root, and the skeleton has {len(roots)}: {roots[:8]}")
-    if motion.signals[0].channels is not None:
+    if not motion.signals[0].has_poses:
         raise MotionError("AMC holds the channels of a skeleton alone", clip=motion.name)
     for joint in skeleton.joints:
         for channel in joint.channels:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcz.clock import EXACT, START, numbers_or_rows, time_signal
+from mcz.clock import EXACT, START, TIMES, numbers_or_rows
 from mcz.motion import Motion
 
 COUNTING = ("bvh", "amc", "c3d")
@@ -24,10 +24,9 @@ def with_counted_times(motion: Motion, to: str) -> Motion:
             metadata = {key: text for key, text in motion.metadata.items() if key != START}
             numbers = first + np.arange(motion.n_frames)
             motion = replace(motion, frame_numbers=numbers, metadata=metadata, number_step=1)
-    index = time_signal(motion.signals)
-    if index is None:
+    if not motion.signals_of(TIMES):
         return motion
-    return replace(motion, signals=(*motion.signals[:index], *motion.signals[index + 1 :]))
+    return motion.with_signals([k for k, s in enumerate(motion.signals) if s.role != TIMES])
 
 
 def first_number(motion: Motion) -> int:

@@ -123,7 +123,7 @@ def _check(motion: Motion) -> None:
     """Raises MotionError for what no BVH can hold."""
     if point_set(motion.skeleton) == "markers":
         raise MotionError("markers have no skeleton, and BVH needs one", clip=motion.name)
-    if motion.signals[0].channels is not None:
+    if not motion.signals[0].has_poses:
         raise MotionError("BVH holds the channels of a skeleton alone", clip=motion.name)
     if gap := first_gap(motion):
         raise MotionError(f"BVH cannot leave out values, but {gap}", clip=motion.name)

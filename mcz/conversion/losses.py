@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from mcz.clock import is_time
+from mcz.clock import TIMES
 from mcz.conversion.counted_times import COUNTING, first_number, lost_times
 from mcz.formats.c3d_plain import KNOWN
 from mcz.formats.c3d_recording import parameters_of
@@ -23,14 +22,16 @@ SCENES = ("glb", "usda")
 GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "EVENT", "TRIAL")  # of C3D, written or named
 SHAPED = ("bvh", "amc", *POINTS, *SCENES)  # a skeleton or its points
 UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
-HELD = {"c3d": KNOWN}  # signals beside the motion, of the formats that hold any
+HELD = {"c3d": KNOWN}  # roles of signals beside the motion, of the formats that hold any
 ROOT = "root"  # the only name that ASF has for it
 
 
 def held(motion: Motion, to: str) -> Motion:
     """``motion`` with the signals alone that a format of ``mcz.convert`` has a place for."""
-    kept = [signal for signal in motion.signals[1:] if signal.name in HELD.get(to, ())]
-    return replace(motion, signals=(motion.signals[0], *kept))
+    roles = HELD.get(to, ())
+    return motion.with_signals(
+        [k for k, s in enumerate(motion.signals) if not k or s.role in roles]
+    )
 
 
 def left_out(motion: Motion, to: str) -> tuple[str, ...]:
@@ -46,7 +47,7 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
     if to in SHAPED and has_no_lengths(motion.skeleton):
         yield f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
     known = HELD.get(to, ())
-    others = [s.name for s in motion.signals[1:] if s.name not in known and not is_time(s)]
+    others = [s.name for s in motion.signals[1:] if s.role not in (TIMES, *known)]
     if others:
         yield f"left out: signal {', '.join(others)}"
     yield from of_text(motion.metadata)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mcz.clock import has_times
 from mcz.conversion.markers import to_c3d
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
@@ -32,4 +31,4 @@ def to_storage(motion: Motion) -> Motion:
 
 def needs_rate(motion: Motion, to: str) -> bool:
     """Return whether a table needs a frame rate: TRC states it, others have times."""
-    return to == "trc" or (not has_times(motion.skeleton) and motion.timeline is None)
+    return to == "trc" or motion.timeline is None

@@ -131,7 +131,7 @@ def plan_cut(
 def _kept_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
     """The joints as indices, None where no joint with channels is left out."""
     skeleton = clip.skeleton
-    if clip.signals[0].channels is not None:
+    if not clip.signals[0].has_poses:
         raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
     with error_context(clip=clip.name):
         kept = frozenset(skeleton.find(joint) for joint in joint_list(joints))

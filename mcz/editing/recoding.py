@@ -116,7 +116,7 @@ def _editable(clip: Clip, joint: int | str) -> int:
     """The joint's index, of a clip that may be edited."""
     if clip.container.salvage:
         raise OptionError("a file that is salvaged cannot be edited", clip=clip.name)
-    if clip.signals[0].channels is not None:
+    if not clip.signals[0].has_poses:
         raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
     index = clip.skeleton.find(joint)
     if not clip.skeleton.joints[index].channels:

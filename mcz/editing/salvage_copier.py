@@ -132,6 +132,11 @@ class Repairer(Copier):
         if not isinstance(cut.clip, SomeSignals):
             return record
         signals = [record.signals[index] for index in cut.clip.kept]
+        place = {old: new for new, old in enumerate(cut.clip.kept)}
+        for signal in signals:
+            if signal.of is not None:
+                signal.of = place.get(signal.of)
+                signal.role = 0 if signal.of is None else signal.role
         return replace(record, signals=signals, source=None)
 
     def _quality(self, cut: ClipCut, row: ClipRow) -> None:

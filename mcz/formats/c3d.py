@@ -196,14 +196,17 @@ def _signal(
     channels: tuple[Channel, ...] | None = None,
     per_frame: int = 1,
 ) -> Signal:
-    """A signal of words as stored: integers, or the bits of floats."""
+    """A signal of words as stored, integers or the bits of floats, with its role as its name."""
     grids = (grid,) * words.shape[1]
-    if grid.kind == GridKind.INTEGER:
-        return Signal(words.astype(np.int64), grids, name, per_frame, channels=channels)
-    scaled = grid.kind == GridKind.SCALED
-    ordinals = words.astype(np.int64) if scaled else grid.ordinals_of_bits(words)
+    values: Values = words.astype(np.int64)
+    ordinals = None
+    if grid.kind != GridKind.INTEGER:
+        scaled = grid.kind == GridKind.SCALED
+        ordinals = words.astype(np.int64) if scaled else grid.ordinals_of_bits(words)
+        values = grid.values(ordinals)
+    of = 0 if name == "residuals" else None
     return Signal(
-        grid.values(ordinals), grids, name, per_frame, channels=channels, ordinals=ordinals
+        values, grids, name, per_frame, channels=channels, ordinals=ordinals, role=name, of=of
     )
 
 

@@ -26,7 +26,7 @@ from mcz.numbers import Grid, GridKind
 from mcz.numbers.scaling import Scaling
 
 UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m", 2.54: "in"}
-KNOWN = ("residuals", "analog", OUTPUTS)  # signals beside the points
+KNOWN = ("residuals", "analog", OUTPUTS)  # roles of signals beside the points
 EVENTS_KEY = 12_345  # label and range data are of the kind that C3D has today
 FLOATS = Grid(GridKind.BINARY32)
 MOST_RATE = 1e30  # of frames: the samples of one second fit a binary32, too
@@ -41,9 +41,10 @@ def plain(motion: Motion) -> Motion:
     for joint in motion.skeleton.joints:
         if joint.parent >= 0 or tuple(c.kind for c in joint.channels) != POSITION_KINDS:
             raise MotionError(f"C3D has markers only, and joint {joint.name!r} is none")
-    others = {signal.name: signal for signal in motion.signals[1:]}
+    others = {signal.role: signal for signal in motion.signals[1:]}
     if len(others) < len(motion.signals) - 1 or not set(others) <= set(KNOWN):
-        raise MotionError(f"C3D has no place for all of the signals {', '.join(others)}")
+        given = ", ".join(signal.name for signal in motion.signals[1:])
+        raise MotionError(f"C3D has no place for all of the signals {given}")
     residuals, outputs = others.get("residuals"), others.get(OUTPUTS)
     analog, scaling = _analog(others.get("analog"))
     placed = [motion.signals[0], *([outputs] if outputs is not None else [])]
@@ -112,7 +113,8 @@ def _residuals(placed: Sequence[Signal], n_frames: int) -> Signal:
     words = np.concatenate(parts, axis=1)
     n_points = words.shape[1]
     channels = (Channel("", "residual"),) * n_points
-    return Signal(words, (FLOATS,) * n_points, "residuals", channels=channels)
+    grids = (FLOATS,) * n_points
+    return Signal(words, grids, "residuals", channels=channels, role="residuals", of=0)
 
 
 def _scale(placed: Sequence[Signal], others: Iterable[Signal]) -> float | None:
@@ -132,7 +134,7 @@ def _scale(placed: Sequence[Signal], others: Iterable[Signal]) -> float | None:
         if signal.values.dtype != np.int64 and signal.n_channels:
             return None
         low, high = _range(signal)
-        if low < -0x8000 or high > (0xFFFF if low >= 0 and signal.name == "analog" else 0x7FFF):
+        if low < -0x8000 or high > (0xFFFF if low >= 0 and signal.role == "analog" else 0x7FFF):
             return None
     return scale
 
@@ -164,6 +166,8 @@ def _on(signal: Signal, grid: Grid) -> Signal:
         signal.samples_per_frame,
         signal.mask,
         channels=signal.channels,
+        role=signal.role,
+        of=signal.of,
     )
 
 

@@ -129,12 +129,12 @@ def _parts(motion: Motion, layout: Layout) -> list[tuple[Signal, NDArray[np.int6
     return parts
 
 
-def _signal(motion: Motion, name: str, n_channels: int, per_frame: int) -> Signal:
-    """The signal of a name, checked; raises FormatError."""
-    for signal in motion.signals[1:]:
-        if signal.name == name:
+def _signal(motion: Motion, role: str, n_channels: int, per_frame: int) -> Signal:
+    """The first signal of a role, checked; raises FormatError."""
+    for signal in motion.signals_of(role):
+        if not signal.of:
             return _checked(signal.as_stored(), n_channels, per_frame)
-    raise FormatError(f"source template: it needs a signal {name!r}, which the clip has not")
+    raise FormatError(f"source template: it needs a signal of {role}, which the clip has not")
 
 
 def _checked(signal: Signal, n_channels: int, per_frame: int) -> Signal:
@@ -151,7 +151,7 @@ def _residuals(motion: Motion, layout: Layout, parts: list[Signal]) -> Signal:
 
     Where the motion has none, 0 for valid points and -1 for others.
     """
-    if any(signal.name == "residuals" for signal in motion.signals[1:]):
+    if any(signal.of == 0 for signal in motion.signals):
         return _signal(motion, "residuals", layout.n_points, 1)
     shape = motion.n_frames, layout.n_points
     residuals = np.zeros(shape, np.int64)

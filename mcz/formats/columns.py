@@ -104,7 +104,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         times.rate,
         times.exact,
         name,
-        table_metadata(encoding, [text_note(labels), head.note]),
+        table_metadata(encoding, [text_note(labels), head.note, times.note]),
         table_source("csv", data, [(section, rows, 1)]),
         rows.numbers,
     )

@@ -116,7 +116,8 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
         times.exact,
         name,
         table_metadata(
-            encoding, [text_note(labels), *_notes(head.said, rows.n_rows, times, bool(stated))]
+            encoding,
+            [text_note(labels), *_notes(head.said, rows.n_rows, times, bool(stated)), times.note],
         ),
         table_source("motive", data, [(section, rows, 1)]),
         rows.numbers,
@@ -246,4 +247,4 @@ def _notes(said: dict[str, str], n_rows: int, times: Times, is_stated: bool) -> 
         notes.append(f"{declared[:40]} frames are declared, {n_rows} are there")
     if is_stated and times.rate is None:
         notes.append("the times are not uniform")
-    return notes
+    return [*notes, times.note]

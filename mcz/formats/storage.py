@@ -1,7 +1,7 @@
 """STO and MOT (tables of OpenSim and SIMM): bytes -> Motion, and back.
 
-SPEC.md, "The text of tables", is normative for the way back. Every column is a joint without a
-parent, the time among them, whose channels are plain scalars: what they move, only the model knows.
+SPEC.md, "The text of tables", is normative for the way back. Every column but the times is a joint
+without a parent, whose channels are plain scalars: what they move, only the model knows.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from mcz.errors import SourceError
 from mcz.formats.csv_text import check_points
 from mcz.formats.rows import line_of
 from mcz.formats.table_plain import plain_storage
-from mcz.formats.table_restore import beside, restore_table
+from mcz.formats.table_restore import restore_table
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.formats.table_signals import read_columns, table_metadata
 from mcz.formats.table_source import named_count, names_in, section_of, table_source
+from mcz.formats.table_times import as_times
 from mcz.formats.text_source import check_text, text_encoding
 from mcz.formats.times import half_digits_of, rate_of_times, stated_rate
 from mcz.motion import Channel, Joint, Motion, Skeleton
@@ -62,37 +63,40 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
     header = _header(data)
     separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
     names, sizes = _columns(data, header, separator, encoding)
+    label, names, sizes = names[0], names[1:], sizes[1:]
     starts = [0, *accumulate(sizes)]
+    time = starts[-1]
     columns = [list(range(a, a + n)) for a, n in zip(starts, sizes, strict=False)]
-    table = read_table(data, header.rows, starts[-1], columns, separator)
-    groups = (columns[0], [column for cell in columns[1:] for column in cell])
-    rows = without_zeros(data, table.rows, groups)
-    signal = beside([read_columns(data, rows, columns) for columns in groups])
+    table = read_table(data, header.rows, time + 1, [[time], *columns], separator)
+    rows = without_zeros(data, table.rows, ([time], range(time)))
+    motion = read_columns(data, rows, range(time))
+    read = read_columns(data, rows, [time])
+    clock, odd = as_times(read, Channel("", label, "s"))
     kind = header.values.get("datatype", "").lower()
     skeleton = Skeleton(
         tuple(
-            Joint(label, channels=_channels(size, kind, "s" if k == 0 else ""))
-            for k, (label, size) in enumerate(zip(names, sizes, strict=True))
+            Joint(name, channels=_channels(size, kind))
+            for name, size in zip(names, sizes, strict=True)
         ),
         angle_unit={"yes": "deg", "no": "rad"}.get(header.values.get("indegrees", "").lower(), ""),
     )
-    times = np.asarray(signal.values[:, 0], np.float64)
-    tokens = scan(data, rows.start[:, 0], rows.stop[:, 0])
+    times = np.asarray(read.values[:, 0], np.float64)
+    tokens = scan(data, rows.start[:, time], rows.stop[:, time])
     stated = stated_rate(header.values.get("datarate", ""))
-    digits = half_digits_of(data, rows.stop[:, 0], tokens)
+    digits = half_digits_of(data, rows.stop[:, time], tokens)
     rate, exact = rate_of_times(times, digits, [stated] if stated else [])
     start, stop = header.labels
     counted = named_count(data, 0, start, header.count, rows.n_rows)
     marked = counted + names_in(data[start:stop], names) + data[stop : header.rows]
     text = marked, data[: header.rows]
-    section = section_of(text, (table.missing, None), rows, names, [0])
+    section = section_of(text, (table.missing, None), rows, names, [0, 1])
     return Motion(
         skeleton,
-        (signal,),
+        (motion, clock),
         rate,
         exact,
         name,
-        table_metadata(encoding, [_note(header.values, rows.n_rows)]),
+        table_metadata(encoding, [_note(header.values, rows.n_rows), odd]),
         table_source(format_name, data, [(section, rows, 1)]),
     )
 
@@ -147,10 +151,10 @@ def _columns(
     return names, sizes
 
 
-def _channels(size: int, kind: str, unit: str) -> tuple[Channel, ...]:
+def _channels(size: int, kind: str) -> tuple[Channel, ...]:
     names = QUATERNION if kind == "quaternion" and size == 4 else PARTS.get(size, ())
     names = names or tuple(str(k + 1) for k in range(size))
-    return tuple(Channel("", name, unit) for name in names)
+    return tuple(Channel("", name) for name in names)
 
 
 def _note(values: dict[str, str], n_rows: int) -> str:

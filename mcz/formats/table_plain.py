@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from mcz.clock import EXACT, Timeline, has_times, numbers_or_rows
+from mcz.clock import EXACT, TIMES, Timeline, numbers_or_rows
 from mcz.errors import MotionError
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.table_layout import Clock, Section, build_table
@@ -59,14 +59,13 @@ def plain_storage(motion: Motion, format_name: str = "sto") -> Motion:
         for channel in joint.channels
     ]
     labels = _names(labels, motion.n_frames)
-    n, timed = len(labels), has_times(skeleton)
+    n = len(labels)
     degrees = "yes" if skeleton.angle_unit == "deg" else "no"
-    header = f"{_printable(motion.name)}\nversion=1\nnRows=\3\nnColumns={n + (not timed)}\n"
+    header = f"{_printable(motion.name)}\nversion=1\nnRows=\3\nnColumns={n + 1}\n"
     header += f"inDegrees={degrees}\nendheader\n"
-    header += "\t".join(labels if timed else ("time", *labels)) + "\n"
-    columns = [*range(n)] if timed else [n, *range(n)]
-    items = [(b"\t" if k else b"", column, 0) for k, column in enumerate(columns)]
-    return _with_source(motion, format_name, header, b"nan", items, timed=timed)
+    header += "\t".join(("time", *labels)) + "\n"
+    items = [(b"\t" if k else b"", column, 0) for k, column in enumerate((n, *range(n)))]
+    return _with_source(motion, format_name, header, b"nan", items)
 
 
 def _with_source(
@@ -75,18 +74,13 @@ def _with_source(
     header: str,
     missing: bytes,
     items: Sequence[tuple[bytes, int, int]],
-    *,
-    timed: bool = False,
 ) -> Motion:
     """``motion`` as its first signal and its times, with the source.
 
-    The times are a clock, or a signal where frame numbers do not give them; ``timed``: they are in
-    the first signal.
+    The times are a clock, or a signal where frame numbers do not give them.
     """
-    clock, signals = None, motion.signals[:1]
-    if not timed:
-        clock, times = _times(motion)
-        signals = (*signals, *times)
+    clock, times = _times(motion)
+    signals = (motion.signals[0], *times)
     rows = Layout((), (Pattern(runs_of(items), b"\n"),))
     numbers = tuple(range(len(signals)))
     template, detail = build_table([Section(numbers, header.encode(), True, missing, clock, rows)])
@@ -106,8 +100,8 @@ def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
     clock = _clock(motion, timeline, grid)
     if clock is not None:
         return clock, ()
-    column = Signal(np.round(times, grid.digits)[:, None], (grid,), "time", channels=(SECONDS,))
-    return None, (column,)
+    rounded = np.round(times, grid.digits)[:, None]
+    return None, (Signal(rounded, (grid,), "time", channels=(SECONDS,), role=TIMES),)
 
 
 def _clock(motion: Motion, timeline: Timeline, grid: Grid) -> Clock | None:

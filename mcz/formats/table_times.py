@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from mcz.clock import TIMES, times_fault
 from mcz.formats.rows import Rows
 from mcz.formats.table_layout import Clock
 from mcz.formats.table_signals import read_columns
@@ -23,12 +24,22 @@ class Times:
     """``signals``: one of times where there are some that no clock gives, named ``time``.
 
     ``rate`` is None where times are not whole frames apart. ``exact``: it is round or stated.
+    ``note`` says why the signal has not the role of times.
     """
 
     clock: Clock | None
     signals: tuple[Signal, ...]
     rate: Fraction | None
     exact: bool
+    note: str = ""
+
+
+def as_times(signal: Signal, channel: Channel) -> tuple[Signal, str]:
+    """A signal of one channel as the times, and why it has not their role, "" where it has."""
+    fault = times_fault(signal.masked()[:, 0])
+    role = "" if fault else TIMES
+    named = replace(signal, name="time", channels=(channel,), role=role)
+    return named, f"the times do not count: {fault}" if fault else ""
 
 
 def read_times(
@@ -51,9 +62,11 @@ def read_times(
         for run in pattern.runs
     )
     signals: tuple[Signal, ...] = ()
+    note = ""
     if clock is None and used:
-        channels = (Channel("", name, _symbol(unit)),)
-        signals = (replace(read_columns(data, rows, [column]), name="time", channels=channels),)
+        channel = Channel("", name, _symbol(unit))
+        signal, note = as_times(read_columns(data, rows, [column]), channel)
+        signals = (signal,)
     rate, exact = None, True
     if whole:
         digits = half_digits_of(data, rows.stop[present, column], tokens)
@@ -62,7 +75,7 @@ def read_times(
         rate, exact = rate_of_times(seconds, in_seconds, stated, rows.numbers)
     if rate is None and stated and (rows.n_rows < 2 or not len(tokens)):
         rate = stated[0]
-    return Times(clock, signals, rate, exact)
+    return Times(clock, signals, rate, exact, note)
 
 
 def _symbol(unit: Fraction) -> str:

@@ -126,7 +126,7 @@ def _times(data: bytes, rows: Rows, column: int, values: dict[str, str]) -> tupl
         odd = ["the times are not uniform"]
     elif stated and rate is not None and rate not in stated:
         odd = [f"DataRate is {values['datarate'][:40]}, the times are {float(rate):g} a second"]
-    return times, odd
+    return times, [*odd, times.note]
 
 
 def _marked(data: bytes, header: _Header, n_rows: int, names: Sequence[str]) -> tuple[bytes, bytes]:

@@ -114,7 +114,7 @@ def contacts(
     OptionError where the length unit is unknown.
     """
     skeleton, signal = motion.skeleton, motion.signals[0]
-    if signal.channels is not None:
+    if not signal.has_poses:
         raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     tracks = FootTracks(skeleton, joints, motion.n_frames)
     step = max(1, BLOCK // max(1, skeleton.n_channels + 12 * skeleton.n_joints))

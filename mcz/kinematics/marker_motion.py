@@ -35,7 +35,7 @@ def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
     skeleton, first = motion.skeleton, motion.signals[0]
     if point_set(skeleton) == "markers":
         return motion
-    if first.channels is not None:
+    if not first.has_poses:
         raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     channels = np.asarray(motion.values, np.float64)
     values = marker_values(skeleton, channels, virtual_markers=virtual_markers)

@@ -37,7 +37,7 @@ def positions(motion: Motion) -> Floats:
     Raises MotionError where the skeleton has no kinematics: its angle unit is unknown, or all of
     its channels are plain scalars.
     """
-    if motion.signals[0].channels is not None:
+    if not motion.signals[0].has_poses:
         raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     return positions_of(motion.skeleton, np.asarray(motion.values, np.float64))
 

@@ -27,7 +27,7 @@ from mcz.container.source import ByteSource
 from mcz.container.value_hash import ValueDigest
 from mcz.errors import ChecksumError, FormatError, TruncatedError, UnsupportedError
 from mcz.motion import Skeleton
-from mcz.reading.signal_info import SignalInfo, read_signal
+from mcz.reading.signal_info import SignalInfo, check_roles, read_signal
 
 Floats = NDArray[np.float64]
 Shared = dict[tuple[bytes, bytes], bytes]  # kind and id -> chunk
@@ -59,6 +59,7 @@ def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
     """A clip of which nothing but its CLIP is known; raises FormatError."""
     if not fields.name or not fields.signals:
         raise FormatError("a clip without a name or a signal", where=f"chunk {chunk.label}")
+    check_roles(fields.signals, f"chunk {chunk.label}")
     rate = fields.rate_numerator, fields.rate_denominator
     rows = signal_rows(fields, chunk.label)
     return ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, rows, chunk)

@@ -103,12 +103,13 @@ def _blocks(original: Motion, decoded: Motion) -> Iterator[tuple[int, Values, Va
 
 
 def _named(motion: Motion) -> dict[str, Signal]:
-    """The further signals by name; ``name#n`` from the second of a name on."""
+    """The further signals by role, or name; ``#n`` behind it from the second of one on."""
     found: dict[str, Signal] = {}
     seen: dict[str, int] = {}
     for signal in motion.signals[1:]:
-        seen[signal.name] = n = seen.get(signal.name, -1) + 1
-        found[signal.name if n == 0 else f"{signal.name}#{n}"] = signal
+        key = signal.role or signal.name
+        seen[key] = n = seen.get(key, -1) + 1
+        found[key if n == 0 else f"{key}#{n}"] = signal
     return found
 
 

@@ -73,7 +73,7 @@ def _feet(found: Comparison) -> JsonObject | None:
 
 def _equal_joints(a: Motion, b: Motion) -> list[str]:
     """The joints of the same name whose channels are the same in every bit of every frame."""
-    if any(motion.signals[0].channels is not None for motion in (a, b)):
+    if any(not motion.signals[0].has_poses for motion in (a, b)):
         return []
     theirs = {name: joint for joint, name in enumerate(b.skeleton.addresses())}
     found = []

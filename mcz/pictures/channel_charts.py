@@ -52,18 +52,13 @@ def length_unit(motion: Motion) -> str:
 
 
 def joint_of(motion: Motion, joint: int | str | None) -> tuple[int, str, tuple[Channel, ...]]:
-    """Index, name and channels of a joint, None: the first that has any; raises MotionError.
-
-    Tables begin with a column of times, which nobody wants to see: the next one is taken there.
-    """
+    """Index, name and channels of a joint, None: the first that has any; raises MotionError."""
     skeleton = motion.skeleton
-    if motion.signals[0].channels is not None:
+    if not motion.signals[0].has_poses:
         raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     having = [index for index, each in enumerate(skeleton.joints) if each.channels]
     if not having:
         raise MotionError("no joint has channels", clip=motion.name)
-    if len(having) > 1 and skeleton.joints[having[0]].name.lower() == "time":
-        having = having[1:]
     index = having[0] if joint is None else skeleton.find(joint)
     name, channels = skeleton.addresses()[index], skeleton.joints[index].channels
     if not channels:
@@ -252,7 +247,7 @@ def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
         raise MotionError(f"{what}; {LEAST} are needed", clip=motion.name)
     period = None if motion.timeline is None else motion.timeline.period
     turned = motion
-    if motion.signals[0].channels is None and motion.skeleton.n_channels:
+    if motion.signals[0].has_poses and motion.skeleton.n_channels:
         first = motion.signals[0]
         values = Unwrapper(motion.skeleton)(np.asarray(first.masked(), np.float64))
         mended = Signal(values, name=first.name, samples_per_frame=first.samples_per_frame)

@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clock import PER_SECOND, Timeline, has_times, is_time, known_timeline
+from mcz.clock import TIMES, Timeline, known_timeline
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, Link, chain_of
 from mcz.kinematics.euler import ORDERS, euler_angles
@@ -74,7 +74,7 @@ def resample(
     """
     wanted = frame_rate_of(rate, motion.name)
     timeline, first = known_timeline(motion.name, motion.timeline), motion.signals[0]
-    others = [signal.name for signal in motion.signals[1:] if not is_time(signal)]
+    others = [signal.name for signal in motion.signals[1:] if signal.role != TIMES]
     if others and not drop_signals:
         raise OptionError(
             f"signals beside the motion ({', '.join(others)}) are not "
@@ -96,8 +96,6 @@ def resample(
             note = f"columns {columns} were resampled as quaternions"
             metadata["source-note"] = "; ".join(filter(None, (metadata.get("source-note"), note)))
     new = timeline.even[:1] + numbers / float(wanted)
-    if not own and has_times(motion.skeleton):
-        values[:, 0] = new * PER_SECOND[motion.skeleton.channels[0].unit]
     mask = ~np.isnan(values) if first.mask is not None else None
     start = float(new[0] * float(wanted)) if len(new) else 0.0
     base = round(start) if abs(start) < 2**52 and abs(start - round(start)) < ALIGNED else 0

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mcz.brief import shown
 from mcz.clock import (
+    TIMES,
     Column,
     Counting,
     Timeline,
@@ -19,7 +20,9 @@ from mcz.clock import (
     known_timeline,
     parts_need_start,
     timeline_of,
+    times_fault,
     times_place,
+    unit_of_times,
 )
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
@@ -105,6 +108,8 @@ class Clip(StoredClip, Posed):
             mask = mask[:, columns] if mask is not None else None
         if (start, stop) == (0, self.n_frames) and joints is None and resolution == 0:
             self._check_whole(info, values, mask)
+        if info.role == TIMES:
+            self._check_times(info, values, mask)
         return Masked(values, mask)
 
     def _check_whole(
@@ -112,6 +117,14 @@ class Clip(StoredClip, Posed):
     ) -> None:
         if not self.container.salvage:
             self.check_hash(info, values, mask)
+
+    def _check_times(
+        self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None
+    ) -> None:
+        """Raise FormatError where values of a signal of times are none."""
+        fault = times_fault(np.where(True if mask is None else mask, values, np.nan)[:, 0])
+        if fault and not self.container.salvage:  # ROLE-05
+            raise FormatError(f"no times: {fault}", clip=self.name, where=f"signal {info.index}")
 
     def _info(self, signal: int) -> SignalInfo:
         if not 0 <= signal < len(self.signals):
@@ -206,6 +219,10 @@ class Clip(StoredClip, Posed):
         signal = reader.signal(start + info.skip, stop + info.skip)
         if whole and resolution == 0:
             self._check_whole(info, signal.values, signal.mask)
+        if info.role == TIMES:
+            self._check_times(info, signal.values, signal.mask)
+            if times_fault(signal.masked()[:, 0]):  # of salvage
+                return replace(signal, role="")
         return signal
 
     def _source(self, start: int, stop: int, resolution: int, step: int) -> Source | None:
@@ -254,12 +271,11 @@ class Clip(StoredClip, Posed):
 
     def times_column(self) -> Column | None:
         """The times that stand among the values; None where there are none."""
-        place = times_place(self.skeleton, self.signals)
-        if place is None:
+        index = times_place(self.signals)
+        if index is None:
             return None
-        index, unit = place
-        times = self.read(joints=None if index else [0], signal=index)[:, 0]
-        return column_of(times, self.signals[index].grids[0], unit)
+        info = self.signals[index]
+        return column_of(self.read(signal=index)[:, 0], info.grids[0], unit_of_times(info))
 
     def preview(self, joints: Joints = None) -> FrameValues:
         """What can be read without decoding the rest: frames, counted from 0, and their values.

@@ -26,6 +26,7 @@ from mcz.formats import FORMATS, format_by_id
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, Source
 from mcz.numbers import GridKind
 from mcz.reading.clip import Clip
+from mcz.reading.signal_info import role_name
 from mcz.reading.signal_reader import SignalReader
 from mcz.types import Values
 from mcz.units import UNIT_CM
@@ -174,11 +175,10 @@ def _of_zeros(fields: payloads.Clip, row: ClipRow, source: Source | None) -> Mot
         shape = row.n_frames * own.samples_per_frame, len(grids)
         values: Values = np.zeros(shape, np.int64 if is_integer else np.float64)
         plain = tuple(Channel("", f"{column}") for column in range(len(grids)))
-        signals.append(
-            Signal(
-                values, grids, own.name, own.samples_per_frame, channels=plain if index else None
-            )
-        )
+        signal = Signal(values, grids, own.name, own.samples_per_frame)
+        role = "" if own.role == payloads.TIMES else role_name(own.role)
+        channels = plain if index else None
+        signals.append(replace(signal, channels=channels, role=role, of=own.of))
     joint = Joint("", channels=tuple(Channel("", f"{n}") for n in range(signals[0].n_channels)))
     return Motion(Skeleton((joint,)), tuple(signals), Fraction(1), name=row.name, source=source)
 

@@ -26,6 +26,7 @@ def preview_motion(clip: Clip) -> Motion:
         samples_per_frame=info.layout.samples_per_frame,
         mask=None if found.mask is None else found.mask[:n_rows],
         channels=info.channels,
+        role=info.role if info.of is None else "",
     )
     frames, timeline = found.frames[:n_frames], clip.timeline
     motion = Motion(

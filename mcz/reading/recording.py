@@ -19,7 +19,7 @@ from mcz.reading.signal_info import SignalInfo
 from mcz.reading.source_info import known_format
 from mcz.reading.source_rates import contradiction
 
-ANALOG = "analog"  # the signal whose stored numbers a source may have a meaning for
+ANALOG = "analog"  # the role of the signal whose stored numbers a source may have a meaning for
 
 
 def recording(motion: Motion) -> Recording | None:
@@ -62,7 +62,7 @@ def scaling_of(
     signals: Sequence[SignalInfo], index: int, recording: Callable[[], Recording | None]
 ) -> Scaling | None:
     """What the stored numbers of a signal mean; None where they are the values themselves."""
-    analog = next((info for info in signals[1:] if info.name == ANALOG), None)
+    analog = next((info for info in signals if info.role == ANALOG), None)
     if analog is None or analog.index != index:
         return None
     told = recording()

@@ -122,6 +122,7 @@ def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
         "codecs": [
             {
                 "signal": s.name,
+                "role": s.role,
                 "channels": s.layout.n_channels,
                 "samples_per_frame": s.layout.samples_per_frame,
                 "id": s.codec_id,

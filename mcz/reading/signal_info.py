@@ -9,7 +9,8 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
-from mcz.codecs import by_id
+from mcz.clock import TIMES, times_form_fault
+from mcz.codecs import CODECS, by_id
 from mcz.codecs.contract import Codec, Layout, Model, Span
 from mcz.container import payloads
 from mcz.container.directory import ClipRow, SegmentRow
@@ -21,6 +22,7 @@ from mcz.container.skeletons import parse_channels
 from mcz.errors import FormatError
 from mcz.motion import Channel, Skeleton
 from mcz.numbers import Grid, GridKind
+from mcz.signal import ROLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,13 @@ class SignalInfo:
     rows: tuple[SegmentRow, ...]
     skip: int = 0
     spare: int = 0
+    role: str = ""
+    of: int | None = None
+
+    @property
+    def has_poses(self) -> bool:
+        """Whether it is a motion whose channels are those of the skeleton."""
+        return self.role == "motion" and self.channels is None
 
     @property
     def samples_per_frame(self) -> int:
@@ -124,9 +133,39 @@ def read_signal(
         tuple(segment for segment in row.segments if segment.header.signal == index),  # DATA-08
         own.skip,
         own.spare,
+        role_name(own.role),
+        own.of,
     )
+    if info.role == TIMES:
+        _check_times(info, where)
     _check_segments(container, info, index == 0 and bool(fields.source), where)
     return info
+
+
+def role_name(role: int) -> str:
+    """The name of a role of the registry, "" of any other."""
+    return ROLES[role] if role < len(ROLES) else ""  # ROLE-06
+
+
+def check_roles(signals: Sequence[payloads.Signal], where: str) -> None:
+    """Raise FormatError for roles that signals of one clip cannot have."""
+    roles = [signal.role for signal in signals]
+    if payloads.MOTION in roles[1:]:  # ROLE-01
+        raise FormatError(f"{where}: a motion that is not the first signal")
+    if roles.count(payloads.TIMES) > 1:  # ROLE-02
+        raise FormatError(f"{where}: two signals of times")
+    for index, signal in enumerate(signals):
+        if signal.of is not None and (signal.of >= len(signals) or signal.of == index):  # ROLE-04
+            raise FormatError(f"{where}: signal {index} has residuals of signal {signal.of}")
+
+
+def _check_times(info: SignalInfo, where: str) -> None:
+    """Raise FormatError for a signal that cannot be one of times."""
+    fault = times_form_fault(info)
+    if not fault and info.codec_id in CODECS and not CODECS[info.codec_id].lossless:  # ROLE-03
+        fault = f"codec {info.codec_id} is lossy"
+    if fault:
+        raise FormatError(f"{where}: no times: {fault}")
 
 
 def read_segments(container: Container, info: SignalInfo) -> None:

@@ -84,6 +84,8 @@ class SignalReader:
             grid_changes=changes,
             channels=info.channels,
             ordinals=ordinals,
+            role=info.role,
+            of=info.of,
         )
 
     def _read(

@@ -21,7 +21,7 @@ from mcz.formats.c3d_recording import Recording
 from mcz.motion import Skeleton
 from mcz.numbers.scaling import Scaling
 from mcz.reading.recording import index_of, read_recording, scaling_of
-from mcz.reading.signal_info import SignalInfo, read_signal
+from mcz.reading.signal_info import SignalInfo, check_roles, read_signal
 from mcz.reading.source_info import SourceInfo, source_info, sourced_skeleton
 from mcz.schema import parse
 
@@ -95,10 +95,11 @@ class StoredClip:
 
     @cached_property
     def signals(self) -> tuple[SignalInfo, ...]:
-        """The signals, the motion first."""
+        """The signals; the motion, where there is one, is the first."""
         fields = self._fields
         if not fields.signals:  # CLIP-05
             raise FormatError("it has no signal", clip=self.name)
+        check_roles(fields.signals, f"clip {self.name!r}")
         skeleton, rate = self.skeleton, self.frame_rate
         return tuple(
             read_signal(self.container, self._row, fields, index, skeleton, rate)
@@ -106,8 +107,17 @@ class StoredClip:
         )
 
     @property
+    def motion_signal(self) -> SignalInfo | None:
+        """The signal with the role "motion", which is the first; None where there is none."""
+        return self.signals[0] if self.signals[0].role == "motion" else None
+
+    def signals_of(self, role: str) -> tuple[SignalInfo, ...]:
+        """The signals of a role, one of ``mcz.signal.ROLES``."""
+        return tuple(info for info in self.signals if info.role == role)
+
+    @property
     def n_channels(self) -> int:
-        """Channels of the motion signal."""
+        """Channels of the first signal, which is the motion."""
         return self._row.signals[0].n_channels
 
     def __len__(self) -> int:

@@ -28,7 +28,7 @@ def moves(channels: tuple[Channel, ...]) -> bool:
 
 def check_channels(motion: Motion) -> None:
     """Raise MotionError where the motion's channels are not those of its joints."""
-    if motion.signals[0].channels is not None:
+    if not motion.signals[0].has_poses:
         raise MotionError("its channels are not those of its skeleton", clip=motion.name)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from mcz.clock import is_time, numbers_or_rows
+from mcz.clock import TIMES, numbers_or_rows
 from mcz.errors import MotionError, OptionError
 from mcz.extras import import_extra
 from mcz.motion import Motion, Signal
@@ -62,7 +62,7 @@ def to_xarray(
     except MotionError:
         variables.pop("positions", None)
     for signal in motion.signals[1:]:
-        if not is_time(signal):  # that is the coordinate
+        if signal.role != TIMES:  # that is the coordinate
             _add_signal(motion, signal, variables, coordinates)
     return xarray.Dataset(variables, coordinates, _facts(motion))
 

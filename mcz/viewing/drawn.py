@@ -88,7 +88,7 @@ def frames_read(moving: Moving) -> int:
 
 def _values(moving: Moving, n_read: int, every: int) -> NDArray[np.float64]:
     """Every so many frames, (n, n_channels), NaN where invalid."""
-    if moving.signals[0].channels is not None:
+    if not moving.signals[0].has_poses:
         raise MotionError("its channels are not those of its skeleton", clip=moving.name)
     if isinstance(moving, Motion):
         signal = moving.signals[0]

@@ -23,7 +23,7 @@ from mcz.container.value_hash import value_hash
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
-from mcz.motion import Motion, Skeleton, Source
+from mcz.motion import ROLES, Motion, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
 from mcz.types import JsonObject, Params, Progress, Values
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
@@ -228,6 +228,8 @@ def _signal_record(source: MemorySource, codec: Codec, part: Encoded) -> payload
     return payloads.Signal(
         name=signal.name,
         flags=payloads.OWN_CHANNELS if own else 0,
+        role=ROLES.index(signal.role or ""),
+        of=signal.of,
         channels=channel_records(signal.channels) if signal.channels is not None else None,
         samples_per_frame=signal.samples_per_frame,
         grids=payloads.grid_runs(signal.grids),

@@ -171,6 +171,8 @@ def _in_units(signal: Signal) -> Signal:
         samples_per_frame=signal.samples_per_frame,
         mask=signal.mask,
         channels=signal.channels,
+        role=signal.role,
+        of=signal.of,
     )
 
 

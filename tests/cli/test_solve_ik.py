@@ -125,7 +125,7 @@ def test_a_clip_of_positions(walk: Motion, tmp_path: Path) -> None:
 
 def test_there_and_back_keeps_the_rest(walk: Motion) -> None:
     numbers = np.arange(5, 35)
-    analog = Signal(np.zeros((30, 1)), name="analog", channels=(Channel("", "emg"),))
+    analog = Signal(np.zeros((30, 1)), name="analog", role="analog", channels=(Channel("", "emg"),))
     motion = replace(
         walk,
         metadata={"subject": "17", "source-note": "odd"},

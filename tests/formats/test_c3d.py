@@ -302,6 +302,7 @@ def test_a_motion_without_source_is_written_plainly_and_comes_back() -> None:
     analog = Signal(
         np.arange(16.0).reshape(8, 2),
         name="analog",
+        role="analog",
         samples_per_frame=2,
         channels=(Channel("", "Fx", "N"), Channel("", "Fy", "N")),
     )
@@ -323,7 +324,12 @@ def test_a_motion_without_source_is_written_plainly_and_comes_back() -> None:
 def test_plain_integers() -> None:
     grid = Grid(GridKind.SCALED, scale=0.125)
     values = np.arange(-9.0, 9.0).reshape(3, 6) / 8
-    analog = Signal(np.array([[0], [1], [65_535]]), name="analog", channels=(Channel("", "force"),))
+    analog = Signal(
+        np.array([[0], [1], [65_535]]),
+        name="analog",
+        role="analog",
+        channels=(Channel("", "force"),),
+    )
     motion = markers(2, values, signals=(Signal(values, (grid,) * 6), analog))
     again = c3d.read(c3d.write(motion), "integers")
     assert again.signals[0].grids == motion.signals[0].grids

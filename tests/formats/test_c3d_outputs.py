@@ -185,7 +185,9 @@ def test_a_plain_file_lists_them_again(size: int) -> None:
 def test_more_units_than_lists() -> None:
     units = ["deg", "N", "Nmm", "W", "kg", "m/s", "N/kg"]
     channels = tuple(Channel("", f"o{k} {part}", u) for k, u in enumerate(units) for part in "xyz")
-    outputs = Signal(np.arange(42.0).reshape(2, 21), name="outputs", channels=channels)
+    outputs = Signal(
+        np.arange(42.0).reshape(2, 21), name="outputs", role="outputs", channels=channels
+    )
     motion = Motion(Skeleton(()), (Signal(np.zeros((2, 0))), outputs))
     again = signal_of(c3d.read(c3d.write(motion), "many"), "outputs")
     assert again.channels is not None
@@ -202,7 +204,7 @@ def test_more_units_than_lists() -> None:
 def test_what_a_plain_file_cannot_list_is_refused(names: tuple[str, ...], message: str) -> None:
     joint = Joint("p", channels=tuple(Channel(kind) for kind in ("tx", "ty", "tz")))
     channels = tuple(Channel("", name) for name in names)
-    outputs = Signal(np.zeros((1, 3)), name="outputs", channels=channels)
+    outputs = Signal(np.zeros((1, 3)), name="outputs", role="outputs", channels=channels)
     with pytest.raises(MotionError) as error:
         c3d.write(Motion(Skeleton((joint,)), (Signal(np.zeros((1, 3))), outputs)))
     assert message in str(error.value)

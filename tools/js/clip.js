@@ -5,7 +5,7 @@ import { Refused } from "./errors.js";
 import { INTEGER, parseGrid } from "./grids.js";
 import { readNeeds } from "./head.js";
 import { within } from "./limits.js";
-import { checkSourceFormat } from "./registry.js";
+import { MOTION, RESIDUALS, TIMES, TIMES_PER_SECOND, checkSourceFormat } from "./registry.js";
 import { checkPath } from "./shared.js";
 import { readChannel } from "./skel.js";
 
@@ -31,13 +31,15 @@ const GROUPS_LISTED = 3;
  * @property {{numerator: number, denominator: number}} frameRate numerator 0: unknown
  * @property {Map<string, string>} metadata
  * @property {object | null} source template, format, detail, path, size
- * @property {Signal[]} signals the motion first
+ * @property {Signal[]} signals the motion, if any, is the first
  */
 
 /**
  * @typedef {object} Signal
  * @property {string} name
  * @property {number} index in CLIP
+ * @property {number} role of the registry; 0: none
+ * @property {number | null} of of residuals the index of their signal
  * @property {boolean} ownChannels its channels are not those of the skeleton
  * @property {import("./skel.js").Channel[]} channels
  * @property {number} samplesPerFrame rows a frame
@@ -82,6 +84,7 @@ export function readClip(payload, offset, file) {
   const source = reader.optional(() => readClipSource(reader, file));
   const signals = reader.counted((_, index) => readSignal(reader, index, skeleton, file.limits));
   if (signals.length === 0) reader.refuse("a clip without a signal");
+  checkRoles(reader, signals);
   reader.rest();
   for (const signal of signals) checkStoredFrames(signal, nFrames, open);
   return {
@@ -128,9 +131,30 @@ function readClipSource(reader, file) {
   return { template, format, detail, path, size };
 }
 
+function checkRoles(reader, signals) {
+  if (signals.slice(1).some(({ role }) => role === MOTION)) {
+    reader.refuse("a motion that is not the first signal");
+  }
+  const times = signals.filter(({ role }) => role === TIMES);
+  if (times.length > 1) reader.refuse("two signals of times");
+  for (const { channels, ownChannels, samplesPerFrame } of times) {
+    const isPlain = ownChannels && samplesPerFrame === 1 && channels.length === 1;
+    if (!isPlain || channels[0].kind !== 0 || !TIMES_PER_SECOND.has(channels[0].unit)) {
+      reader.refuse("times that are not one plain scalar a frame in units of time");
+    }
+  }
+  for (const { index, of } of signals) {
+    if (of !== null && (of >= signals.length || of === index)) {
+      reader.refuse(`residuals of signal ${of}`);
+    }
+  }
+}
+
 function readSignal(reader, index, skeleton, limits) {
   const name = reader.text();
   const ownChannels = (reader.flags(FLAG_OWN_CHANNELS) & FLAG_OWN_CHANNELS) !== 0;
+  const role = reader.u8();
+  const of = role === RESIDUALS ? reader.varint() : null;
   const channels = ownChannels
     ? reader.counted(() => readChannel(reader, -1))
     : skeleton.channels;
@@ -150,6 +174,8 @@ function readSignal(reader, index, skeleton, limits) {
   return {
     name,
     index,
+    role,
+    of,
     ownChannels,
     channels,
     samplesPerFrame,

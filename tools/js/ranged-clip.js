@@ -76,6 +76,8 @@ function sameSignal(signal, listed) {
  * @typedef {object} SignalFacts
  * @property {string} name
  * @property {number} index
+ * @property {number} role of SPEC.md's registry; 0: none
+ * @property {number | null} of of residuals the index of their signal
  * @property {string} codec
  * @property {number} nChannels
  * @property {import("./skel.js").Channel[]} channels with names, kinds and units
@@ -385,10 +387,12 @@ function sizesOf(segment, signal) {
 }
 
 function factsOf(signal) {
-  const { name, index, codec, channels, gridRuns, integer, ownChannels } = signal;
+  const { name, index, role, of, codec, channels, gridRuns, integer, ownChannels } = signal;
   return {
     name,
     index,
+    role,
+    of,
     codec: codecLabel(codec),
     nChannels: channels.length,
     channels,

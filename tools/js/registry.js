@@ -2,6 +2,17 @@
 
 import { Refused, Unsupported } from "./errors.js";
 
+/** Roles of signals. */
+export const MOTION = 1;
+export const TIMES = 2;
+export const RESIDUALS = 3;
+export const ANALOG = 4;
+export const OUTPUTS = 5;
+export const ROTATIONS = 6;
+
+/** The units of times, and how many of them are a second. */
+export const TIMES_PER_SECOND = new Map([["s", 1], ["ms", 1e3], ["us", 1e6], ["ns", 1e9]]);
+
 /** Source formats: what each is a source of, and the kind of its template. */
 const SOURCE_FORMATS = new Map([
   [1, { name: "asf", of: "skeleton", kind: "text" }],

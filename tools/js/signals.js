@@ -8,6 +8,7 @@ import { readGroupNotes, readMasks, takeStreams } from "./data.js";
 import { Refused } from "./errors.js";
 import { checkColumn, columnValues } from "./grids.js";
 import { decodedBytes, profile, within } from "./limits.js";
+import { TIMES } from "./registry.js";
 
 /** Bytes that are decoded beside what is wanted: the rest of the first and of the last segment. */
 const MOST_BESIDE = 2 * profile(0).segmentBytes;
@@ -129,6 +130,7 @@ export function decodeSegments({ clip, signal, layout, decoder }, needed, { from
   if (!signal.integer) canonicalNaNs(out.values);
   const whole = from === 0 && to === clip.nFrames && dropped === 0;
   if (whole && clip.end) checkHash(out, clip.end.valueSha256[signal.index]);
+  if (signal.role === TIMES) checkTimes(out);
   return out;
 }
 
@@ -137,6 +139,9 @@ function openDecoder(signal, layout) {
   const decoder = findCodec(signal).open(signal.header, layout);
   if (signal.integer && decoder.decodes !== "ordinals") {
     throw new Refused(`signal ${signal.name}: integers of a codec of values`);
+  }
+  if (signal.role === TIMES && decoder.decodes !== "ordinals") {
+    throw new Refused(`signal ${signal.name}: times of a lossy codec`);
   }
   decoder.check?.(signal.segments);
   return decoder;
@@ -276,6 +281,13 @@ function maskOf(parts, size, layout) {
     mask.set(ofSegment.subarray(start, start + nRows * nChannels), firstRow * nChannels);
   }
   return mask.includes(0) ? mask : null;
+}
+
+function checkTimes({ signal, values, mask }) {
+  const times = Float64Array.from(values, (value, row) => (mask?.[row] === 0 ? NaN : Number(value)));
+  const isFault = (time, row) => !Number.isFinite(time) || (row > 0 && time < times[row - 1]);
+  const row = times.findIndex(isFault);
+  if (row >= 0) throw new Refused(`signal ${signal.name}: no time in row ${row}`);
 }
 
 function checkHash({ signal, values, mask }, expected) {

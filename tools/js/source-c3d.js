@@ -7,6 +7,7 @@ import { LimitExceeded, Refused } from "./errors.js";
 import { BINARY32, Grid, INTEGER, SCALED, VAX_F } from "./grids.js";
 import { halvesOf, highHalf, lowHalf } from "./int64.js";
 import { NAN_32, ordinalOf } from "./ordinals.js";
+import { ANALOG, OUTPUTS, ROTATIONS } from "./registry.js";
 
 const INTEL = 84;
 const DEC = 85;
@@ -210,23 +211,23 @@ class File {
     this.maxBytes = maxBytes;
     const { points, nOutputs, channels, subframes, rotations, ratio } = template;
     const [motion, ...others] = signals;
-    const named = (name) => others.find(({ signal }) => signal.name === name);
+    const withRole = (role) => others.find(({ signal }) => signal.role === role);
     this.floats = new Grid(template.processor === DEC ? VAX_F : BINARY32, 0, 0, 1);
     this.motion = this.fitting(motion, "motion", 3 * (points - nOutputs), 1);
     this.outputs = null;
     if (nOutputs > 0) {
-      this.outputs = this.fitting(named("outputs"), "outputs", 3 * nOutputs, 1);
+      this.outputs = this.fitting(withRole(OUTPUTS), "outputs", 3 * nOutputs, 1);
     }
-    const residuals = points > 0 ? named("residuals") : undefined;
+    const residuals = points > 0 ? others.find(({ signal }) => signal.of === 0) : undefined;
     this.residuals = residuals ? this.fitting(residuals, "residuals", points, 1) : null;
     this.analog = null;
     if (channels > 0) {
-      this.analog = this.fitting(named("analog"), "analog", channels, subframes);
+      this.analog = this.fitting(withRole(ANALOG), "analog", channels, subframes);
     }
     this.turns = null;
     if (rotations > 0) {
       const elements = ELEMENTS_OF_A_ROTATION * rotations;
-      this.turns = this.fitting(named("rotations"), "rotations", elements, ratio);
+      this.turns = this.fitting(withRole(ROTATIONS), "rotations", elements, ratio);
     }
   }
 

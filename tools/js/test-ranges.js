@@ -8,6 +8,7 @@ import { readAnnex } from "./annex-node.js";
 import { MczError, Refused, Unsupported } from "./errors.js";
 import { analogValues, decode, fromBytes, list, open, setAnnex, sources } from "./mcz.js";
 import { c3dRecording } from "./recording.js";
+import { ANALOG, OUTPUTS } from "./registry.js";
 
 setAnnex(readAnnex);
 const VECTORS = new URL("../../conformance/vectors/", import.meta.url);
@@ -275,9 +276,9 @@ test("sources, and what a C3D says beside its numbers", async () => {
       assert.equal(recording !== null, clip.origin?.format.startsWith("c3d") ?? false, name);
       if (recording === null) continue;
       const [motion, ...others] = clip.signals;
-      const nOf = (signal) => others.find((other) => other.name === signal)?.nChannels ?? 0;
-      assert.equal(3 * recording.points.length, motion.nChannels + nOf("outputs"), name);
-      assert.equal(recording.analog.length, nOf("analog"), name);
+      const nOf = (role) => others.find((other) => other.role === role)?.nChannels ?? 0;
+      assert.equal(3 * recording.points.length, motion.nChannels + nOf(OUTPUTS), name);
+      assert.equal(recording.analog.length, nOf(ANALOG), name);
       n++;
     }
   }

@@ -1,10 +1,8 @@
 // SPEC.md, "Time": when the frames of a clip were, in seconds on the clock of the recording.
 
-import { sourceKind } from "./registry.js";
+import { TIMES, TIMES_PER_SECOND, sourceKind } from "./registry.js";
 import { clockOf, timeOf } from "./source-table.js";
 
-const NAMES = new Set(["time", "times", "timestamp", "timestamps"]);
-const PER_SECOND = new Map([["", 1], ["s", 1], ["ms", 1e3], ["us", 1e6], ["ns", 1e9]]);
 const NUMBER = /^-?[0-9]+(\.[0-9]+)?$/;
 const SAME_RATE = 1e-5; // relative
 
@@ -29,39 +27,13 @@ export async function timesOf(clip) {
   return Float64Array.from({ length: nFrames }, (_, f) => (start ?? 0) + (counted[f] - from) / rate);
 }
 
-/** The column of times, null where there is none. */
+/** The signal of times in seconds, null where there is none. */
 async function columnOf(clip) {
-  const { signals, skeleton, nFrames } = clip;
-  const [motion] = signals;
-  const [joint] = skeleton.joints;
-  const own = motion.channels.filter((channel) => channel.joint === 0);
-  const isFirst =
-    !motion.ownChannels &&
-    motion.samplesPerFrame === 1 &&
-    joint?.name.toLowerCase() === "time" &&
-    own.length === 1 &&
-    isPlain(own[0]) &&
-    PER_SECOND.has(own[0].unit);
-  if (isFirst) return seconds(await clip.read({ joints: [0] }), own[0].unit, nFrames);
-  const found = signals.findIndex((signal, at) => at > 0 && isTimes(signal));
-  if (found < 0) return null;
-  return seconds(await clip.read({ signal: found }), signals[found].channels[0].unit, nFrames);
-}
-
-const isPlain = ({ kind }) => kind === 0;
-
-const isTimes = ({ name, channels, samplesPerFrame, ownChannels }) =>
-  NAMES.has(name) &&
-  samplesPerFrame === 1 &&
-  ownChannels &&
-  channels.length === 1 &&
-  isPlain(channels[0]) &&
-  channels[0].unit !== "" &&
-  PER_SECOND.has(channels[0].unit);
-
-function seconds({ values, mask }, unit, nFrames) {
-  const perSecond = PER_SECOND.get(unit);
-  return Float64Array.from({ length: nFrames }, (_, f) =>
+  const found = clip.clip.signals.find(({ role }) => role === TIMES);
+  if (!found) return null;
+  const { values, mask } = await clip.read({ signal: found.index });
+  const perSecond = TIMES_PER_SECOND.get(found.channels[0].unit);
+  return Float64Array.from({ length: clip.nFrames }, (_, f) =>
     mask === null || mask[f] ? Number(values[f]) / perSecond : NaN,
   );
 }

@@ -86,7 +86,7 @@ def odd() -> Base:
 @base
 def analog() -> Motion:
     """The dance beside a second signal of two rows a frame."""
-    signal = Signal(np.arange(8.0).reshape(8, 1), name="analog", samples_per_frame=2)
+    signal = Signal(np.arange(8.0).reshape(8, 1), name="analog", role="analog", samples_per_frame=2)
     signal = replace(signal, channels=(Channel("", "force"),))
     return replace(motions.dance(), signals=(*motions.dance().signals, signal))
 

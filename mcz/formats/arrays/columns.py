@@ -138,12 +138,13 @@ def signal_of(
     name: str = "motion",
     per_frame: int = 1,
     channels: tuple[Channel, ...] | None = None,
+    role: str = "",
 ) -> Signal:
     """One signal of the columns of all parts, one behind the other; NaN is invalid."""
     grids = tuple(grid for part in parts for grid in part.grids)
     if all(grid.kind == GridKind.INTEGER for grid in grids):
         values = np.hstack([part.values for part in parts])
-        return Signal(values, grids, name, per_frame, channels=channels)
+        return Signal(values, grids, name, per_frame, channels=channels, role=role)
     floats = [part.values.astype(np.float64, copy=False) for part in parts]
     values = floats[0] if len(parts) == 1 else np.hstack(floats)
     nan = np.isnan(values)
@@ -151,7 +152,9 @@ def signal_of(
     if any(part.ordinals is not None for part in parts):
         ordinals = np.hstack([_ordinals(part) for part in parts])
     mask = ~nan if nan.any() else None
-    return Signal(values, grids, name, per_frame, mask, channels=channels, ordinals=ordinals)
+    return Signal(
+        values, grids, name, per_frame, mask, channels=channels, ordinals=ordinals, role=role
+    )
 
 
 def _ordinals(part: Columns) -> NDArray[np.int64]:

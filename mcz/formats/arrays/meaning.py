@@ -10,6 +10,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
 
+import numpy as np
+
+from mcz.clock import times_fault
 from mcz.errors import SourceError
 from mcz.formats.arrays.body import Body, body_of
 from mcz.formats.arrays.facts import SHAPE, TIMES, facts_of, rate_of
@@ -28,6 +31,7 @@ class Part:
     words: list[Items]
     per_frame: int = 1
     channels: tuple[Channel, ...] | None = None
+    role: str = ""
 
 
 @dataclass
@@ -41,6 +45,10 @@ class Meaning:
     parts: list[Part] = field(default_factory=list)
     places: dict[int, tuple[int, Sequence[int]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def has_times(self) -> bool:
+        return any(part.role == "times" for part in self.parts)
 
 
 def meaning_of(arrays: Sequence[Array]) -> Meaning:
@@ -65,13 +73,18 @@ def meaning_of(arrays: Sequence[Array]) -> Meaning:
             continue
         place = len(meaning.parts), range(array.numbers.shape[1])
         meaning.places[index] = place
-        part = Part(array.name, [array.numbers], per_frame, _channels(array))
+        channels, role = _channels(array), ""
+        if per_frame == 1 and channels[0].unit and not meaning.has_times:
+            fault = times_fault(array.numbers[:, 0].astype(np.float64))
+            role = "" if fault else "times"
+            meaning.notes += [f"the times do not count: {fault}"] if fault else []
+        part = Part(array.name, [array.numbers], per_frame, channels, role)
         meaning.parts.append(part)
     return meaning
 
 
 def _add_body(meaning: Meaning, body: Body) -> None:
-    meaning.parts.append(Part("motion", body.words))
+    meaning.parts.append(Part("motion", body.words, role="motion"))
     meaning.places |= {index: (0, columns) for index, columns in body.places.items()}
 
 
@@ -109,7 +122,7 @@ def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> Non
         raise SourceError("; ".join((f"no array of {n_frames} frames", *_reasons(arrays))))
     index = -max(fit)[1]
     array = arrays[index]
-    meaning.parts.append(Part("motion", [array.numbers]))
+    meaning.parts.append(Part("motion", [array.numbers], role="motion"))
     meaning.places[index] = 0, range(array.numbers.shape[1])
     meaning.skeleton = Skeleton(plain_joints(array.head.shape[1:], array.name), angle_unit="")
 

@@ -65,9 +65,14 @@ def _motion(
 
 def _signals(meaning: Meaning) -> list[Signal]:
     return [
-        signal_of([columns_of(words) for words in part.words], part.name, part.per_frame, own)
+        signal_of(
+            [columns_of(words) for words in part.words],
+            part.name,
+            part.per_frame,
+            part.channels,
+            part.role,
+        )
         for part in meaning.parts
-        for own in (part.channels,)
     ]
 
 

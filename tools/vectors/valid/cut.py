@@ -57,6 +57,7 @@ def _signals(shelf: Whole) -> None:
         np.arange(32, dtype=np.int64).reshape(16, 2) * 1000 - 7,
         (Grid(GridKind.INTEGER),) * 2,
         name="analog",
+        role="analog",
         samples_per_frame=2,
         channels=(Channel("", "emg", "V"), Channel("", "force", "N")),
     )

@@ -92,6 +92,7 @@ def _two_signals(shelf: Whole) -> None:
         np.arange(24, dtype=np.int64).reshape(12, 2) * 1000 - 7,
         (Grid(GridKind.INTEGER),) * 2,
         name="analog",
+        role="analog",
         samples_per_frame=3,
         channels=(Channel("", "emg", "V"), Channel("", "force", "N")),
     )
@@ -124,7 +125,7 @@ def _own_channels(shelf: Whole) -> None:
     purpose = "A second signal with the skeleton's channels, in groups by joint."
     parts = (partial(motion, (1, 3)),)
     shelf.hold("skeleton-twice", "CLIP; SKEL", purpose, data, motion, parts=parts)
-    motion = dance(signals=(first, *dance().signals))
+    motion = dance(signals=(first, replace(dance().signals[0], role="")))
     data = file_of(motion, grouping="channel")
     purpose = "A motion with channels of its own, and a signal with the skeleton's."
     shelf.hold("skeleton-second", "CLIP; SKEL", purpose, data, motion)

@@ -44,6 +44,7 @@ def _groups(shelf: Streams) -> None:
         np.round(values * 100).astype(np.int64),
         (WHOLE,) * 3,
         name="analog",
+        role="analog",
         samples_per_frame=3,
         channels=tuple(Channel("", name, "V") for name in ("emg", "force", "moment")),
     )

@@ -255,7 +255,7 @@ def _signals(shelf: Waves) -> None:
     samples = np.array([[k * k % 97 - 40, 5 * k] for k in range(40)], np.int64)
     whole = (Grid(GridKind.INTEGER),) * 2
     own = (Channel("", "emg", "V"), Channel("", "force", "N"))
-    analog = Signal(samples, whole, name="analog", samples_per_frame=2, channels=own)
+    analog = Signal(samples, whole, name="analog", role="analog", samples_per_frame=2, channels=own)
     motion = dance_of(plan, made)
     motion = replace(motion, signals=(*motion.signals, analog))
     streams = [build_stream(samples[:, [c]], whole[:1], [USUAL]) for c in range(2)]
@@ -267,7 +267,7 @@ def _signals(shelf: Waves) -> None:
     purpose = "A lossless signal beside the motion, of which a coarser motion leaves nothing out."
     about: dict[str, Any] = {"motion": motion, "requests": requests, "segments": coded}
     shelf.wave("signals", purpose, plan, made, spec=f"{HEADING}; CLIP", **about)
-    extra = replace(motion.signals[0], name="forces", channels=_newtons(6))
+    extra = replace(motion.signals[0], name="forces", role="", channels=_newtons(6))
     both_coded = replace(codec_of(plan, made), lossless=True)  # the further signal as well
     motion = replace(motion, signals=(motion.signals[0], extra))
     data = file_of(motion, grouping="channel", codec=both_coded)

@@ -24,7 +24,7 @@ def add(shelf: Whole) -> None:
     _hold(shelf, "sections-numbers", "A number is not as printed: it is another one.", other)
     times = take_table(TIMES, "hidden.trc")
     mask = np.array([[True], [True], [True], [False]])
-    hidden = replace(times.signals[1], mask=mask)
+    hidden = replace(times.signals[1], mask=mask, role="")
     assert len(hidden.exceptions) == 1
     hidden_times = unhashed(replace(times, signals=(times.signals[0], hidden)))
     _hold(shelf, "missing-exception", "A token beneath a mask is not printed.", hidden_times)

@@ -4,7 +4,7 @@
 import { clockFacts, nearestFrame } from "../ui/times.js";
 import { analogValues, fromBlob, fromBytes, fromUrl, open } from "../../../js/mcz.js";
 
-const ANALOG = "analog"; // the signal whose values are words, which the source says the meaning of
+const ANALOG = 4; // the role of the signal whose values are words, which the source says the meaning of
 
 /**
  * @param {{blob?: Blob, bytes?: Uint8Array, url?: string, headers?: object}} where
@@ -54,7 +54,7 @@ async function clipOf(file, clip) {
     })),
     async read(signal, from, to) {
       const { values, mask } = await clip.read({ signal, frames: [from, to] });
-      const isWords = clip.signals[signal].name === ANALOG && recording?.analog?.length > 0;
+      const isWords = clip.signals[signal].role === ANALOG && recording?.analog?.length > 0;
       return { values: isWords ? analogValues(recording, values) : values, mask };
     },
     sourceBytes: () => clip.source(),
@@ -70,8 +70,8 @@ async function known(ask) {
   }
 }
 
-function unitOf({ name, channels }, recording, i) {
-  const isAnalog = name === ANALOG && recording?.analog?.length === channels.length;
+function unitOf({ role, channels }, recording, i) {
+  const isAnalog = role === ANALOG && recording?.analog?.length === channels.length;
   return isAnalog ? { unit: recording.analog[i].unit } : {};
 }
 
