@@ -120,7 +120,7 @@ def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
 def one_of(choices: Collection[str]) -> Rule:
     """The rule of a field that is one of some words."""
 
-    def form(value: Any) -> str:
+    def form(value: object) -> str:
         if value not in choices:
             raise ValueError
         return str(value)

@@ -46,6 +46,7 @@ from mcz.errors import MotionError, OutOfRangeError
 from mcz.indexing import row_numbers
 from mcz.numbers.blocks import grid_blocks as grid_blocks
 from mcz.numbers.exceptions import Exceptions as Exceptions
+from mcz.signal import ROLES as ROLES
 from mcz.signal import Signal as Signal
 from mcz.signal import check_poses as check_poses
 from mcz.skeleton import ANGLE_KINDS as ANGLE_KINDS
@@ -155,9 +156,7 @@ class Motion:
             raise MotionError("two signals of times", clip=self.name)
         for index, signal in enumerate(self.signals):
             if (signal.role == RESIDUALS) != (signal.of is not None):
-                raise MotionError(
-                    f"signal {signal.name!r}: ``of`` is for residuals", clip=self.name
-                )
+                raise MotionError(f"signal {signal.name!r}: of is {signal.of}", clip=self.name)
             if signal.of is not None and (signal.of == index or not 0 <= signal.of < len(roles)):
                 raise MotionError(f"residuals of signal {signal.of}", clip=self.name)
             if signal.role == TIMES:

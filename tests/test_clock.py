@@ -61,14 +61,6 @@ def test_a_signal_of_times_comes_first() -> None:
     near(stored(motion).times, motion.times)
 
 
-@pytest.mark.parametrize("bad", [[0.0, np.nan, 1, 2], [0.0, 2, 1, 3], [0.0, 1, 2, np.inf]])
-def test_times_that_fall_or_are_unknown_do_not_count(bad: list[float]) -> None:
-    motion = markers(4)
-    motion = replace(motion, signals=(*motion.signals, times_signal(bad)))
-    near(motion.times, [0, 0.01, 0.02, 0.03])
-    assert motion.timeline is not None and "do not count" in motion.timeline.note
-
-
 def test_numbers_that_do_not_ascend_count_rows() -> None:
     motion = markers(4, frame_numbers=np.array([5, 6, 1, 2]))
     near(motion.times, [0.04, 0.05, 0.06, 0.07])

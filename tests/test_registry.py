@@ -17,7 +17,7 @@ from mcz.container.chunks import FLAGS_OF
 from mcz.container.versions import FORMAT_NAME
 from mcz.container.walk_with_losses import KNOWN
 from mcz.formats import FORMATS
-from mcz.motion import CHANNEL_KINDS
+from mcz.motion import CHANNEL_KINDS, ROLES
 from mcz.transforms.wavelets import IDS, WAVELETS
 from tools import registry
 
@@ -99,6 +99,10 @@ def test_source_formats() -> None:
 def test_channel_kinds() -> None:
     rows = by("id", "channel_kinds")
     assert [rows[id_]["name"] for id_ in sorted(rows)] == ["", *CHANNEL_KINDS]
+
+
+def test_roles() -> None:
+    assert tuple(row["name"] for _, row in sorted(by("id", "roles").items())) == ROLES
 
 
 def test_metrics() -> None:

@@ -62,6 +62,7 @@ def registry(text: str) -> dict[str, Any]:
         "source_formats": _keyed(
             rows_after(text, "**Source formats**"), "id", "name", "suffixes", "source_of"
         ),
+        "roles": _keyed(rows_after(text, "**Roles of signals**"), "id", "name", "meaning"),
         "channel_kinds": list(_kinds(rows_after(text, "**Channel kinds**"))),
         "metadata_keys": _keyed(
             rows_after(text, "**Metadata keys**"), "key", "value", "type", "dublin_core", "others"

@@ -123,7 +123,7 @@ class Clip(StoredClip, Posed):
     ) -> None:
         """Raise FormatError where values of a signal of times are none."""
         fault = times_fault(np.where(True if mask is None else mask, values, np.nan)[:, 0])
-        if fault and not self.container.salvage:  # ROLE-05
+        if fault and not self.container.salvage:  # ROLE-04
             raise FormatError(f"no times: {fault}", clip=self.name, where=f"signal {info.index}")
 
     def _info(self, signal: int) -> SignalInfo:

@@ -20,9 +20,8 @@ from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
 from mcz.container.skeletons import parse_channels
 from mcz.errors import FormatError
-from mcz.motion import Channel, Skeleton
+from mcz.motion import ROLES, Channel, Skeleton
 from mcz.numbers import Grid, GridKind
-from mcz.signal import ROLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +154,7 @@ def check_roles(signals: Sequence[payloads.Signal], where: str) -> None:
     if roles.count(payloads.TIMES) > 1:  # ROLE-02
         raise FormatError(f"{where}: two signals of times")
     for index, signal in enumerate(signals):
-        if signal.of is not None and (signal.of >= len(signals) or signal.of == index):  # ROLE-04
+        if signal.of is not None and (signal.of >= len(signals) or signal.of == index):  # ROLE-05
             raise FormatError(f"{where}: signal {index} has residuals of signal {signal.of}")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 
 import numpy as np
@@ -74,18 +74,10 @@ class SignalReader:
         ordinals = np.empty(self._shape(start, stop), np.int64) if keep else None
         values, mask = self._read(start, stop, ordinals)
         exceptions, changes = self.exceptions(start, stop)
-        return Signal(
-            values=values,
-            grids=info.grids,
-            name=info.name,
-            samples_per_frame=info.layout.samples_per_frame,
-            mask=mask,
-            exceptions=exceptions,
-            grid_changes=changes,
-            channels=info.channels,
-            ordinals=ordinals,
-            role=info.role,
-            of=info.of,
+        per_frame = info.layout.samples_per_frame
+        signal = Signal(values, info.grids, info.name, per_frame, mask, exceptions, changes)
+        return replace(
+            signal, channels=info.channels, ordinals=ordinals, role=info.role, of=info.of
         )
 
     def _read(

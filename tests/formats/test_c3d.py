@@ -279,7 +279,7 @@ def test_what_cannot_be_read_is_refused(change: object, message: str) -> None:
 
 def test_signals_that_do_not_fit_the_template_are_refused() -> None:
     motion = c3d.read(made(3, 2, 2).build(), "clip")
-    with pytest.raises(FormatError, match="needs a signal 'analog'"):
+    with pytest.raises(FormatError, match="needs a signal of analog"):
         c3d.write(replace(motion, signals=motion.signals[:2]))
     doubles = Signal(motion.signals[0].values)
     with pytest.raises(FormatError, match="not on a grid BINARY32"):

@@ -92,6 +92,42 @@ def analog() -> Motion:
 
 
 @base
+def timed(
+    times: str = "0 10 20 20", unit: str = "ms", role: str = "times", *, twice: bool = False
+) -> Motion:
+    """The dance beside a signal of a channel; of a frame with "?" the value is invalid.
+
+    ``twice``: and beside another, equal but for its role, which it has not.
+    """
+    words = times.split()
+    values = np.array([[float(word) if word != "?" else 15.0] for word in words])
+    mask = np.array([[word != "?"] for word in words])
+    signal = Signal(values, name="clock", channels=(Channel("", "t", unit),), role=role)
+    signal = replace(signal, mask=None if mask.all() else mask)
+    dance = motions.dance(len(words))
+    more = (signal, replace(signal, role="")) if twice else (signal,)
+    return replace(dance, signals=(*dance.signals, *more))
+
+
+@base
+def many_roles() -> Motion:
+    """The dance beside signals of other roles, the residuals those of the second of two."""
+    dance, values = motions.dance(), np.arange(8.0).reshape(4, 2)
+    roles = ("analog", "outputs", "rotations", "confidence", "residuals")
+    channels = (Channel("", "a"), Channel("", "b"))
+    more = (Signal(values, name="words", channels=channels, role=role) for role in roles[:-1])
+    last = Signal(values, name="words", channels=channels, role=roles[-1], of=2)
+    return replace(dance, signals=(*dance.signals, *more, last))
+
+
+@base
+def no_motion() -> Motion:
+    """Analog samples alone."""
+    signal = replace(motions.dance().signals[0], role="analog", name="emg")
+    return motions.dance(signals=(replace(signal, channels=motions.dance().skeleton.channels),))
+
+
+@base
 def own_channels() -> Motion:
     """The dance whose channels are its own, not those of the joints."""
     dance = motions.dance()

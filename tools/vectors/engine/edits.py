@@ -7,6 +7,7 @@ then all is repaired, and those of INDEX, INDX, FOOT and ``file`` come where eac
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -88,7 +89,11 @@ class Editor:
                 index, indexes = part, indexes + 1
             elif part.type == b"FOOT":
                 part.payload = foot_of(index)
+                before = bytes(part.payload)
                 self._late(part, "FOOT", feet, late)
+                if part.payload != before and part.payload[4:8] == before[4:8]:
+                    crc = zlib.crc32(part.payload[:4] + part.payload[8:])
+                    part.payload = part.payload[:4] + crc.to_bytes(4, "little") + part.payload[8:]
                 layout.place()
                 index, feet = None, feet + 1
         whole = layout.signature + b"".join(part.build() for part in layout.parts)

@@ -124,7 +124,7 @@ def _signals(shelf: Unrestorable) -> None:
     for name, purpose, motion, edits in cases:
         data = file_of(motion, SRCE=with_template(both(*edits)))
         shelf.add(f"c3d-signals-{name}", C3D_SPEC, f"A template of C3D: {purpose}.", data)
-    renamed = replace(floats.signals[2], name="analogue")
+    renamed = replace(floats.signals[2], role="")
     motion = replace(floats, signals=(*floats.signals[:2], renamed))
     purpose = "A clip without the signal analog, which its template of C3D needs."
     shelf.add("c3d-signals-missing", C3D_SPEC, purpose, file_of(motion))
