@@ -1,24 +1,22 @@
 """The time of every frame, in seconds. SPEC.md, "Time", is normative.
 
-A ``Timeline`` is made of what a motion or a clip says: a column of times, a clock of its source, a
-start time, frame numbers and a rate. ``Motion.times``, ``Clip.times`` and ``mcz.times`` give it.
+A ``Timeline`` is made of what a motion or a clip says: a column of times, a clock of its source,
+the time of its first frame, frame numbers and a rate. ``Motion.times``, ``Clip.times`` and
+``mcz.times`` give it.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from math import isfinite
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.numbers import Grid, GridKind
 from mcz.skeleton import Channel
@@ -28,14 +26,13 @@ from mcz.types import Values
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-START = "start-time"  # of the registry
 TIMES = "times"  # the role of a signal of times
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # units of a signal of times
 JITTER = 1e-6  # of a step: binary times that are off by less are uniform
 EXACT = 1e-10  # seconds: the most by which two times of one clock differ
 SAME_RATE = 1e-5  # relative: frame rates that differ by less are one
 GAP = 1.5  # steps: frames further apart are not neighbors
-_NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?")
+MAX_NUMBER = 2**52 - 1  # of a frame, so that the number of the first one of any part can be stored
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +40,12 @@ class Timeline:
     """The times of frames in seconds, as their source has them.
 
     ``times`` float64 (n_frames,), never falling. ``rounding`` is how far each may be from the one
-    that was meant, as of printed decimals. ``note`` tells what is odd about them.
+    that was meant, as of printed decimals.
     """
 
     times: Floats
     rate: Fraction | None
     rounding: float = 0.0
-    note: str = ""
 
     def __post_init__(self) -> None:
         self.times.setflags(write=False)
@@ -135,16 +131,16 @@ class Timeline:
     def cut(self, frames: slice) -> Timeline:
         """The times of these frames, at the rate divided by the step of ``frames``."""
         rate = self.rate and self.rate / (frames.step or 1)
-        return Timeline(self.times[frames], rate, self.rounding, self.note)
+        return Timeline(self.times[frames], rate, self.rounding)
 
 
-def time_facts(timeline: Timeline | None) -> dict[str, float | int | str | None] | None:
-    """First and last time, the number of gaps and what is odd, for documents; None: unknown."""
+def time_facts(timeline: Timeline | None) -> dict[str, float | int] | None:
+    """First and last time and the number of gaps, for documents; None: unknown."""
     if timeline is None or not len(timeline.times):
         return None
     first, last = float(timeline.times[0]), float(timeline.times[-1])
     gaps = len(timeline.runs) - 1
-    return {"first": first, "last": last, "gaps": gaps, "note": timeline.note or None}
+    return {"first": first, "last": last, "gaps": gaps}
 
 
 class Column(NamedTuple):
@@ -211,15 +207,15 @@ class Counting(NamedTuple):
 
 def timeline_of(
     counting: Counting,
-    metadata: Mapping[str, str],
+    first_time: float | None = None,
     clock: SourceClock | None = None,
     column: Column | None = None,
 ) -> Timeline | None:
     """The times of frames; None where nothing tells them.
 
-    ``clock`` is that of the source, ``column`` the times that stand among the values.
+    ``first_time`` is that of the first frame, ``clock`` that of the source, ``column`` the times
+    that stand among the values.
     """
-    note = ""
     numbers, rate, step = counting
     if column is not None and not times_fault(column.times):  # what salvage found may have one
         return Timeline(column.times, rate, column.rounding)
@@ -229,20 +225,10 @@ def timeline_of(
             return Timeline(told, rate, clock.rounding(rate and rate * step))
     if rate is None:
         return None
-    places = numbers.astype(np.float64)  # beyond 64 bits, too
-    since = (numbers - numbers[:1]).astype(np.uint64)
-    if not _ascend(numbers):
-        note = "the frame numbers do not ascend: rows are counted"
-        since = np.arange(len(numbers), dtype=np.uint64) * np.uint64(step)
-        places = places[:1] + since
-    start = metadata.get(START, "") if clock is None else ""
-    if len(numbers) and _NUMBER.fullmatch(start) and isfinite(float(start)):
-        return Timeline(float(start) + since / float(rate * step), rate, note=note)
-    return Timeline((places - 1) / float(rate * step), rate, note=note)
-
-
-def _ascend(numbers: Ints) -> bool:
-    return bool((numbers[1:] > numbers[:-1]).all())
+    if first_time is None:
+        return Timeline((numbers.astype(np.float64) - 1) / float(rate * step), rate)
+    since = (numbers - numbers[:1]).astype(np.float64)
+    return Timeline(first_time + since / float(rate * step), rate)
 
 
 def times_fault(times: Values) -> str:
@@ -263,10 +249,10 @@ def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
 
 
 class Numbered(NamedTuple):
-    """Frame numbers, and the ``start-time`` that makes them times, "" where none is needed."""
+    """Frame numbers, and the time of the first frame, None where they tell it."""
 
     numbers: Ints
-    start: str
+    first_time: float | None
 
 
 def numbering_of(timeline: Timeline, numbers: Ints) -> Numbered | None:
@@ -283,29 +269,33 @@ def numbering_of(timeline: Timeline, numbers: Ints) -> Numbered | None:
     if timeline.places is not None and abs(first) < 2**52:
         candidates.append(round(first) + timeline.places)
     for known in candidates:
-        for start in ("", _decimal(float(times[0]))):
-            found = timeline_of(Counting(known, rate), {START: start})
+        for start in (None, float(times[0])):
+            found = timeline_of(Counting(known, rate), start)
             if found is not None and np.abs(found.times - times).max() <= tolerance:
                 return Numbered(known, start)
     return None
 
 
-def _decimal(seconds: float) -> str:
-    """The shortest decimal without an exponent that reads back as ``seconds``."""
-    return format(Decimal(repr(seconds)), "f")
-
-
-def parts_need_start(numbers: Ints | None, metadata: Mapping[str, str]) -> bool:
-    """Return True if only a ``start-time`` gives a part its times, unless a source does.
-
-    So it is after a ``start-time``, and where numbers do not ascend, so that rows are counted.
-    """
-    return START in metadata or (numbers is not None and not _ascend(numbers))
-
-
 def numbers_or_rows(numbers: Ints | None, n_frames: int) -> Ints:
     """Frame numbers, 1, 2, 3, ... where there are none."""
     return np.arange(1, n_frames + 1) if numbers is None else numbers
+
+
+def part_begins(
+    first_time: float | None, timeline: Timeline | None, start: int, stop: int
+) -> float | None:
+    """The stated time of the first of the frames start <= f < stop; ``first_time``: of frame 0."""
+    if first_time is None or not start:
+        return first_time
+    return float(timeline.times[start]) if timeline is not None and start < stop else None
+
+
+def check_numbers(numbers: Ints, name: str) -> None:
+    """Raise MotionError for frame numbers of ``name`` that a clip cannot have."""
+    if (numbers[1:] <= numbers[:-1]).any():
+        raise MotionError("its frame numbers do not ascend", clip=name)
+    if len(numbers) and not (numbers[0] >= -MAX_NUMBER and numbers[-1] <= MAX_NUMBER):
+        raise MotionError("a frame number is beyond 2^52 - 1", clip=name)
 
 
 def usual_step(numbers: Ints | None) -> int:

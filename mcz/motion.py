@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mcz import brief
 from mcz.checks import (
     INTEGER,
+    NUMBER,
     TEXT,
     TEXT_MAP,
     TRUTH,
@@ -27,15 +28,15 @@ from mcz.checks import (
     several,
 )
 from mcz.clock import (
-    START,
     TIMES,
     Counting,
     Timeline,
+    check_numbers,
     column_of,
     known_timeline,
     numbering_of,
     numbers_or_rows,
-    parts_need_start,
+    part_begins,
     timeline_of,
     times_fault,
     times_form_fault,
@@ -90,6 +91,7 @@ MOTION = {
     "source": optional(of_type(Source, "a Source")),
     "frame_numbers": optional(array_of("i8", 1, "int64 of one dimension")),
     "number_step": INTEGER,
+    "first_time": optional(NUMBER),
 }
 
 
@@ -98,10 +100,11 @@ class Motion:
     """A skeleton in motion: the motion signal first, then any others (analog, ...).
 
     ``frame_rate`` in frames a second, None while unknown; ``frame_rate_exact`` is False where the
-    source gave a rounded frame time. ``frame_numbers`` (int64) is None for 1, 2, 3, ...; they count
-    ``number_step`` from a frame to the next, more than 1 where frames were left out evenly.
-    ``metadata`` maps keys of SPEC.md's registry, or private ``x-`` keys, to text. All of them, a
-    signal of times and the source say when each frame was: ``times``.
+    source gave a rounded frame time. ``frame_numbers`` (int64, ascending) is None for 1, 2, 3, ...;
+    they count ``number_step`` from a frame to the next, more than 1 where frames were left out
+    evenly. ``first_time`` is when the first frame was, in seconds; None where its number tells it:
+    frame 1 is at 0 s. ``metadata`` maps keys of SPEC.md's registry, or private ``x-`` keys, to
+    text. ``times`` says when each frame was.
     """
 
     skeleton: Skeleton
@@ -113,6 +116,7 @@ class Motion:
     source: Source | None = None
     frame_numbers: NDArray[np.int64] | None = None
     number_step: int = 1
+    first_time: float | None = None
 
     __repr__ = brief.motion_text
     _repr_html_ = html_of
@@ -136,6 +140,8 @@ class Motion:
             object.__setattr__(self, "frame_rate", frame_rate_of(self.frame_rate, self.name))
         if self.frame_numbers is not None and len(self.frame_numbers) != self.n_frames:
             raise MotionError(f"{len(self.frame_numbers)} frame numbers", clip=self.name)
+        if self.frame_numbers is not None:
+            check_numbers(self.frame_numbers, self.name)
         if self.number_step < 1:
             raise MotionError(f"a number step of {self.number_step}", clip=self.name)
 
@@ -217,15 +223,16 @@ class Motion:
         numbers = self.frame_numbers
         if start:
             numbers = numbers_or_rows(numbers, self.n_frames)
-        made = replace(
+        first_time = self.first_time
+        if first_time is not None:
+            first_time = part_begins(first_time, self.timeline, start, stop)
+        return replace(
             self,
             signals=tuple(signal.cut(start, stop) for signal in self.signals),
             frame_numbers=None if numbers is None else numbers[start:stop],
+            first_time=first_time,
             source=self.source and self.source.cut(start, stop),
         )
-        if not parts_need_start(numbers, self.metadata):
-            return made
-        return made.at_times(self.timeline and self.timeline.cut(slice(start, stop)))
 
     def with_values(self, values: NDArray[np.float64]) -> Motion:
         """The same motion with other values of its motion signal, same shape."""
@@ -242,7 +249,7 @@ class Motion:
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
         clock = self.source.clock if self.source is not None else None
         counting = Counting(numbers, self.frame_rate, self.number_step)
-        return timeline_of(counting, self.metadata, clock, column)
+        return timeline_of(counting, self.first_time, clock, column)
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -271,16 +278,15 @@ class Motion:
         Frame numbers are kept where they give such times; else they are others, or the motion gets
         a signal ``time``.
         """
-        metadata = {key: text for key, text in self.metadata.items() if key != START}
-        motion = replace(self, metadata=metadata)
+        motion = replace(self, first_time=None)
         own = motion.timeline
         if timeline is None or not self.n_frames or (own and own.is_near(timeline)):
             return motion
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
         found = numbering_of(timeline, numbers)
         if found is not None:
-            metadata |= {START: found.start} if found.start else {}
-            return replace(motion, frame_numbers=found.numbers, metadata=metadata, number_step=1)
+            first = found.first_time
+            return replace(motion, frame_numbers=found.numbers, first_time=first, number_step=1)
         return motion._with_time_signal(timeline)
 
     def _with_time_signal(self, timeline: Timeline) -> Motion:

@@ -55,16 +55,10 @@ def test_frame_1_is_at_0() -> None:
 
 
 def test_a_signal_of_times_comes_first() -> None:
-    motion = markers(4, metadata={"start-time": "9"})
+    motion = markers(4, first_time=9.0)
     motion = replace(motion, signals=(*motion.signals, times_signal([500, 510, 700, 705], "ms")))
     near(motion.times, [0.5, 0.51, 0.7, 0.705])
     near(stored(motion).times, motion.times)
-
-
-def test_numbers_that_do_not_ascend_count_rows() -> None:
-    motion = markers(4, frame_numbers=np.array([5, 6, 1, 2]))
-    near(motion.times, [0.04, 0.05, 0.06, 0.07])
-    assert motion.timeline is not None and "ascend" in motion.timeline.note
 
 
 def test_an_unknown_rate_is_an_error_that_says_what_to_do() -> None:
@@ -244,7 +238,7 @@ def test_resampling_takes_irregular_times() -> None:
 def test_resampling_keeps_the_time_of_the_first_frame() -> None:
     made = mcz.resample(moving(list(range(101, 151))), 37)
     near(made.times[0], 1.0)
-    near(mcz.resample(markers(9, metadata={"start-time": "2.5"}), 33).times[0], 2.5)
+    near(mcz.resample(markers(9, first_time=2.5), 33).times[0], 2.5)
 
 
 def test_windows_do_not_span_gaps(tmp_path: Path) -> None:
@@ -317,25 +311,6 @@ def test_kept_windows_are_of_their_times(tmp_path: Path) -> None:
         for name in "ab"
     ]
     near(speeds[0]["velocities"], speeds[1]["velocities"] * 2)
-
-
-@pytest.mark.parametrize("numbers", [[1, 1, 2, 3, 4, 5, 6, 7], [7] * 8, [9, 8, 7, 6, 5, 4, 3, 2]])
-def test_parts_of_numbers_that_do_not_ascend(tmp_path: Path, numbers: list[int]) -> None:
-    motion = markers(8, frame_numbers=np.array(numbers))
-    mcz.write(motion, tmp_path / "a.mcz")
-    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(3, 7))
-    with mcz.open(tmp_path / "a.mcz") as file, mcz.open(tmp_path / "b.mcz") as part:
-        clip = file.only_clip()
-        for found in (motion[3:7], clip.motion((3, 7)), part.only_clip()):
-            near(found.times, motion.times[3:7])
-            assert found.frame_numbers is not None
-            assert found.frame_numbers.tolist() == numbers[3:7]
-
-
-def test_a_whole_clip_says_of_its_times_what_the_motion_did() -> None:
-    """Also where binary64 cannot tell its numbers from those that rows would have."""
-    motion = markers(2, Fraction(2997, 100), frame_numbers=np.array([155575069868025] * 2))
-    assert stored(motion).metadata == motion.metadata == {}
 
 
 # What every source format says of time, and what every target makes of it.
@@ -608,38 +583,24 @@ def made_of(motion: Motion) -> dict[str, Motion]:
     }
 
 
-@pytest.mark.parametrize("start", ["", "12.345"])
-def test_whatever_is_made_of_a_motion_keeps_its_times(samples: Path, start: str) -> None:
-    motion = walk(samples, WALK)
-    if start:
-        motion = replace(motion, metadata={"start-time": start})
+@pytest.mark.parametrize("start", [None, 12.345])
+def test_whatever_is_made_of_a_motion_keeps_its_times(samples: Path, start: float | None) -> None:
+    motion = replace(walk(samples, WALK), first_time=start)
     for name, made in made_of(motion).items():
         near(made.times, motion.times)
         near(stored(made).times, motion.times)
         assert made.frame_rate == motion.frame_rate, name
 
 
-def test_a_start_time_that_changes_nothing_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for source, told in (("trc", True), ("bvh", False)):
-        path = tmp_path / f"{source}.mcz"
-        mcz.write(read_case(CASES[source], tmp_path), path)
-        assert run("meta", path, "--set", "start-time=5") == 0
-        assert ("start-time does not change" in capsys.readouterr().err) == told
-        with mcz.open(path) as file:
-            assert (file.only_clip().times[0] == 5) == (not told)
-
-
 @given(
     st.integers(-(10**6), 10**6),
     st.lists(st.sampled_from([1, 1, 1, 2, 7, 500]), max_size=12),
     st.sampled_from([Fraction(100), Fraction(60000, 1001), Fraction(1, 3), Fraction(24)]),
-    st.sampled_from(["", "0", "-2.5", "1234.56789"]),
+    st.sampled_from([None, 0.0, -2.5, 1234.56789]),
     st.integers(1, 3),
 )
 def test_times_outlive_parts_files_and_steps(
-    first: int, steps: list[int], rate: Fraction, start: str, each: int
+    first: int, steps: list[int], rate: Fraction, start: float | None, each: int
 ) -> None:
     numbers = np.cumsum([first, *(step * each for step in steps)])
     motion = markers(
@@ -647,10 +608,10 @@ def test_times_outlive_parts_files_and_steps(
         rate,  # type: ignore[arg-type]
         frame_numbers=numbers,
         number_step=each,
-        metadata={"start-time": start} if start else {},
+        first_time=start,
     )
     since = (numbers - numbers[0]) / float(rate * each)
-    wanted = since + (float(start) if start else (first - 1) / float(rate * each))
+    wanted = since + ((first - 1) / float(rate * each) if start is None else start)
     exact = {"rtol": 1e-12, "atol": 1e-9}
     np.testing.assert_allclose(motion.times, wanted, **exact)  # type: ignore[arg-type]
     for stop in (1, len(numbers)):
@@ -679,7 +640,6 @@ def test_absurd_rates_and_times_are_answered(rate: Fraction) -> None:
     if rate < 1:
         with pytest.raises(mcz.OptionError, match="too many"):
             mcz.resample(motion, 50)
-    near(markers(3, metadata={"start-time": "9" * 400}).times, [0, 0.01, 0.02])
 
 
 def test_a_rate_that_is_told_makes_gaps_of_frame_numbers(tmp_path: Path) -> None:

@@ -43,12 +43,12 @@ SOURCES: dict[str, Callable[[], Motion]] = {
     "gap": lambda: markers(9, frame_numbers=GAP),
     "gap at 120": lambda: markers(9, Fraction(120), frame_numbers=GAP),
     "gap at 59.94": lambda: markers(9, Fraction(60000, 1001), frame_numbers=GAP),
-    "start": lambda: markers(9, metadata={"start-time": "1.2345"}),
-    "start and gap": lambda: markers(9, metadata={"start-time": "1.2"}, frame_numbers=GAP),
+    "start": lambda: markers(9, first_time=1.2345),
+    "start and gap": lambda: markers(9, first_time=1.2, frame_numbers=GAP),
     "decimated": lambda: markers(
         5, Fraction(50), frame_numbers=np.arange(101, 111, 2), number_step=2
     ),
-    "before 0": lambda: markers(9, metadata={"start-time": "-0.25"}),
+    "before 0": lambda: markers(9, first_time=-0.25),
     "late": lambda: markers(9, frame_numbers=GAP + 10**6),
     "irregular": irregular,
 }
@@ -74,7 +74,7 @@ def test_tables_have_the_times(source: str, to: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("to", ["trc", "sto", "mot"])
 def test_times_of_a_calendar_are_printed(to: str, tmp_path: Path) -> None:
-    motion = markers(9, metadata={"start-time": "1700000000.123"})
+    motion = markers(9, first_time=1700000000.123)
     assert np.abs(again(motion, to, tmp_path).times - motion.times).max() < 5e-7  # a binary64
 
 
@@ -146,20 +146,20 @@ def test_numbers_that_count_from_0_begin_a_c3d_at_their_time(tmp_path: Path) -> 
 @pytest.mark.parametrize(("to", "first"), [("bvh", "0"), ("amc", "0.01")])
 def test_skeletons_say_what_they_lose(to: str, first: str) -> None:
     motion = bvh_walk().cut(0, 9)
-    motion = replace(motion, source=None, frame_rate=Fraction(100), metadata={"start-time": "1.23"})
+    motion = replace(motion, source=None, frame_rate=Fraction(100), first_time=1.23)
     motion = replace(motion, frame_numbers=np.arange(2, 11))
     said = [text for text in left_out(motion, to) if "first frame" in text]
     assert said == [
         f"left out: the time of the first frame, 1.23 s: {to.upper()} begins at {first} s"
     ]
-    gap = replace(motion, frame_numbers=GAP, metadata={})
+    gap = replace(motion, frame_numbers=GAP, first_time=None)
     lost = [text for text in left_out(gap, to) if "gap" in text]
     assert lost == (
         ["left out: a gap in time of 0.04 s: BVH has frame after frame"] if to == "bvh" else []
     )
     if to == "amc":
         assert "left out: the frame rate, 100 a second" in left_out(gap, to)
-    plain = replace(motion, frame_numbers=None, metadata={})
+    plain = replace(motion, frame_numbers=None, first_time=None)
     assert not [text for text in left_out(plain, to) if " time" in text]
 
 

@@ -366,7 +366,7 @@ def test_an_open_clip_is_closed() -> None:
     whole = written(rich())
     part = extracted(clip_with(whole, flags=1, n_frames=0), frames=(5, 30))
     check(whole, part, 5, 30, None, 0)
-    assert clip_fields_of(part).flags == 0
+    assert clip_fields_of(part).flags == payloads.HAS_TIME_BASE
 
 
 class _Live(Writer):
@@ -583,12 +583,22 @@ def clip_fields_of(data: bytes) -> Any:
 
 
 def clip_with(data: bytes, *, flags: int = 0, n_frames: int | None = None, **signal: Any) -> bytes:
-    """The file with other fields in its clip and the first signal, checksums made right."""
+    """The file with other fields in its clip and the first signal, checksums made right.
+
+    Where it is open, its missing frames are told by CEND.
+    """
     parts = parts_of(data)
     which = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"CLIP")
     fields = clip_fields_of(data)
-    fields.flags, fields.n_frames = flags, fields.n_frames if n_frames is None else n_frames
+    fields.flags |= flags
+    fields.n_frames = fields.n_frames if n_frames is None else n_frames
     update(fields.signals[0], signal)
+    if fields.flags & payloads.OPEN_CLIP:
+        end = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"CEND")
+        cend = parse(payloads.Cend, parts[end][1], "CEND")
+        cend.missing, fields.time_base.missing = fields.time_base.missing, []
+        assert cend.missing
+        parts = replaced(parts, end, built(payloads.Cend, cend, "CEND"))
     return joined(replaced(parts, which, built(payloads.Clip, fields, "CLIP")))
 
 

@@ -34,6 +34,7 @@ from mcz.container.packets import (
 )
 from mcz.container.scan import scan
 from mcz.container.writer import Writer
+from mcz.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.live.strict_reader import live_frames
 from mcz.live.writer import LiveWriter
 from mcz.reading.report import info, layout
@@ -87,6 +88,38 @@ def test_reads_like_any_clip() -> None:
         assert sum(size for _, size, _ in layout(file)) == len(data)
     use(data)
     use(data, salvage=True)
+
+
+def test_numbers_of_missing_frames_come_with_the_end() -> None:
+    values, out = frames(9), io.BytesIO()
+    with LiveWriter(out, skeleton(), "stairs", frame_rate=Fraction(4), first_number=5) as writer:
+        with pytest.raises(mcz.OptionError, match="missing"):
+            writer.miss()
+        for n, row in enumerate(values):
+            writer.push(row)
+            writer.miss() if n in (2, 8) else None
+            writer.miss(3) if n in (2, 3) else None
+        with pytest.raises(mcz.OptionError, match="2\\^52"):
+            writer.miss(2**52)
+    wanted = [5, 6, 7, 12, 16, 17, 18, 19, 20]
+    data = out.getvalue()
+    assert mcz.verify(data) == []
+    assert [n for n, _, _ in live_frames(io.BytesIO(data))] == list(range(9))
+    losses = FramesWithLosses(io.BytesIO(data), "missing", False, StreamSummary())
+    assert [frame.state for frame in losses.frames()] == ["decoded"] * 9
+    for target in (data, extracted(data)):
+        with mcz.open(target) as file:
+            clip = file.clips["live"]
+            assert clip.frame_numbers.tolist() == wanted
+            np.testing.assert_array_equal(clip.times, (np.array(wanted) - 1) / 4)
+    with mcz.open(extracted(data, frames=(2, 7))) as file:
+        assert file.clips["live"].frame_numbers.tolist() == wanted[2:7]
+
+
+def extracted(data: bytes, **how: Any) -> bytes:
+    out = io.BytesIO()
+    mcz.extract(data, out, **({"clip": "live"} | how))
+    return out.getvalue()
 
 
 def test_the_hash_is_compared_at_the_end() -> None:

@@ -95,12 +95,6 @@ def test_templates_keep_their_limit() -> None:
         Writer(io.BytesIO()).template(3, bytes(2**26 + 1))
 
 
-@pytest.mark.parametrize("numbers", [[10**17, 5, 6], [-(10**16), 1, 2]])
-def test_frame_numbers_of_many_digits(numbers: list[int]) -> None:
-    with pytest.raises(mcz.MotionError, match="digits"):
-        written(replace(smooth(3), frame_numbers=np.array(numbers)))
-
-
 def test_reserved_metadata() -> None:
     with pytest.raises(mcz.MotionError, match="frame-numbers"):
         written(smooth(3, metadata={"frame-numbers": "zzz"}))

@@ -199,7 +199,6 @@ def _set(
             outcomes += report.outcomes
         if changes:
             outcomes += mcz.set_metadata(file, changes).outcomes
-            _tell_ignored_starts(file, changes)
     if as_json:
         rows = [{"name": o.path, "result": o.result, "message": o.message} for o in outcomes]
         print_json({"target": file, "changed": rows})
@@ -211,24 +210,3 @@ def _set(
     whole = " and of the file" if "" in names else ""
     echo(f"{file}: changed what is said of {of_clips}{whole}{rates}")
     return Exit.FINE
-
-
-def _tell_ignored_starts(file: str, changes: Mapping[str, Said]) -> None:
-    """Say of which clips a ``start-time`` changes no time, as their sources state times."""
-    from mcz.clock import START
-    from mcz.reading.names import listed
-
-    starts = {name: said[START] for name, said in changes.items() if name and said.get(START)}
-    if not starts:
-        return
-    with opened(file) as held:
-        timelines = {name: held.only_clip(name).timeline for name in starts}
-    ignored = [
-        name
-        for name, line in timelines.items()
-        if line is not None
-        and len(line.times)
-        and abs(line.times[0] - float(starts[name] or 0)) > 1e-6
-    ]
-    if ignored:
-        say(f"{START} does not change the times of {listed(ignored)}: their sources state them")

@@ -87,5 +87,3 @@ def time_lines(times: JsonObject | None) -> Iterator[str]:
     if times["first"] or times["gaps"]:
         gaps = f", {plural(times['gaps'], 'gap')}" if times["gaps"] else ""
         yield f"  time       {times['first']:.6g} s to {times['last']:.6g} s{gaps}"
-    if times["note"]:
-        yield f"  time       {times['note']}"

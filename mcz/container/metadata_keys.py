@@ -36,10 +36,6 @@ def _is_time(value: str) -> bool:
     return _parses(datetime.fromisoformat, FRACTION.sub(r"\1", value))
 
 
-def _is_number(value: str) -> bool:
-    return re.fullmatch(r"-?[0-9]+(\.[0-9]+)?", value) is not None
-
-
 def _parses(parse: Callable[[str], object], value: str) -> bool:
     try:
         parse(value)
@@ -52,27 +48,23 @@ TYPES: dict[str, Callable[[str], bool]] = {
     "text": _is_text,
     "date": _is_date,
     "time": _is_time,
-    "number": _is_number,
     "SPDX": lambda value: SPDX.fullmatch(value) is not None,
     "DOI": lambda value: DOI.fullmatch(value) is not None,
 }
 EXAMPLES = {
     "date": "2014, 2014-05 or 2014-05-21",
     "time": "2014-05-21T14:30:00+02:00",
-    "number": "12.5",
     "SPDX": "CC-BY-4.0",
     "DOI": "10.1000/182",
 }
 
-# The first four are about values and source of a clip, and not to be said behind it (META-03).
+# The first three are about values and source of a clip, and not to be said behind it (META-03).
 KEYS = {
-    "frame-numbers": "text",
     "name-encoding": "text",
     "skeleton-note": "text",
     "source-note": "text",
     "subject": "text",
     "scene": "text",
-    "start-time": "number",
     "rights": "text",
     "credit": "text",
     "title": "text",
@@ -94,8 +86,8 @@ KEYS = {
     "mtime": "time",
 }
 SPELLINGS = {"license": "licence"}  # of keys as users may type them
-INTERPRETED = tuple(KEYS)[:4]
-SAID = tuple(KEYS)[4:]  # what users set
+INTERPRETED = tuple(KEYS)[:3]
+SAID = tuple(KEYS)[3:]  # what users set
 
 
 def check_said(key: str, value: str | None) -> None:

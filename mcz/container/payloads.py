@@ -19,6 +19,7 @@ from mcz.schema import (
     FINITE,
     POSITIVE,
     SIZED,
+    SVARINT,
     TEXT,
     UVARINT,
     Exactly,
@@ -28,6 +29,7 @@ from mcz.schema import (
     field,
     flags,
     one_of,
+    only_if,
     optional,
 )
 
@@ -249,8 +251,27 @@ class Signal(Record):
     extension: bytes = field(SIZED, "ignored, kept", default=b"")
 
 
-CLIP_FLAGS = ("open", "rounded rate")
-OPEN_CLIP, ROUNDED_RATE = 1, 2
+CLIP_FLAGS = ("open", "rounded rate", "time base")
+OPEN_CLIP, ROUNDED_RATE, HAS_TIME_BASE = 1, 2, 4
+
+
+class MissingRun(Record):
+    """Frame numbers that no frame of the clip has, in TIME_BASE and CEND."""
+
+    frames: int = field(POSITIVE, "frames after the run before, or from the first, at least 1")
+    length: int = field(POSITIVE, "frame numbers that are missing then, at least 1")  # TIME-01
+
+
+class TimeBase(Record):
+    """The numbers of the frames of a clip and the time of the first, in CLIP."""
+
+    number: int = field(SVARINT, "number of the first frame")
+    first_time: float | None = field(
+        optional(FINITE),  # TIME-06
+        "0 or 1 binary64: time of the first frame in seconds",
+        default=None,
+    )
+    missing: list[MissingRun] = field(counted(MissingRun), "runs of missing frames", default=[])
 
 
 class Metadata(Record):
@@ -283,12 +304,19 @@ class Clip(Record):
     )
     name: str = field(TEXT, "name of the clip, unique in the file, not empty")
     flags: int = field(
-        flags(*CLIP_FLAGS), "bit 0: n_frames is open; 1: the frame rate is rounded", default=0
+        flags(*CLIP_FLAGS),
+        "bit 0: n_frames is open; 1: the frame rate is rounded; 2: has a time base",
+        default=0,
     )
     skeleton: bytes = field(ID, "id of the SKEL chunk")
     n_frames: int = field(UVARINT, "frames; 0 while open")
     rate_numerator: int = field(UVARINT, "frame rate, numerator; 0: unknown")
     rate_denominator: int = field(POSITIVE, "frame rate, denominator, at least 1")  # CLIP-14
+    time_base: TimeBase | None = field(
+        only_if(this.flags & HAS_TIME_BASE, TimeBase),
+        "numbers and time of the frames; only where flag bit 2 is set",
+        default=None,
+    )
     metadata: list[Metadata] = field(counted(Metadata), "pairs of key and value", default=[])
     source: ClipSource | None = field(
         optional(ClipSource), "0 or 1: how to restore the source file", default=None
@@ -301,6 +329,9 @@ class Cend(Record):
     """CEND, all that is known of a clip behind its data."""
 
     n_frames: int = field(UVARINT, "frames of the clip")
+    missing: list[MissingRun] = field(
+        counted(MissingRun), "runs of missing frames of a clip with flag bit 0", default=[]
+    )
     source_sha256: bytes | None = field(
         optional(SHA256), "0 or 1: hash of the source file", default=None
     )

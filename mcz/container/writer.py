@@ -245,13 +245,18 @@ class Writer:
         source_sha256: bytes,
         value_sha256: Sequence[bytes],
         extension: bytes = b"",
+        missing: Sequence[payloads.MissingRun] = (),
     ) -> None:
-        """Write CEND; an empty ``source_sha256`` means that there is no source."""
+        """Write CEND; an empty ``source_sha256`` means that there is no source.
+
+        ``missing`` are the runs of missing frames of a clip that was open.
+        """
         clip = self._in_clip("CEND")
         if self._next_packet is not None:
             self.close_data()
         record = payloads.Cend(
             n_frames=n_frames,
+            missing=list(missing),
             source_sha256=source_sha256 or None,
             value_sha256=list(value_sha256),
             extension=extension,

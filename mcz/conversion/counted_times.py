@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcz.clock import EXACT, START, TIMES, numbers_or_rows
+from mcz.clock import EXACT, TIMES, numbers_or_rows
 from mcz.motion import Motion
 
 COUNTING = ("bvh", "amc", "c3d")
@@ -21,9 +21,8 @@ def with_counted_times(motion: Motion, to: str) -> Motion:
     if to == "c3d":
         first = first_number(motion)
         if first != numbers_or_rows(motion.frame_numbers, motion.n_frames)[:1].sum():
-            metadata = {key: text for key, text in motion.metadata.items() if key != START}
             numbers = first + np.arange(motion.n_frames)
-            motion = replace(motion, frame_numbers=numbers, metadata=metadata, number_step=1)
+            motion = replace(motion, frame_numbers=numbers, first_time=None, number_step=1)
     if not motion.signals_of(TIMES):
         return motion
     return motion.with_signals([k for k, s in enumerate(motion.signals) if s.role != TIMES])

@@ -225,6 +225,9 @@ def _changed(payload: bytes, where: str, change: Change) -> bytes:
     if change.path is not None and record.source:
         record.source.path = change.path
     if change.rate is not None:
+        base, rate = record.time_base, record.rate_numerator
+        if base is not None and base.first_time is not None and rate:
+            base.first_time *= float(rate / change.rate / record.rate_denominator)
         record.rate_numerator = change.rate.numerator
         record.rate_denominator = change.rate.denominator
         record.flags &= ~payloads.ROUNDED_RATE

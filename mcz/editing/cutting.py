@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from mcz.clock import START, numbering_of, parts_need_start
+from mcz.clock import numbering_of, part_begins
 from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
-from mcz.container.frame_numbers import KEY, frame_number_metadata
 from mcz.container.limits import Profile
 from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
+from mcz.container.time_base import put_time_base, time_base_of
 from mcz.errors import OptionError, error_context
 from mcz.hints import Hint
 from mcz.motion import Skeleton
@@ -204,15 +204,9 @@ def _kept_rows(info: SignalInfo, start: int, stop: int) -> tuple[SegmentRow, ...
 def clip_record(cut: ClipCut, skeleton: bytes, record: payloads.Clip) -> payloads.Clip:
     """The CLIP of the cut clip, its source not yet changed; ``record``: that of before."""
     metadata = payloads.metadata_pairs(record.metadata)
-    if not cut.has_all_frames:
-        numbers = cut.clip.frame_numbers[cut.start : cut.stop]
-        given = metadata.pop(KEY, None) is not None or cut.start > 0
-        metadata |= frame_number_metadata(numbers if given else None)
     if cut.joints is not None:
         add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
-    if cut.joints is not None or parts_need_start(cut.clip.frame_numbers, metadata):
-        keep_times(cut, metadata)
-    return replace(
+    new = replace(
         record,
         flags=record.flags & ~payloads.OPEN_CLIP,
         skeleton=skeleton,
@@ -222,6 +216,14 @@ def clip_record(cut: ClipCut, skeleton: bytes, record: payloads.Clip) -> payload
             _signal_record(part, own) for part, own in zip(cut.signals, record.signals, strict=True)
         ],
     )
+    clip, numbers = cut.clip, cut.clip.frame_numbers[cut.start : cut.stop]
+    first_time = None
+    if clip.first_time is not None:
+        first_time = part_begins(clip.first_time, clip.timeline, cut.start, cut.stop)
+    put_time_base(new, time_base_of(numbers, first_time))
+    if cut.joints is not None:
+        keep_times(cut, new)
+    return new
 
 
 def _sorted_records(metadata: Mapping[str, str]) -> list[payloads.Metadata]:
@@ -230,24 +232,21 @@ def _sorted_records(metadata: Mapping[str, str]) -> list[payloads.Metadata]:
 
 def note_source(record: payloads.Clip, text: str, cut: ClipCut | None = None) -> None:
     """Add ``text`` to the ``source-note`` of a clip; ``cut``: whose times its numbers must tell."""
-    metadata = payloads.metadata_pairs(record.metadata)
     if cut is not None:
-        keep_times(cut, metadata)
+        keep_times(cut, record)
+    metadata = payloads.metadata_pairs(record.metadata)
     add_note(metadata, "source-note", text)
     record.metadata = _sorted_records(metadata)
 
 
-def keep_times(cut: ClipCut, metadata: dict[str, str]) -> None:
-    """Make frame numbers and ``start-time`` tell the times of a cut, whose source may be gone."""
-    metadata.pop(START, None)
+def keep_times(cut: ClipCut, record: payloads.Clip) -> None:
+    """Let the time base tell the times of a cut, whose source may be gone."""
     if cut.clip.timeline is None or not cut.n_frames:
         return
     frames = slice(cut.start, cut.stop)
     found = numbering_of(cut.clip.timeline.cut(frames), cut.clip.frame_numbers[frames])
     if found is not None:
-        metadata.pop(KEY, None)
-        metadata |= frame_number_metadata(found.numbers)
-        metadata |= {START: found.start} if found.start else {}
+        put_time_base(record, time_base_of(found.numbers, found.first_time))
 
 
 def add_note(metadata: dict[str, str], key: str, text: str) -> None:

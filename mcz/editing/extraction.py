@@ -247,7 +247,8 @@ class Copier:
         self._segments(cut, noted=bool(new.source))
         cend = self.container.cend(row)
         extension = b"" if cend is None else bytes(cend.extension)
-        self.writer.end_clip(cut.n_frames, source, hashes, extension)
+        missing = cend.missing if cend is not None and cut.is_whole else []
+        self.writer.end_clip(cut.n_frames, source, hashes, extension, missing)
         self._quality(cut, row)
         self._note(cut)
 

@@ -204,7 +204,8 @@ class _Editor(Copier):
         cend = self.container.whole_cend(row)
         signal = self.recoded.decoded.signals[0]
         hashes = [value_hash(signal.values, signal.mask), *cend.value_sha256[1:]]
-        self.writer.end_clip(cut.n_frames, source, hashes, bytes(cend.extension))
+        extension = bytes(cend.extension)
+        self.writer.end_clip(cut.n_frames, source, hashes, extension, cend.missing)
         self._edited_quality(row)
 
     def _source(self, record: payloads.Clip) -> bytes:

@@ -20,7 +20,7 @@ from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.line_by_line import Arriving, Frame, Lines
 from mcz.formats.notes import RowNotes
 from mcz.formats.restore import restore
-from mcz.formats.rows import Rows, Token, line_of, read_rows, tail_end
+from mcz.formats.rows import Rows, Token, counted_up, line_of, read_rows, tail_end
 from mcz.formats.signals import read_signal
 from mcz.formats.text_source import check_first_line, check_text, source_of, text_encoding
 from mcz.motion import Motion, Skeleton, Source
@@ -85,7 +85,7 @@ def _read_frames(
     else:
         fitted, columns = fit(skeleton, counts, unit)
     frames.columns = {bone: columns[bone.decode(encoding)] for bone in frames.counts}
-    return fitted, read_rows(data, begin, fitted.n_channels, frames)
+    return fitted, counted_up(read_rows(data, begin, fitted.n_channels, frames))
 
 
 def _unit(header: bytes) -> str:

@@ -23,7 +23,7 @@ from mcz.formats.csv_text import (
     whole_cells,
 )
 from mcz.formats.layout import FRAME_NUMBER
-from mcz.formats.rows import Rows, line_of
+from mcz.formats.rows import Rows, counted_up, line_of
 from mcz.formats.table_layout import UNIT_CM
 from mcz.formats.table_rows import TableRows, lines_from, read_table, without_zeros
 from mcz.formats.table_signals import read_columns, read_text, table_metadata, text_note
@@ -83,14 +83,14 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         raise SourceError("no column of numbers beside the times", line=1)
     at = len(values) + sum(text.n_numbers for text in table.texts)
     timed = time is not None and time not in text_cells
-    rows = without_zeros(data, table.rows, (range(len(values)), [at] if timed else []))
+    rows = without_zeros(data, counted_up(table.rows), (range(len(values)), [at] if timed else []))
     times = Times(None, (), None, True)
     if time is not None and timed:
         label = head.names[time].strip()
         times = read_times(data, rows, at, unit=_seconds(label, head.units[time]), name=label)
     labels = [head.names[k] for k in text_cells]
     more = (*read_text(data, rows, table.texts, labels, (len(values), 1)), *times.signals)
-    if text_cells and rows.numbers is None and not any(map(counts_rows, head.names)):
+    if text_cells and table.rows.numbers is None and not any(map(counts_rows, head.names)):
         _check_decimals(data, rows, len(values), labels)
     skeleton = _markers(head, values) or _scalars(head, values)
     names = [joint.name for joint in skeleton.joints]

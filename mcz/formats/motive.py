@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from mcz.errors import SourceError
 from mcz.formats.csv_text import count_columns, is_blank, texts_of, whole_cells
 from mcz.formats.layout import FRAME_NUMBER
-from mcz.formats.rows import line_of
+from mcz.formats.rows import counted_up, line_of
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.formats.table_signals import read_columns, read_text, table_metadata, text_note
 from mcz.formats.table_source import named_count, names_in, section_of, table_source
@@ -90,7 +90,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     n_values = sum(len(found.columns) for found in objects)
     time = n_values + sum(text.n_numbers for text in table.texts)
     rows = without_zeros(
-        data, table.rows, (range(time, table.rows.start.shape[1]), range(n_values))
+        data, counted_up(table.rows), (range(time, table.rows.start.shape[1]), range(n_values))
     )
     stated = [
         rate

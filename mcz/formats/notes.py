@@ -45,7 +45,8 @@ class Notes(Record):
         counted(PatternRun), "patterns of the rows; all rows after them have pattern 0"
     )
     texts: list[NumberText] = field(
-        counted(NumberText), "frame numbers printed in another way than as plain decimal"
+        counted(NumberText),
+        "frame numbers that are not printed as the frame's, in plain decimal",
     )
 
 

@@ -77,8 +77,7 @@ def rows_text(
     numbered = any_numbers(runs)
     cells = Cells(signal, numbers if numbered else None)
     if numbered and notes is not None:
-        odd = (entry for entry in notes.texts if entry[0] < signal.n_rows)
-        texts = [(row, text) for row, text in odd if int(text) == numbers[row]]  # AMC-06
+        texts = [entry for entry in notes.texts if entry[0] < signal.n_rows]  # AMC-06
         rows = np.array([row for row, _ in texts], dtype=np.int64)
         cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
     if missing is not None and signal.mask is not None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,23 @@ class Rows:
     @property
     def n_rows(self) -> int:
         return len(self.start)
+
+
+def counted_up(rows: Rows, n_each: int = 1) -> Rows:
+    """``rows``, ``n_each`` a frame, with numbers that ascend from frame to frame.
+
+    Where those of the file do not, they count from the first by 1, and the notes have its texts.
+    """
+    numbers = rows.numbers
+    if numbers is None or (np.diff(numbers[::n_each]) > 0).all():
+        return rows
+    counted = numbers[0] + np.arange(rows.n_rows) // n_each
+    known = {} if rows.notes is None else dict(rows.notes.texts)
+    others = np.flatnonzero(counted != numbers).tolist()
+    texts = {row: b"%d" % numbers[row] for row in others} | known
+    patterns = np.zeros(rows.n_rows, np.int64) if rows.notes is None else rows.notes.patterns
+    notes = RowNotes(patterns, tuple(sorted(texts.items())))
+    return replace(rows, numbers=None if numbers[0] == 1 else counted, notes=notes)
 
 
 def read_rows(

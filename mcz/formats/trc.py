@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from mcz.errors import SourceError
 from mcz.formats.layout import FRAME_NUMBER
-from mcz.formats.rows import Rows
+from mcz.formats.rows import Rows, counted_up
 from mcz.formats.table_layout import NEXT, SAME, UNIT_CM
 from mcz.formats.table_plain import plain_trc
 from mcz.formats.table_restore import restore_table
@@ -56,7 +56,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     columns = [[FRAME_NUMBER], [time], *([c] for c in range(time))]
     separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
     table = read_table(data, header.rows, time + 1, columns, separator)
-    rows = without_zeros(data, table.rows, ([time], range(time)))
+    rows = without_zeros(data, counted_up(table.rows), ([time], range(time)))
     motion = read_columns(data, rows, range(time))
     joints = tuple(Joint(marker, channels=POSITION) for marker in names)
     unit_cm = UNIT_CM.get(header.values.get("units", "").lower())

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mcz.errors import SourceError
 from mcz.formats.csv_text import count_columns, texts_of
 from mcz.formats.layout import FRAME_NUMBER
-from mcz.formats.rows import Rows, line_of
+from mcz.formats.rows import Rows, counted_up, line_of
 from mcz.formats.table_layout import MAX_SECTIONS, UNIT_CM, Section
 from mcz.formats.table_rows import (
     TableRows,
@@ -198,6 +198,8 @@ def _read(data: bytes, part: _Part) -> _Read:
             f"are not as many a frame in all frames",
             line=line_of(data, part.rows),
         )
+    rows = counted_up(rows, n_each)
+    numbers = rows.numbers if rows.numbers is not None else np.arange(rows.n_rows) // n_each + 1
     tokens = scan(data, rows.start[:, n], rows.stop[:, n])
     texts = [b"%d" % k for k in range(n_each)]
     in_order = tokens.texts().tolist() == texts * (rows.n_rows // n_each)

@@ -39,10 +39,13 @@ class LiveText:
         due, is_renumbered = self._arriving.first_number, False
         for number, values in self._arriving.frames:
             if number is not None and number != due:
-                if not is_renumbered:
+                if number > due:
+                    self.writer.miss(number - due)
+                elif not is_renumbered:
                     remark = f"frame {number} comes where {due} is due; the clip counts on"
                     self.remarks = (*self.remarks, remark)
-                is_renumbered, due = True, number
+                    is_renumbered = True
+                due = number
             self.writer.push(values)
             due += 1
         declared, n_frames = self._arriving.declared, self.writer.n_frames

@@ -20,6 +20,7 @@ from mcz.container import payloads
 from mcz.container.chunks import ANCILLARY, REPEAT, REPEATED
 from mcz.container.masks import build_mask
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
+from mcz.container.time_base import ComingGaps
 from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
@@ -107,7 +108,7 @@ class LiveWriter:
     ) -> None:
         if repeat < 0:
             raise OptionError(f"repeat is {repeat}, not 0 or more")
-        self.n_frames = 0
+        self.n_frames, self._gaps = 0, ComingGaps(first_number)
         self.entry: int | None = None
         self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
         self.codec = by_name(codec)
@@ -191,6 +192,10 @@ class LiveWriter:
                 self._is_open = False
                 raise
 
+    def miss(self, n_frames: int = 1) -> None:
+        """Leave out the numbers of so many frames behind the last one; OptionError before one."""
+        self._gaps.miss(n_frames)
+
     def _push(self, row: Floats) -> Floats:
         if self._positions:
             row = self._placed(row).reshape(-1)
@@ -208,6 +213,7 @@ class LiveWriter:
         self._count(size, len(stream))
         decoded = self._decoder.push(stream, fresh)
         self._digest.update(decoded[None], None if valid is None else valid[None])
+        self._gaps.frame()
         self.n_frames += 1
         self._figures.add(row, decoded)
         return decoded if valid is None else np.where(valid, decoded, np.nan)
@@ -295,7 +301,8 @@ class LiveWriter:
         if self._has_data:
             self._writer.close_data()
         self.entry = self._outlet.size
-        self._writer.end_clip(self.n_frames, b"", [self._digest.digest()])
+        hashes, missing = [self._digest.digest()], self._gaps.runs
+        self._writer.end_clip(self.n_frames, b"", hashes, missing=missing)
         if not self.codec.lossless:
             fixed = {k: v for k, v in self.options.items() if k not in self._changed}
             settings = {f"param.{name}": value for name, value in fixed.items()}

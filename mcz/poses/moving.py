@@ -104,8 +104,8 @@ def times(moving: Moving, frames: Frames = None, *, signal: int | str = 0) -> ND
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 
     In this order: the times that the file has as numbers (a column ``time``, an array of times);
-    those that it gives to frame numbers (TRC, Motive, C3D, ...); the metadata key ``start-time``,
-    the time of the first frame; else (number - 1) / rate, so that frame 1 is at 0 s. Events are on
+    those that it gives to frame numbers (TRC, Motive, C3D, ...); ``first_time``, that of the
+    first frame; else (number - 1) / rate, so that frame 1 is at 0 s. Events are on
     the same clock. ``signal``, by index or name: the times of its samples, which lie evenly from
     each frame on. ``frames`` (a, b) or a slice. Raises OptionError where neither times nor a rate
     are known.

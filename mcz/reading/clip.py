@@ -18,7 +18,6 @@ from mcz.clock import (
     Timeline,
     column_of,
     known_timeline,
-    parts_need_start,
     timeline_of,
     times_fault,
     times_place,
@@ -199,15 +198,14 @@ class Clip(StoredClip, Posed):
             frame_rate=self.frame_rate,
             frame_rate_exact=self.frame_rate_exact,
             name=self.name,
-            metadata={k: v for k, v in self.metadata.items() if k != "frame-numbers"},
-            frame_numbers=None if "frame-numbers" not in self.metadata and not start else numbers,
+            metadata=self.metadata,
+            frame_numbers=numbers if start or self._time_base is not None else None,
+            first_time=self.first_time,
         )
         step = 2**resolution if decimate else 1
         motion = decimated(motion, step) if step > 1 else motion
         motion = replace(motion, source=self._source(start, stop, resolution, step))
-        is_whole = (start, stop) == (0, self.n_frames) and not self.container.salvage
-        is_timed = is_whole or not parts_need_start(self.frame_numbers, motion.metadata)
-        if step == 1 and is_timed:
+        if step == 1 and (not start or self.first_time is None):
             return motion
         return motion.at_times(self.timeline and self.timeline.cut(slice(start, stop, step)))
 
@@ -253,7 +251,7 @@ class Clip(StoredClip, Posed):
             lost = "its times are those of its rate, its source's are lost"
             self._complain(f"{lost}: {error}", error)
         counting = Counting(self.frame_numbers, self.frame_rate)
-        return timeline_of(counting, self.metadata, clock, column)
+        return timeline_of(counting, self.first_time, clock, column)
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -266,7 +264,7 @@ class Clip(StoredClip, Posed):
     def timeline_at(self, rate: Fraction | None) -> Timeline | None:
         """``timeline``, by ``rate`` where the clip states neither a rate nor times."""
         if self.timeline is None and rate is not None:
-            return timeline_of(Counting(self.frame_numbers, rate), self.metadata)
+            return timeline_of(Counting(self.frame_numbers, rate), self.first_time)
         return self.timeline
 
     def times_column(self) -> Column | None:

@@ -20,7 +20,7 @@ from mcz.types import JsonObject, Params
 
 # Parameters that say where data lie and which frames there are, which is compared by itself.
 OF_DATA = {"DATA_START", "FRAMES", "LONG_FRAMES", "ACTUAL_START_FIELD", "ACTUAL_END_FIELD"}
-OF_READERS = {"source-note", "skeleton-note", "name-encoding", "frame-numbers"}
+OF_READERS = {"source-note", "skeleton-note", "name-encoding"}
 
 
 @dataclass(frozen=True, slots=True)

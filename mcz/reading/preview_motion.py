@@ -35,7 +35,7 @@ def preview_motion(clip: Clip) -> Motion:
         frame_rate=None if rate is None else rate / found.step,
         frame_rate_exact=clip.frame_rate_exact,
         name=clip.name,
-        metadata={k: v for k, v in clip.metadata.items() if k != "frame-numbers"},
+        metadata=clip.metadata,
         frame_numbers=clip.frame_numbers[frames],
         number_step=found.step,
     )

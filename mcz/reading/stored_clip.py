@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from mcz.codecs import by_id
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
-from mcz.container.frame_numbers import parse_frame_numbers
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
+from mcz.container.time_base import numbers_of, whole_time_base
 from mcz.errors import FormatError, OptionError, UnsupportedError
 from mcz.formats.c3d_recording import Recording
 from mcz.motion import Skeleton
@@ -80,13 +80,22 @@ class StoredClip:
         """Keys of the registry, or ``x-...``, and texts, as META chunks have changed them."""
         return self.container.metadata(self._row)
 
+    @cached_property
+    def _time_base(self) -> payloads.TimeBase | None:
+        return whole_time_base(self._fields, self._cend)
+
     @property
     def frame_numbers(self) -> NDArray[np.int64]:
-        """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
+        """The number of every frame, ascending: 1, 2, 3, ... where there is no time base."""
         where = f"clip {self.name!r}: frame numbers"
         check_decoded(where, 8 * self.n_frames, self.container.max_decoded)
-        said = self.metadata.get("frame-numbers", "1")
-        return parse_frame_numbers(said, self.n_frames, self.name)
+        whole = not self.container.salvage
+        return numbers_of(self._time_base, self.n_frames, self.name, whole=whole)
+
+    @property
+    def first_time(self) -> float | None:
+        """The time of the first frame in seconds, None where its number and the rate tell it."""
+        return None if self._time_base is None else self._time_base.first_time
 
     @property
     def damage(self) -> list[str]:

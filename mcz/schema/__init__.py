@@ -30,6 +30,7 @@ from mcz.schema.types import bounded as bounded
 from mcz.schema.types import counted as counted
 from mcz.schema.types import flags as flags
 from mcz.schema.types import one_of as one_of
+from mcz.schema.types import only_if as only_if
 from mcz.schema.types import optional as optional
 from mcz.schema.varints import MAX_COUNT as MAX_COUNT
 from mcz.schema.varints import read_varint as read_varint

@@ -206,6 +206,11 @@ def optional(item: Kind) -> Optional:
     return Optional(item)
 
 
+def only_if(condition: object, item: Kind) -> Construct:
+    """An item that is there only where the condition holds: None, or the value."""
+    return construct.If(condition, as_construct(item))
+
+
 def one_of(kind: Kind, values: Collection[object]) -> Checked:
     """One of ``values``."""
     return Checked(kind, lambda value: value in values)

@@ -13,12 +13,12 @@ from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded, Request, Segment, Span, model_finder
 from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
-from mcz.container.frame_numbers import KEY, frame_number_metadata
 from mcz.container.limits import ARCHIVE, check
 from mcz.container.packed import pack_skeleton
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.skeletons import build_skeleton, channel_records
 from mcz.container.strict import is_plain_path
+from mcz.container.time_base import put_time_base, time_base_of
 from mcz.container.value_hash import value_hash
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
@@ -135,9 +135,7 @@ def open_clip(
     source = MemorySource(motion, 0, codec, writer.profile.segment_bytes)
     record = _clip_record(writer, motion, [_Coded(source, codec, encoded)])
     record.flags |= payloads.OPEN_CLIP
-    numbers = frame_number_metadata(np.array([first_number], np.int64))
-    more = payloads.metadata_records(numbers)
-    record.metadata = sorted(record.metadata + more, key=lambda pair: pair.key)
+    put_time_base(record, time_base_of(np.array([first_number], np.int64), None))
     writer.begin_clip(record, [motion.signals[0].n_channels])
 
 
@@ -187,20 +185,19 @@ def _clip_record(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> pay
     rate = motion.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
         raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
-    if KEY in motion.metadata:
-        raise MotionError(f"metadata {KEY!r} is written from the motion's frame_numbers")
-    metadata = dict(motion.metadata) | frame_number_metadata(motion.frame_numbers)
-    return payloads.Clip(
+    record = payloads.Clip(
         name=motion.name,
         flags=0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
         skeleton=write_skeleton(writer, motion.skeleton),
         n_frames=motion.n_frames,
         rate_numerator=rate.numerator if rate else 0,
         rate_denominator=rate.denominator if rate else 1,
-        metadata=payloads.metadata_records(dict(sorted(metadata.items()))),
+        metadata=payloads.metadata_records(dict(sorted(motion.metadata.items()))),
         source=_source_record(writer, motion.source) if motion.source else None,
         signals=[_signal_record(part.source, part.codec, part.encoded) for part in coded],
     )
+    put_time_base(record, time_base_of(motion.frame_numbers, motion.first_time))
+    return record
 
 
 def _source_record(writer: Writer, source: Source) -> payloads.ClipSource:

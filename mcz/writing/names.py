@@ -43,7 +43,7 @@ def check_name(path: str) -> None:
         raise MotionError(f"source path {path!r} is not relative and plain; rename the file")
 
 
-METADATA_KEYS = tuple(KEYS)  # ``frame-numbers`` is written from the numbers of a motion
+METADATA_KEYS = tuple(KEYS)
 
 
 def check_metadata(metadata: Mapping[str, str], name: str) -> None:

@@ -291,11 +291,21 @@ def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
     np.testing.assert_array_equal(arrived("amc", data, mcz.read_skeleton(asf)), whole.values)
     out = io.BytesIO()
     report = encode_live(lines(data), out, "amc", *in_channels(asf))
-    assert report.remarks == ("frame 4 comes where 3 is due; the clip counts on",)
+    assert report.remarks == ()
     with mcz.open(out.getvalue()) as file:
+        assert file.clips["live"].frame_numbers.tolist() == [1, 2, 4]
         found = file.clips["live"].read()
         np.testing.assert_array_equal(np.isnan(found), np.isnan(whole.values))
         assert file.skeleton_bytes(file.clips["live"].skeleton_id) == ASF
+
+
+def test_numbers_that_fall_are_counted_on(asf: Path) -> None:
+    data = b"".join(b"%d\nroot 1 2 3 4 5 6\nknee 7\n" % n for n in (7, 9, 3, 4, 6))
+    out = io.BytesIO()
+    report = encode_live(lines(b":DEGREES\n" + data), out, "amc", *in_channels(asf))
+    assert report.remarks == ("frame 3 comes where 10 is due; the clip counts on",)
+    with mcz.open(out.getvalue()) as file:
+        assert file.clips["live"].frame_numbers.tolist() == [7, 9, 10, 11, 13]
 
 
 def test_other_channels_than_the_asf(asf: Path) -> None:

@@ -2,12 +2,14 @@
 
 import { ByteReader } from "./bytes.js";
 import { Sha256 } from "./sha256.js";
+import { readMissing } from "./time-base.js";
 
 const HASH_SIZE = 32;
 
 /**
  * @typedef {object} ClipEnd
  * @property {number} nFrames
+ * @property {{frames: number, length: number}[]} missing runs of missing frames of an open clip
  * @property {Uint8Array | null} sourceSha256
  * @property {Uint8Array[]} valueSha256 one a signal
  */
@@ -24,9 +26,11 @@ const HASH_SIZE = 32;
 export function readClipEnd(payload, clip, salvage = false) {
   const reader = new ByteReader(payload, `CEND of ${clip.name}`);
   const nFrames = reader.varint();
+  const missing = readMissing(reader);
   const sourceSha256 = reader.optional(() => reader.take(HASH_SIZE));
   const valueSha256 = reader.counted(() => reader.take(HASH_SIZE));
   reader.rest();
+  if (missing.length > 0 && !clip.open) reader.refuse("missing frames of a clip that is not open");
   if (!salvage) checkFrames(reader, nFrames, clip);
   if ((sourceSha256 !== null) !== (clip.source !== null)) {
     reader.refuse("the hash of a source, or none, where CLIP says otherwise");
@@ -34,7 +38,7 @@ export function readClipEnd(payload, clip, salvage = false) {
   if (valueSha256.length !== clip.signals.length) {
     reader.refuse(`${valueSha256.length} hashes of ${clip.signals.length} signals`);
   }
-  return { nFrames, sourceSha256, valueSha256 };
+  return { nFrames, missing, sourceSha256, valueSha256 };
 }
 
 function checkFrames(reader, nFrames, clip) {

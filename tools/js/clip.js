@@ -1,4 +1,4 @@
-// SPEC.md, "CLIP": a clip, its signals, their grids and groups; and the metadata `frame-numbers`.
+// SPEC.md, "CLIP": a clip, its signals, their grids and groups.
 
 import { ByteReader, count, hex } from "./bytes.js";
 import { Refused } from "./errors.js";
@@ -8,9 +8,11 @@ import { within } from "./limits.js";
 import { MOTION, RESIDUALS, TIMES, TIMES_PER_SECOND, checkSourceFormat } from "./registry.js";
 import { checkPath } from "./shared.js";
 import { readChannel } from "./skel.js";
+import { readTimeBase } from "./time-base.js";
 
 const FLAG_OPEN = 1;
 const FLAG_ROUNDED_RATE = 2;
+const FLAG_TIME_BASE = 4;
 const FLAG_OWN_CHANNELS = 1;
 const ID_SIZE = 16;
 
@@ -29,6 +31,7 @@ const GROUPS_LISTED = 3;
  * @property {import("./skel.js").Skeleton} skeleton
  * @property {number} nFrames frames that are shown; of an open clip 0 until CEND has come
  * @property {{numerator: number, denominator: number}} frameRate numerator 0: unknown
+ * @property {import("./time-base.js").TimeBase | null} timeBase
  * @property {Map<string, string>} metadata
  * @property {object | null} source template, format, detail, path, size
  * @property {Signal[]} signals the motion, if any, is the first
@@ -72,7 +75,7 @@ export function readClip(payload, offset, file) {
   if (name === "") reader.refuse("a clip without a name");
   if (file.clips.has(name)) reader.refuse(`a second clip ${name}`);
   reader.what = `CLIP ${name}`;
-  const flags = reader.flags(FLAG_OPEN | FLAG_ROUNDED_RATE);
+  const flags = reader.flags(FLAG_OPEN | FLAG_ROUNDED_RATE | FLAG_TIME_BASE);
   const open = (flags & FLAG_OPEN) !== 0;
   const skeleton = file.skeletons.get(hex(reader.take(ID_SIZE)));
   if (!skeleton) reader.refuse("its SKEL does not come before it");
@@ -80,6 +83,7 @@ export function readClip(payload, offset, file) {
   if (open && nFrames !== 0) reader.refuse(`an open clip of ${nFrames} frames`);
   const frameRate = { numerator: reader.varint(), denominator: reader.varint() };
   if (frameRate.denominator === 0) reader.refuse("a frame rate over 0");
+  const timeBase = flags & FLAG_TIME_BASE ? readTimeBase(reader, open) : null;
   const metadata = readMetadata(reader);
   const source = reader.optional(() => readClipSource(reader, file));
   const signals = reader.counted((_, index) => readSignal(reader, index, skeleton, file.limits));
@@ -96,6 +100,7 @@ export function readClip(payload, offset, file) {
     skeleton,
     nFrames,
     frameRate,
+    timeBase,
     metadata,
     source,
     signals,
@@ -284,34 +289,4 @@ function checkStoredFrames(signal, nFrames, open) {
   }
   const stored = count(signal.skip + nFrames + signal.spare, `stored frames of ${signal.name}`);
   count(stored * signal.samplesPerFrame, `rows of ${signal.name}`);
-}
-
-const FRAME_NUMBER = "(?:0|-?[1-9][0-9]{0,15})";
-const FRAME_NUMBERS = new RegExp(`^${FRAME_NUMBER}(?: [1-9][0-9]{0,15}:${FRAME_NUMBER})*$`);
-
-/**
- * The metadata `frame-numbers`, as runs of numbers that grow by 1.
- *
- * @param {Clip} clip whose number of frames is known
- * @returns {{frame: number, number: bigint}[]} where each run begins, and with which number
- * @throws {Refused}
- */
-export function frameNumbers(clip) {
-  const text = clip.metadata.get("frame-numbers");
-  if (text === undefined) return [{ frame: 0, number: 1n }];
-  if (!FRAME_NUMBERS.test(text)) {
-    throw new Refused(`clip ${clip.name}: frame-numbers ${JSON.stringify(text.slice(0, 80))}`);
-  }
-  const [first, ...others] = text.split(" ");
-  const runs = [{ frame: 0, number: BigInt(first) }];
-  for (const other of others) {
-    const [row, number] = other.split(":");
-    const last = runs[runs.length - 1];
-    const run = { frame: Number(row), number: BigInt(number) };
-    if (run.frame <= last.frame || run.frame >= clip.nFrames) {
-      throw new Refused(`clip ${clip.name}: frame-numbers of frame ${row}`);
-    }
-    runs.push(run);
-  }
-  return runs;
 }

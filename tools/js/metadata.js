@@ -5,7 +5,7 @@ import { indexLimit, within } from "./limits.js";
 import { decoded } from "./shared.js";
 
 /** Keys that belong to the values and the source of a clip: nothing behind it may say them. */
-const INTERPRETED = new Set(["frame-numbers", "name-encoding", "skeleton-note", "source-note"]);
+const INTERPRETED = new Set(["name-encoding", "skeleton-note", "source-note"]);
 
 /**
  * The records of a META.

@@ -1,7 +1,7 @@
 // A clip of a file that is read by ranges: what it is, and its frames as they are asked for.
 
 import { readClipEnd } from "./cend.js";
-import { frameNumbers, readClip } from "./clip.js";
+import { readClip } from "./clip.js";
 import { codecLabel } from "./codecs.js";
 import { addSegment, takeStreams } from "./data.js";
 import { joined, runsOf, runsWithin } from "./decoded-runs.js";
@@ -17,6 +17,7 @@ import { isC3d, sourceFormatLabel } from "./registry.js";
 import { salvageSignal } from "./salvaged-signal.js";
 import { decodeSegments, openSignal, segmentsOf, takeColumns } from "./signals.js";
 import { restoreClip } from "./sources.js";
+import { frameNumbers } from "./time-base.js";
 import { timesOf } from "./times.js";
 
 const AHEAD = 64 * 1024; // bytes of segments that come with CLIP where requests cost
@@ -41,9 +42,15 @@ export async function openClip(file, index, row) {
   clip.declared = clip.nFrames;
   clip.nFrames = row.nFrames;
   clip.findModel = file.shared.modelFinder(place.offset);
-  clip.numbers = numbersOf(clip, file.salvage);
   for (const segment of row.segments()) addSegment(clip.signals[segment.signal], segment);
+  if (clip.open && row.end !== null) clip.end = await readEnd(file, row, clip);
+  clip.numbers = numbersOf(clip, file.salvage);
   return new RangedClip(file, index, row, clip);
+}
+
+async function readEnd(file, { end }, clip) {
+  const payload = await file.ranges.payload(end, file.limits.payloadBytes);
+  return readClipEnd(payload, clip, file.salvage);
 }
 
 function numbersOf(clip, salvage) {
@@ -112,6 +119,8 @@ export class RangedClip {
     this.lengthUnit = LENGTH_UNITS[clip.skeleton.unitCm] ?? null;
     this.firstFrame = Number(clip.numbers[0].number);
     this.frameNumbers = clip.numbers;
+    /** The time of the first frame in seconds; null where its number and the rate tell it. */
+    this.firstTime = clip.timeBase?.firstTime ?? null;
     /** What is said in CLIP; `file.metadata(i)` has also what is said behind it. */
     this.metadata = clip.metadata;
     const { source } = clip;
@@ -359,10 +368,8 @@ export class RangedClip {
 
   async end() {
     if (!this.clip.end) {
-      const { end } = this.row;
-      if (end === null) throw new Refused(`clip ${this.name} has no CEND`);
-      const payload = await this.file.ranges.payload(end, this.file.limits.payloadBytes);
-      this.clip.end = readClipEnd(payload, this.clip);
+      if (this.row.end === null) throw new Refused(`clip ${this.name} has no CEND`);
+      this.clip.end = await readEnd(this.file, this.row, this.clip);
     }
     return this.clip.end;
   }

@@ -14,7 +14,6 @@ import {
   readFoot,
   readHeader,
 } from "./chunks.js";
-import { frameNumbers } from "./clip.js";
 import { COPIED, copiesIn } from "./copies.js";
 import { Damage } from "./damage.js";
 import { Refused } from "./errors.js";
@@ -24,6 +23,7 @@ import { supplied } from "./missing.js";
 import { Packets, passPacket } from "./packets.js";
 import { resynchronize } from "./resynchronize.js";
 import { sha256 } from "./sha256.js";
+import { frameNumbers } from "./time-base.js";
 import { Walk } from "./walk.js";
 
 const WINDOW = 4 * 1024 * 1024; // bytes that are read at once

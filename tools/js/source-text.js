@@ -88,7 +88,7 @@ export function writeRows(out, text) {
           out.write(gaps[run.gap]);
           const token =
             c === 0
-              ? numberToken(numberOfRow(row), notes.texts.get(skippedRows + i))
+              ? (notes.texts.get(skippedRows + i) ?? String(numberOfRow(row)))
               : tokenOf(row, c - 1);
           writePadded(out, token, run.width);
         }
@@ -186,10 +186,6 @@ export function numberOf(numbers) {
     while (at + 1 < numbers.length && numbers[at + 1].frame <= frame) at++;
     return numbers[at].number + BigInt(frame - numbers[at].frame);
   };
-}
-
-function numberToken(number, text) {
-  return text !== undefined && BigInt(text.replace("+", "")) === number ? text : String(number);
 }
 
 // Structures

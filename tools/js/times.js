@@ -3,7 +3,6 @@
 import { TIMES, TIMES_PER_SECOND, sourceKind } from "./registry.js";
 import { clockOf, timeOf } from "./source-table.js";
 
-const NUMBER = /^-?[0-9]+(\.[0-9]+)?$/;
 const SAME_RATE = 1e-5; // relative
 
 /**
@@ -21,10 +20,9 @@ export async function timesOf(clip) {
   if (printed !== null && isClock(printed)) return printed;
   const { rate, nFrames } = clip;
   if (rate === null) return null;
-  const counted = isRising(numbers) ? numbers : numbers.map((_, row) => numbers[0] + row);
-  const start = printed === null ? await startOf(clip) : null;
-  const from = start === null ? 1 : counted[0];
-  return Float64Array.from({ length: nFrames }, (_, f) => (start ?? 0) + (counted[f] - from) / rate);
+  const { firstTime } = clip;
+  const from = firstTime === null ? 1 : numbers[0];
+  return Float64Array.from({ length: nFrames }, (_, f) => (firstTime ?? 0) + (numbers[f] - from) / rate);
 }
 
 /** The signal of times in seconds, null where there is none. */
@@ -51,8 +49,6 @@ function numbersOf({ frameNumbers, nFrames }) {
   });
   return numbers;
 }
-
-const isRising = (numbers) => numbers.every((number, f) => f === 0 || number > numbers[f - 1]);
 
 /** The times that the source gives to frame numbers, null where it gives none. */
 async function printedTimes({ clip, file, rate }, numbers) {
@@ -88,10 +84,4 @@ function usualStep(numbers) {
   const steps = numbers.slice(1).map((number, at) => number - numbers[at]).sort();
   const middle = steps.length >> 1;
   return Math.trunc(steps.length % 2 ? steps[middle] : (steps[middle - 1] + steps[middle]) / 2);
-}
-
-async function startOf({ file, index, metadata }) {
-  const told = (await file.metadata(index)) ?? metadata;
-  const text = told.get("start-time") ?? "";
-  return NUMBER.test(text) ? Number(text) : null;
 }

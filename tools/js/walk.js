@@ -4,7 +4,7 @@ import { wellKnownModel } from "./bases.js";
 import { hex } from "./bytes.js";
 import { readClipEnd } from "./cend.js";
 import { HEADER_SIZE, SIGNATURE_SIZE } from "./chunks.js";
-import { frameNumbers, readClip } from "./clip.js";
+import { readClip } from "./clip.js";
 import { COPIED, checkCopies } from "./copies.js";
 import { addSegment, readSegment } from "./data.js";
 import { Refused, Unsupported } from "./errors.js";
@@ -16,6 +16,7 @@ import { readQuality } from "./qual.js";
 import { sha256 } from "./sha256.js";
 import { Attachment, readAlias, readModel, readTemplate } from "./shared.js";
 import { readSkeleton } from "./skel.js";
+import { frameNumbers } from "./time-base.js";
 
 const ID_SIZE = 16;
 const BASE_PROFILE = 0;

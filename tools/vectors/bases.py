@@ -79,6 +79,12 @@ def plain() -> Base:
 
 
 @base
+def numbered(*numbers: int) -> Motion:
+    """The dance with these frame numbers."""
+    return motions.dance(len(numbers), frame_numbers=np.array(numbers))
+
+
+@base
 def odd() -> Base:
     return Base((take(ODD, "odd"),), None, (("odd.bvh", ODD),))
 

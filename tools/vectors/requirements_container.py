@@ -84,7 +84,6 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "C3D-17": ("invalid/sources/c3d-outputs-run-of-none-last",),
     "C3D-18": ("invalid/sources/c3d-outputs-many",),
     "C3D-15": ("valid/sources/c3d-*",),
-    "REG-01": ("valid/container/frame-numbers",),
 }
 
 _REWRITER = "of rewriters, and a decoder writes no file: shown by tests/"

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from mcz.clock import MAX_NUMBER
 from mcz.container import payloads
 from mcz.container.chunks import COPY, META, SIGNATURE
 from mcz.container.limits import ARCHIVE
 from mcz.container.metadata import Record
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import varint
 from tools.records import built
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.deflate import END, Bits, code_of, own_lengths
-from tools.vectors.build.edits import at, put
+from tools.vectors.build.edits import at, both, put
 from tools.vectors.build.files import Crafter, Vector, Whole, attached, file_of, finished, partial
 from tools.vectors.build.metadata import meta_of
 from tools.vectors.build.motions import HUNDREDTHS, dance, numbers
@@ -60,7 +60,7 @@ def _clips(shelf: Whole) -> None:
     shelf.hold("metadata", "CLIP; Registry", purpose, file_of(ntsc), ntsc)
     numbered = dance(frame_numbers=np.array([-3, -2, 10, 11]))
     purpose = "Frame numbers that do not begin at 1 and have a gap."
-    shelf.hold("frame-numbers", "Registry", purpose, file_of(numbered), numbered)
+    shelf.hold("frame-numbers", "Time", purpose, file_of(numbered), numbered)
     data = finished(Crafter(profile=ARCHIVE), dance())
     shelf.hold("archive-profile", "Limits and profiles", "The archive profile.", data, dance())
 
@@ -301,18 +301,33 @@ def _deflate(shelf: Whole) -> None:
 
 
 def _frame_numbers(shelf: Whole) -> None:
-    """The text says more than it must, or more than 2^53 - 1."""
+    """Time bases: what follows anyway, the greatest numbers, a first time, runs in CEND."""
     motion = dance(frame_numbers=np.array([5, 6, 9, 10]))
-    for name, text, purpose in (
-        ("more", "5 1:6 2:9 3:10", "Frame numbers that follow anyway are listed, too."),
-        ("great", "-9999999999999999 1:-1 2:9999999999999998", "Frame numbers of 16 digits."),
-    ):
-        data = file_of(motion, CLIP=_number_text(text))
-        shelf.hold(f"frame-numbers-{name}", "Registry; CLIP", purpose, data, motion)
-
-
-def _number_text(text: str) -> Any:
-    return put(payloads.Clip, "metadata.0.value", varint(len(text)) + text.encode())
+    usual = dance(frame_numbers=np.array([2, 3, 4, 5]))
+    data = file_of(usual, CLIP=put(payloads.Clip, "time_base.number", b"\2"))
+    purpose = "A time base that says what holds without one."
+    shelf.hold("frame-numbers-more", "Time; CLIP", purpose, data, usual)
+    great = dance(frame_numbers=np.array([-MAX_NUMBER, -1, 0, MAX_NUMBER]))
+    purpose = "Frame numbers up to 2^52 - 1, either sign."
+    shelf.hold("frame-numbers-great", "Time; CLIP", purpose, file_of(great), great)
+    timed = replace(motion, first_time=-0.1)
+    purpose = "The time of the first frame, and a gap after the second."
+    shelf.hold("first-time", "Time; CLIP", purpose, file_of(timed), timed)
+    timed = replace(timed, frame_rate=None)
+    purpose = "The time of the first frame where the frame rate is unknown."
+    shelf.hold("first-time-no-rate", "Time; CLIP", purpose, file_of(timed), timed)
+    runs = b"\2\1\1\2\7"
+    opened = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames", b"\0"))
+    data = file_of(dance(), CLIP=opened, CEND=put(payloads.Cend, "missing", runs))
+    purpose = (
+        "Two runs of missing frames of an open clip, which CEND states; CLIP has no time base."
+    )
+    shelf.hold("missing-open", "Time; CEND", purpose, data, dance())
+    based = put(payloads.Clip, "time_base.missing", b"\0")
+    opened = both(based, put(payloads.Clip, "flags", b"\5"), put(payloads.Clip, "n_frames", b"\0"))
+    data = file_of(timed, CLIP=opened, CEND=put(payloads.Cend, "missing", runs))
+    purpose = "Runs of missing frames that CEND states behind a time base of CLIP."
+    shelf.hold("missing-open-first-time", "Time; CEND", purpose, data, timed)
 
 
 def _words(shelf: Whole) -> None:

@@ -20,10 +20,11 @@ from mcz.container.chunks import ANCILLARY, REPEAT
 from mcz.container.limits import ARCHIVE, BASE
 from mcz.container.packets import END, SEGMENT, Packet, build_packet
 from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.time_base import missing_runs
 from mcz.container.value_hash import value_hash
 from mcz.container.versions import FORMAT
 from mcz.motion import Motion
-from mcz.schema import deflate, varint
+from mcz.schema import build, deflate, parse, varint
 from mcz.writing.clip_writer import write_skeleton
 from tools.records import built
 from tools.vectors.build.edits import both, plus, put
@@ -227,7 +228,7 @@ class _Maker:
         numbers = None
         if motion.n_frames and self.says("frame numbers", 0.2):
             steps = [chance.choice((1, 1, 1, 5, -7, 0)) for _ in range(motion.n_frames)]
-            numbers = np.cumsum(steps) + chance.randrange(-99, 99)
+            numbers = np.cumsum(np.maximum(steps, 1)) + chance.randrange(-99, 99)
         return replace(
             motion,
             frame_rate=rate,
@@ -263,8 +264,11 @@ class _Maker:
                 more = self.bytes()
                 edit = put(payloads.Clip, f"{place}.extension", varint(len(more)) + more)
                 clip_edits.append(edit)
+        gaps = b"\0"
         if opened:
             clip_edits.append(_opened)
+            runs = [] if motion.frame_numbers is None else missing_runs(motion.frame_numbers)
+            gaps = varint(len(runs)) + b"".join(varint(r.frames) + varint(r.length) for r in runs)
         if self.says("listed groups", 0.25):
             sizes = _sizes(made)
             listed = b"\3" + varint(len(sizes)) + b"".join(map(varint, sizes))
@@ -272,6 +276,7 @@ class _Maker:
         hashes = [value_hash(s.values, s.mask) for s in shown.signals]
         cend_edits = [
             put(payloads.Cend, "n_frames", varint(size)),
+            put(payloads.Cend, "missing", gaps),
             put(payloads.Cend, "value_sha256", varint(len(hashes)) + b"".join(hashes)),
             *self.extended(payloads.Cend, "CEND"),
         ]
@@ -296,10 +301,12 @@ def _sizes(made: Clip) -> list[int]:
 
 
 def _opened(payload: bytes) -> bytes:
-    """Flag bit 0, which is bit 0 of the byte behind the name."""
-    fields = put(payloads.Clip, "flags", b"\1")(payload)
-    rounded = put(payloads.Clip, "flags", b"\3")(payload)
-    return rounded if payload != put(payloads.Clip, "flags", b"\0")(payload) else fields
+    """CLIP with flag bit 0; the runs of missing frames go to CEND."""
+    fields = parse(payloads.Clip, payload, "CLIP")
+    if fields.time_base is not None:
+        fields.time_base.missing = []
+    fields.flags |= payloads.OPEN_CLIP
+    return build(fields, "CLIP")
 
 
 class _Odd(Crafter):

@@ -75,7 +75,7 @@ def _acclaim(shelf: Broken) -> None:
     motion = called(amc.read(AMC, "take", skeleton), "take.amc")
     data = file_of(replace(motion, frame_numbers=None))
     purpose = "Frame numbers with a gap, which the clip does not state."
-    shelf.add("AMC-frame-numbers", f"{HEADING}; Registry", purpose, data)
+    shelf.add("AMC-frame-numbers", f"{HEADING}; Time", purpose, data)
 
 
 def _other_skeletons(shelf: Unrestorable) -> None:

@@ -138,14 +138,14 @@ def _renumbered(shelf: Whole) -> None:
         ("", 7, "from 7 on"),
         ("-negative", -5, "from -5 on, which fields limit to 0"),
         ("-long", 70_000, "from 70,000 on, beyond a word"),
-        ("-great", 10**16 - 9, "from 10^16 - 9 on, beyond two words"),
+        ("-great", 2**52 - 4, "from 2^52 - 4 on, beyond two words"),
     )
     for name, first, what in cases:
         file = counted(4, 40, tail=BEHIND)
         motion = replace(take_c3d(file.build(), f"renumbered{name}"), frame_numbers=None)
         motion = replace(motion, frame_numbers=np.arange(first, first + 4))
         purpose = f"As many frames as the source file has, numbered {what}."
-        _hold(shelf, f"renumbered{name}", purpose, motion, f"{C3D_SPEC}; Registry")
+        _hold(shelf, f"renumbered{name}", purpose, motion, f"{C3D_SPEC}; Time")
     whole = take_c3d(c3d_rotations().build(), "renumbered-rotations")
     assert whole.source is not None
     fields = parse(C3dDetail, whole.source.detail, "detail")

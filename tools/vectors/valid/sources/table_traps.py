@@ -20,8 +20,8 @@ from tools.vectors.valid.sources.tables import odd_sections, take_table, with_fi
 def add(shelf: Whole) -> None:
     _hold(shelf, "sections-names", "Names that repeat, anew in each header; bytes above.", _names())
     odd = odd_sections("numbers.csv")
-    other = unhashed(replace(odd, frame_numbers=np.array([1, 5, 3])))
-    _hold(shelf, "sections-numbers", "A number is not as printed: it is another one.", other)
+    other = unhashed(replace(odd, frame_numbers=np.array([1, 3, 5])))
+    _hold(shelf, "sections-numbers", "Frames have got other numbers than were printed.", other)
     times = take_table(TIMES, "hidden.trc")
     mask = np.array([[True], [True], [True], [False]])
     hidden = replace(times.signals[1], mask=mask, role="")

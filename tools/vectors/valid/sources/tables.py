@@ -140,7 +140,7 @@ def odd_sections(name: str) -> Motion:
 def _clocks(shelf: Whole) -> None:
     """Times of frames that have other numbers, and of other clocks."""
     plain = take_table(MARKERS, "clock.trc")
-    numbers = unhashed(replace(plain, frame_numbers=np.array([-3, 0, 1, 10**12, 7])))
+    numbers = unhashed(replace(plain, frame_numbers=np.array([-3, 0, 1, 7, 10**12])))
     purpose = "Frames that have got other numbers, one of them below 0: their times follow."
     signals = tuple(replace(s, values=np.abs(s.values)) for s in numbers.signals)
     _hold(shelf, "clock-numbers", purpose, replace(numbers, signals=signals))
