@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from mcz.container.chunks import Chunk, check_chunk
+from mcz.container.chunks import Chunk
 from mcz.container.directory import parse_head
 from mcz.container.events import ChunkEvent, Event, Fault, PacketEvent
 from mcz.container.feeding import events
 from mcz.container.grammar import INDEX, START
-from mcz.container.index import parse_index
+from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import index_limit
 from mcz.container.packets import END
 from mcz.container.parser import ALL, Parser
@@ -136,9 +136,10 @@ class _Check:
             self._note(size, f"the file ends at {size} without a FOOT")
         elif index is not None and not self._has_lost:
             try:
-                data = self._source.read(index.offset, index.size)
-                listed = parse_index(check_chunk(data, index), index_limit(size))
-                found = self._places.differences(listed)
+                listed = read_indexes(
+                    self._source.read, index.offset, index.size, index_limit(size)
+                )
+                found = self._places.differences(directory_of(listed))
             except FormatError as error:
                 found = [str(error)]
             for text in found:

@@ -25,12 +25,14 @@ ANCILLARY = 1  # a reader that does not know the type skips the chunk
 SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
 KNOWN_FLAGS = ANCILLARY | SAFE_TO_COPY
 
+INDEX = b"INDX"  # flags: ANCILLARY alone
 REPEAT = b"REPT"  # flags: ANCILLARY alone
 COPY = b"COPY"  # flags: ANCILLARY alone, for what it says is true of this file only
 RECOVERY = b"RECV"  # flags: ANCILLARY alone
 META = b"META"  # flags: ANCILLARY and SAFE_TO_COPY
 # CHUNK-16, CHUNK-17, CHUNK-18, CHUNK-19, CHUNK-20
 FLAGS_OF = {
+    INDEX: ANCILLARY,
     b"QUAL": ANCILLARY | SAFE_TO_COPY,
     REPEAT: ANCILLARY,
     COPY: ANCILLARY,

@@ -116,9 +116,8 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
 
 def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
     """The COPY chunks of a file that belong to a clip; without clips all, up to a fault."""
-    rows = directory.clips.values()
-    if rows:
-        return [chunk for row in rows for chunk in row.ancillary if chunk.type == COPY]
+    if directory.clips:
+        return directory.clips.ancillary(COPY)
     found, at = [], len(SIGNATURE)
     with suppress(FormatError):
         while at < source.size:

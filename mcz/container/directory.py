@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    MutableMapping,
+    Sequence,
+)
+from copy import copy
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk
+from mcz.container.index_records import IndexedSegment
 from mcz.container.limits import PROFILES, Profile
 from mcz.container.segments import SegmentHeader
-from mcz.errors import FormatError, TruncatedError, UnsupportedError
-from mcz.schema import MAX_COUNT, parse, read_varint
+from mcz.errors import FormatError, UnsupportedError
+from mcz.schema import MAX_COUNT, Table, parse
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +77,8 @@ def _signal_row(signal: Any, clip: Any, where: str) -> SignalRow:
     return SignalRow(n_channels, signal.samples_per_frame, *codec, *cut)
 
 
-Packed = tuple[bytes, int, int]  # fields segments, cend_gap, cend_length of an indexed clip
+# Of an indexed clip: the columns of its segments, ``cend_gap`` and ``cend_length``.
+Packed = tuple["Table[IndexedSegment]", int, int]
 
 
 @dataclass(slots=True, eq=False)
@@ -147,7 +157,9 @@ class PackedClipRow(ClipRow):
     @property
     def cend(self) -> Chunk | None:
         if self._cend is None and self._packed is not None:
-            self._cend = cend_of(self._packed, self.clip.offset + self.clip.size)
+            table, gap, length = self._packed
+            inside = int(table.numbers("gap").sum() + table.numbers("size").sum())
+            self._cend = Chunk(b"CEND", 0, self.clip.offset + self.clip.size + inside + gap, length)
         return self._cend
 
     @cend.setter
@@ -157,22 +169,64 @@ class PackedClipRow(ClipRow):
         self._cend = chunk
 
 
-def cend_of(packed: Packed, at: int) -> Chunk:
-    """The CEND of a clip whose CLIP ends ``at``, its segments not looked into; FormatError."""
-    data, gap, length = packed
-    here, size = 0, len(data)
-    try:
-        while here < size:
-            before, here = read_varint(data, here)
-            own, here = read_varint(data, here)
-            at += before + own
-            for _ in range(5):  # signal, n_frames, lead, tail, flags
-                while data[here] >= 0x80:
-                    here += 1
-                here += 1
-    except IndexError:
-        raise TruncatedError("INDX: the segments of a clip run past their end") from None
-    return Chunk(b"CEND", 0, at + gap, length)
+class ClipRows(MutableMapping[str, ClipRow]):
+    """Rows by name, in file order; those of an index are made when they are asked for.
+
+    ``make`` makes the row of a number, and ``having`` are the numbers of clips with a type of
+    ancillary chunks.
+    """
+
+    def __init__(
+        self,
+        names: Iterable[str] = (),
+        make: Callable[[int], ClipRow] | None = None,
+        having: Callable[[bytes], Collection[int]] | None = None,
+    ) -> None:
+        self._rows: dict[str, ClipRow | int] = {name: n for n, name in enumerate(names)}
+        self._make, self._having = make, having
+
+    def __getitem__(self, name: str) -> ClipRow:
+        row = self._rows[name]
+        if isinstance(row, int):
+            assert self._make is not None
+            row = self._rows[name] = self._make(row)
+        return row
+
+    def __setitem__(self, name: str, row: ClipRow) -> None:
+        self._rows[name] = row
+
+    def __delitem__(self, name: str) -> None:
+        del self._rows[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __reversed__(self) -> Iterator[str]:
+        return reversed(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._rows
+
+    @property
+    def last(self) -> ClipRow | None:
+        """The row of the clip that came last, None without one."""
+        name = next(reversed(self._rows), None)
+        return None if name is None else self[name]
+
+    def copy(self) -> ClipRows:
+        """The same rows, to be added to."""
+        twin = copy(self)
+        twin._rows = dict(self._rows)
+        return twin
+
+    def ancillary(self, kind: bytes) -> list[Chunk]:
+        """The ancillary chunks of a type; no other row is made for it."""
+        few = set(self._having(kind)) if self._having is not None else ()
+        names = [n for n, row in self._rows.items() if not isinstance(row, int) or row in few]
+        return [chunk for name in names for chunk in self[name].ancillary if chunk.type == kind]
 
 
 @dataclass(slots=True)
@@ -182,16 +236,41 @@ class AttachmentRow:
     parts: list[Chunk]
 
 
+@dataclass(frozen=True, slots=True)
+class IndexPlace:
+    """An INDX of a file, and how many things it and those before it list.
+
+    ``n_bytes`` of its content say how much it lists alone.
+    """
+
+    offset: int
+    length: int  # bytes of the whole chunk
+    crc: int
+    n_bytes: int
+    n_shared: int
+    n_attachments: int
+    n_aliases: int
+    n_clips: int
+
+    @property
+    def stop(self) -> int:
+        return self.offset + self.length
+
+
 @dataclass(slots=True)
 class Directory:
-    """Everything in a file by name or id. ``end`` is the offset after the last FOOT."""
+    """Everything in a file by name or id. ``end`` is the offset after the last FOOT.
+
+    ``indexes``: the INDX that it was read from, each of which continues the one before.
+    """
 
     head: bytes = b""
     shared: dict[tuple[bytes, bytes], Chunk] = field(default_factory=dict)
     attachments: dict[str, AttachmentRow] = field(default_factory=dict)
     aliases: dict[str, tuple[int, bytes]] = field(default_factory=dict)
-    clips: dict[str, ClipRow] = field(default_factory=dict)
+    clips: ClipRows = field(default_factory=ClipRows)
     end: int = 0
+    indexes: tuple[IndexPlace, ...] = field(default=(), compare=False)
 
 
 def parse_head(payload: bytes) -> Profile:

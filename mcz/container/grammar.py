@@ -41,12 +41,10 @@ CRITICAL = {
 def thing_of(chunk: Chunk) -> str:
     """The row of the grammar that a closed chunk belongs to; raises FormatError for wrong flags."""
     thing = CRITICAL.get(chunk.type)
-    if thing is not None:
-        if chunk.flags:  # CHUNK-15
-            raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on a critical type")
-        return thing
-    if chunk.flags != FLAGS_OF.get(chunk.type, chunk.flags):
+    if chunk.flags != FLAGS_OF.get(chunk.type, 0 if thing else chunk.flags):  # CHUNK-15
         raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, not those of its type")
+    if thing is not None:
+        return thing
     if chunk.flags & ANCILLARY:  # CHUNK-12
         return OTHER
     raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")  # CHUNK-11

@@ -1,202 +1,196 @@
-"""INDX: the Directory of a file as bytes, and back.
+"""INDX: the Directory of a file as bytes, or what is new in it since another INDX.
 
-Both ways are written by hand, for an archive has tens of thousands of rows; the schema ``INDEX`` of
-``payloads.py`` states the same structure, and a test compares the two. The segments of a clip stay
-packed until somebody asks for them. SPEC.md, "INDX", is normative.
+SPEC.md, "INDX", is normative; ``index_reader.py`` has the way back.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+from itertools import islice
 from typing import Any
 
+import numpy as np
+
 from mcz.container import payloads
-from mcz.container.chunks import Chunk, build_chunk
-from mcz.container.cursor import Cursor
+from mcz.container.chunks import (
+    ANCILLARY,
+    FRAMING,
+    Chunk,
+    build_chunk,
+)
 from mcz.container.directory import (
-    AttachmentRow,
     ClipRow,
     Directory,
-    PackedClipRow,
-    SegmentRow,
-    SignalRow,
+    IndexPlace,
+    Packed,
 )
-from mcz.container.limits import check
-from mcz.container.packets import FRAME, NUMBERED, SEGMENT, SHORT
-from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.index_records import (
+    Index,
+    IndexedAlias,
+    IndexedAncillary,
+    IndexedAttachment,
+    IndexedChunk,
+    IndexedClip,
+    IndexedPart,
+    IndexedSegment,
+    IndexedSignal,
+)
+from mcz.container.packets import FRAME, NUMBERED, SEGMENT
 from mcz.errors import FormatError
-from mcz.schema import build, deflate, inflate, parse, varint
-from mcz.types import Settings
+from mcz.schema import Table, build, deflate
+from mcz.schema.columns import Numbers
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
 PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
+INDEXES = 4  # of these a writer leaves no more, so that few requests open a file
+GROWTH = 27  # times the bytes of what is new: a smaller INDX is made part of it
 
-# Each segment in the "segments" field of an indexed clip: (name, type, meaning).
-INDEXED_SEGMENT_FIELDS = (
-    ("gap", "varint", "bytes from the end of CLIP, or of the payload before, to this payload"),
-    ("size", "varint", "bytes of the payload"),
-    ("signal", "varint", "index of the signal"),
-    ("n_frames", "varint", "frames"),
-    ("lead", "varint", "as in DATA"),
-    ("tail", "varint", "as in DATA"),
-    (
-        "flags",
-        "varint",
-        "as in DATA; more where it is a packet: 128 of kind 1, 64 of kind 2, 32 of 3",
-    ),
-)
-ALIASED = (payloads.OF_CLIP, payloads.OF_SKELETON, payloads.OF_ATTACHMENT)
+SIGNAL = tuple(f.name for f in fields(IndexedSignal))
+SEGMENT_COLUMNS = tuple(f.name for f in fields(IndexedSegment))
 
 
 def build_index(directory: Directory) -> bytes:
-    """The whole INDX chunk."""
-    content = index_content(directory)
+    """The whole INDX chunk, which continues what the file has of them where that is larger."""
+    kept = list(directory.indexes)
+    while True:
+        content = index_content(directory, kept[-1] if kept else None)
+        if not kept or not (kept[-1].n_bytes < GROWTH * len(content) or len(kept) >= INDEXES):
+            break
+        kept.pop()
+    return index_chunk(content, kept[-1] if kept else None)
+
+
+def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
+    """The INDX chunk of this content."""
     record = payloads.Indx(size=len(content), data=deflate(content))
-    return build_chunk(b"INDX", build(record, "INDX"))
+    if since is not None:
+        place = payloads.PreviousIndex(offset=since.offset, length=since.length, crc=since.crc)
+        record.flags, record.previous = payloads.CONTINUES, place
+    return build_chunk(b"INDX", build(record, "INDX"), ANCILLARY)
 
 
-def index_content(directory: Directory) -> bytes:
-    """The index, not deflated yet."""
-    out = bytearray(_sized(directory.head))
-    out += varint(len(directory.shared))
-    for (kind, id_), chunk in directory.shared.items():
-        out += kind + id_ + _place(chunk)
-    out += varint(len(directory.attachments))
-    for held in directory.attachments.values():
-        out += _text(held.name) + varint(held.size) + varint(len(held.parts))
-        out += b"".join(map(_place, held.parts))
-    out += varint(len(directory.aliases))
-    for name, (of, target) in directory.aliases.items():
-        out += _text(name) + bytes((of,)) + _sized(target)
-    out += varint(len(directory.clips))
-    for clip in directory.clips.values():
-        out += _clip(clip)
-    return bytes(out)
+def index_content(directory: Directory, since: IndexPlace | None = None) -> bytes:
+    """The index of what is new ``since`` another one, not deflated yet."""
+    return build(index_record(directory, since), "INDX")
 
 
-def _sized(data: bytes) -> bytes:
-    return varint(len(data)) + data
+def index_record(directory: Directory, since: IndexPlace | None = None) -> Index:
+    """The same as a record."""
+    start = 0 if since is None else since.stop
+    shared = list(islice(directory.shared.items(), since.n_shared if since else 0, None))
+    skip = since.n_attachments if since else 0
+    attachments = [*islice(directory.attachments.values(), skip, None)]
+    aliases = list(islice(directory.aliases.items(), since.n_aliases if since else 0, None))
+    names = list(islice(directory.clips, since.n_clips if since else 0, None))
+    clips = [directory.clips[name] for name in names]
+    behind: list[Chunk] = []
+    if since is not None and since.n_clips:
+        last = next(islice(directory.clips, since.n_clips - 1, None))
+        behind = [chunk for chunk in directory.clips[last].ancillary if chunk.offset >= start]
+    return Index(
+        head=directory.head,
+        shared=Table.of(
+            IndexedChunk,
+            type=[kind for (kind, _), _ in shared],
+            id=[id_ for (_, id_), _ in shared],
+            **_places((chunk for _, chunk in shared), start),
+        ),
+        attachments=Table.of(
+            IndexedAttachment,
+            name=[row.name for row in attachments],
+            size=[row.size for row in attachments],
+            n_parts=[len(row.parts) for row in attachments],
+        ),
+        parts=Table.of(
+            IndexedPart, **_places((part for row in attachments for part in row.parts), start)
+        ),
+        aliases=Table.of(
+            IndexedAlias,
+            name=[name for name, _ in aliases],
+            of=[of for _, (of, _) in aliases],
+            target=[target for _, (_, target) in aliases],
+        ),
+        **_clip_tables(clips, behind, start),
+    )
 
 
-def _text(text: str) -> bytes:
-    return _sized(text.encode("utf-8"))
+def _places(chunks: Iterable[Chunk], end: int) -> dict[str, list[int]]:
+    """The columns ``gap`` and ``length`` of chunks in file order, behind ``end``."""
+    gaps, lengths = [], []
+    for chunk in chunks:
+        gaps.append(chunk.offset - end)
+        lengths.append(chunk.size - FRAMING)
+        end = chunk.offset + chunk.size
+    return {"gap": gaps, "length": lengths}
 
 
-def _varints(values: Iterable[int]) -> bytes:
-    return b"".join(map(varint, values))
+def _clip_tables(clips: Sequence[ClipRow], behind: Sequence[Chunk], start: int) -> dict[str, Any]:
+    """The fields of an index that are about clips."""
+    skeletons: dict[bytes, int] = {}
+    packed = [clip.packed or packed_segments(clip) for clip in clips]
+    ancillary: dict[str, list[int]] = {"gap": [], "length": []}
+    at, gaps = start, []
+    for name, column in _places(behind, start).items():
+        ancillary[name] += column
+    for clip in clips:
+        skeletons.setdefault(clip.skeleton, len(skeletons))
+        gaps.append(clip.clip.offset - at)
+        assert clip.cend is not None
+        at = clip.cend.offset + clip.cend.size
+        for name, column in _places(clip.ancillary, at).items():
+            ancillary[name] += column
+    signals = [signal for clip in clips for signal in clip.signals]
+    chunks = [*behind, *(chunk for clip in clips for chunk in clip.ancillary)]
+    return {
+        "skeletons": list(skeletons),
+        "clips": Table.of(
+            IndexedClip,
+            name=[clip.name for clip in clips],
+            skeleton=[skeletons[clip.skeleton] for clip in clips],
+            n_frames=[clip.n_frames for clip in clips],
+            rate_numerator=[clip.rate_numerator for clip in clips],
+            rate_denominator=[clip.rate_denominator for clip in clips],
+            n_signals=[len(clip.signals) for clip in clips],
+            gap=gaps,
+            length=[clip.clip.size - FRAMING for clip in clips],
+            n_segments=[len(table) for table, _, _ in packed],
+            cend_gap=[gap for _, gap, _ in packed],
+            cend_length=[length for _, _, length in packed],
+            n_ancillary=[len(clip.ancillary) for clip in clips],
+        ),
+        "signals": Table.of(
+            IndexedSignal, **{name: [getattr(s, name) for s in signals] for name in SIGNAL}
+        ),
+        "segments": Table.of(
+            IndexedSegment,
+            **{
+                name: np.concatenate(
+                    [np.zeros(0, np.int64), *(t.numbers(name) for t, _, _ in packed)]
+                )
+                for name in SEGMENT_COLUMNS
+            },
+        ),
+        "n_behind": len(behind),
+        "ancillary": Table.of(IndexedAncillary, type=[chunk.type for chunk in chunks], **ancillary),
+    }
 
 
-def _place(chunk: Chunk) -> bytes:
-    assert chunk.length is not None
-    return varint(chunk.offset) + varint(chunk.length)
+def _joined(columns: Iterable[Numbers]) -> Numbers:
+    return np.concatenate([np.zeros(0, np.int64), *columns])
 
 
-def _clip(clip: ClipRow) -> bytes:
-    segments, gap, length = clip.packed or packed_segments(clip)
-    rate = clip.rate_numerator, clip.rate_denominator
-    out = _text(clip.name) + clip.skeleton + _varints((clip.n_frames, *rate, len(clip.signals)))
-    for s in clip.signals:
-        kinds = s.n_channels, s.samples_per_frame, s.skip, s.spare, s.codec, s.codec_version
-        out += _varints(kinds)
-    out += _place(clip.clip) + _sized(segments) + _varints((gap, length, len(clip.ancillary)))
-    return out + b"".join(chunk.type + _place(chunk) for chunk in clip.ancillary)
-
-
-def packed_segments(clip: ClipRow) -> tuple[bytes, int, int]:
-    """The fields ``segments``, ``cend_gap`` and ``cend_length`` of a clip."""
+def packed_segments(clip: ClipRow) -> Packed:
+    """The segments of a clip as columns, and the fields ``cend_gap`` and ``cend_length``."""
     if clip.cend is None or clip.cend.length is None:
         raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
-    out, end = bytearray(), clip.clip.offset + clip.clip.size
+    rows, end = [], clip.clip.offset + clip.clip.size
     for row in clip.segments:
         header = row.header
-        fields = (row.offset - end, row.size, header.signal, header.n_frames)
         flags = header.flags | PACKETS.get(row.packet, 0)
-        out += _varints((*fields, header.lead, header.tail, flags))
+        covers = header.signal, header.n_frames, header.lead, header.tail
+        rows.append((row.offset - end, row.size, *covers, flags))
         end = row.stop
-    return bytes(out), clip.cend.offset - end, clip.cend.length
-
-
-def parse_index(payload: bytes, limit: int) -> Directory:
-    """The Directory in the payload of an INDX; ``limit`` bounds its inflated size."""
-    outer = parse(payloads.Indx, payload, "INDX")
-    check("INDX: inflated size", outer.size, limit)
-    return parse_content(inflate(outer.data, outer.size, "INDX"))
-
-
-def parse_content(content: bytes) -> Directory:
-    """The Directory in an index that was inflated."""
-    read = Cursor(content, "INDX")
-    directory = Directory(head=read.sized())
-    for _ in range(read.varint()):
-        key = read.take(4), read.take(16)
-        if key in directory.shared:
-            raise FormatError(f"INDX: two entries of {key[0]!r} have the id {key[1].hex()}")
-        directory.shared[key] = Chunk(key[0], 0, read.varint(), read.varint())
-    for _ in range(read.varint()):
-        name, size, n_parts = read.text(), read.varint(), read.varint()
-        parts = [Chunk(b"ATTA", 0, read.varint(), read.varint()) for _ in range(n_parts)]
-        if not parts:
-            raise FormatError(f"INDX: attachment {name!r} has no part")
-        _add(directory.attachments, name, AttachmentRow(name, size, parts))
-    for _ in range(read.varint()):
-        name, of = read.text(), read.take(1)[0]
-        if of not in ALIASED:
-            raise FormatError(f"INDX: alias {name!r} is one of {of}, not of 0, 1 or 2")
-        _add(directory.aliases, name, (of, read.sized()))
-    seen: dict[tuple[int, ...], SignalRow] = {}  # those of an archive are few
-    for _ in range(read.varint()):
-        row = _parse_clip(read, seen)
-        _add(directory.clips, row.name, row)
-    return directory
-
-
-def _add(table: Settings, name: str, row: object) -> None:
-    if name in table:
-        raise FormatError(f"INDX: two entries are named {name!r}")
-    table[name] = row
-
-
-def _parse_clip(read: Cursor, seen: dict[tuple[int, ...], SignalRow]) -> ClipRow:
-    number = read.varint
-    name, skeleton = read.text(), read.take(16)
-    n_frames, numerator, denominator = number(), number(), number()
-    signals = tuple(_parse_signal(number, seen) for _ in range(number()))
-    if not signals:
-        raise FormatError(f"INDX: clip {name!r} has no signal")
-    clip = Chunk(b"CLIP", 0, number(), number())
-    packed = read.sized(), number(), number()
-    ancillary = [Chunk(read.take(4), 1, number(), number()) for _ in range(number())]
-    row = PackedClipRow(name, skeleton, n_frames, numerator, denominator, signals, clip)
-    row.ancillary = ancillary
-    row.keep_packed(packed, parse_segments)
-    return row
-
-
-def _parse_signal(number: Any, seen: dict[tuple[int, ...], SignalRow]) -> SignalRow:
-    key = number(), number(), number(), number(), number(), number()
-    if key not in seen:
-        n_channels, samples, skip, spare, codec, version = key
-        seen[key] = SignalRow(n_channels, samples, codec, version, skip, spare)
-    return seen[key]
-
-
-def parse_segments(clip: ClipRow, packed: tuple[bytes, int, int]) -> tuple[list[SegmentRow], Chunk]:
-    """The segments of a clip, and its CEND."""
-    data, gap, length = packed
-    segments: list[SegmentRow] = []
-    at, first, where = 0, [0] * len(clip.signals), f"INDX: clip {clip.name!r}"
-    end = clip.clip.offset + clip.clip.size  # INDX-01
-    read = Cursor(data, where)
-    while read.at < len(data):
-        at, size, signal, n_frames, lead, tail, flags = (read.varint() for _ in range(7))
-        if signal >= len(first):
-            raise FormatError(f"{where} has a segment of signal {signal}")
-        kind = next((kind for kind, bit in PACKETS.items() if flags & bit), 0)
-        flags &= ~PACKETS.get(kind, 0)
-        header = SegmentHeader(signal, first[signal], n_frames, lead, tail, flags)
-        if kind in SHORT and header != SegmentHeader(0, first[0], 1, flags=flags & FRESH):
-            raise FormatError(f"{where} has {header} as a packet of kind {kind}")
-        segments.append(SegmentRow(end + at, size, header, kind))
-        first[signal] += n_frames
-        end += at + size
-    return segments, Chunk(b"CEND", 0, end + gap, length)
+    values = np.array(rows, np.int64).reshape(-1, len(SEGMENT_COLUMNS)).T
+    table = Table.of(IndexedSegment, **dict(zip(SEGMENT_COLUMNS, values, strict=True)))
+    return table, clip.cend.offset - end, clip.cend.length

@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
-from mcz.container.payloads import ID, Alia
-from mcz.schema import EXTENSION, SIZED, TEXT, UVARINT, Exactly, Record, counted, field
+from construct import Int8ul
+
+from mcz.container.payloads import ID, OF_ATTACHMENT, OF_CLIP, OF_SKELETON
+from mcz.schema import (
+    EXTENSION,
+    POSITIVE,
+    SIZED,
+    TEXT,
+    UVARINT,
+    Exactly,
+    Record,
+    Table,
+    columns,
+    counted,
+    field,
+    one_of,
+)
 
 
 class IndexedChunk(Record):
@@ -11,14 +26,7 @@ class IndexedChunk(Record):
 
     type: bytes = field(Exactly(4), "chunk type")
     id: bytes = field(ID, "id of the chunk")
-    offset: int = field(UVARINT, "offset of the chunk")
-    length: int = field(UVARINT, "bytes of its payload")
-
-
-class IndexedPart(Record):
-    """An ATTA in INDEX."""
-
-    offset: int = field(UVARINT, "offset of the chunk")
+    gap: int = field(UVARINT, "bytes to the chunk from the end of the one before")
     length: int = field(UVARINT, "bytes of its payload")
 
 
@@ -27,7 +35,39 @@ class IndexedAttachment(Record):
 
     name: str = field(TEXT, "relative path of the attached file")
     size: int = field(UVARINT, "bytes of the whole file")
-    parts: list[IndexedPart] = field(counted(IndexedPart), "its ATTA chunks, in order, at least 1")
+    n_parts: int = field(POSITIVE, "its ATTA chunks, at least 1")
+
+
+class IndexedPart(Record):
+    """An ATTA in INDEX."""
+
+    gap: int = field(UVARINT, "bytes to the chunk from the end of the one before")
+    length: int = field(UVARINT, "bytes of its payload")
+
+
+class IndexedAlias(Record):
+    """An ALIA in INDEX."""
+
+    name: str = field(TEXT, "as in ALIA")
+    of: int = field(one_of(Int8ul, (OF_CLIP, OF_SKELETON, OF_ATTACHMENT)), "as in ALIA")
+    target: bytes = field(SIZED, "as in ALIA")
+
+
+class IndexedClip(Record):
+    """A clip in INDEX."""
+
+    name: str = field(TEXT, "name of the clip")
+    skeleton: int = field(UVARINT, "index in skeletons")
+    n_frames: int = field(UVARINT, "frames")
+    rate_numerator: int = field(UVARINT, "frame rate, numerator; 0: unknown")
+    rate_denominator: int = field(POSITIVE, "frame rate, denominator")
+    n_signals: int = field(POSITIVE, "its signals, at least 1")
+    gap: int = field(UVARINT, "bytes to CLIP from the end of the CEND before")
+    length: int = field(UVARINT, "bytes of the payload of CLIP")
+    n_segments: int = field(UVARINT, "its segments")
+    cend_gap: int = field(UVARINT, "bytes to CEND from the end of the last segment, or of CLIP")
+    cend_length: int = field(UVARINT, "bytes of the payload of CEND")
+    n_ancillary: int = field(UVARINT, "ancillary chunks between CEND and the next clip")
 
 
 class IndexedSignal(Record):
@@ -41,41 +81,44 @@ class IndexedSignal(Record):
     codec_version: int = field(UVARINT, "codec version")
 
 
+class IndexedSegment(Record):
+    """A segment in INDEX."""
+
+    gap: int = field(UVARINT, "bytes to the payload from the end of the payload before, or of CLIP")
+    size: int = field(UVARINT, "bytes of the payload")
+    signal: int = field(UVARINT, "index of the signal")
+    n_frames: int = field(UVARINT, "frames")
+    lead: int = field(UVARINT, "as in DATA")
+    tail: int = field(UVARINT, "as in DATA")
+    flags: int = field(
+        UVARINT, "as in DATA; more where it is a packet: 128 of kind 1, 64 of kind 2, 32 of 3"
+    )
+
+
 class IndexedAncillary(Record):
     """An ancillary chunk in INDEX."""
 
     type: bytes = field(Exactly(4), "chunk type")
-    offset: int = field(UVARINT, "offset of the chunk")
+    gap: int = field(UVARINT, "bytes to the chunk from the end of the one before, or of CEND")
     length: int = field(UVARINT, "bytes of its payload")
-
-
-class IndexedClip(Record):
-    """A clip in INDEX."""
-
-    name: str = field(TEXT, "name of the clip")
-    skeleton: bytes = field(ID, "id of its SKEL chunk")
-    n_frames: int = field(UVARINT, "frames")
-    rate_numerator: int = field(UVARINT, "frame rate, numerator; 0: unknown")
-    rate_denominator: int = field(UVARINT, "frame rate, denominator")
-    signals: list[IndexedSignal] = field(counted(IndexedSignal), "its signals")
-    offset: int = field(UVARINT, "offset of the CLIP chunk")
-    length: int = field(UVARINT, "bytes of its payload")
-    segments: bytes = field(SIZED, "its segments, seven varints each")
-    cend_gap: int = field(UVARINT, "bytes between the last segment (or CLIP) and CEND")
-    cend_length: int = field(UVARINT, "bytes of the payload of CEND")
-    ancillary: list[IndexedAncillary] = field(
-        counted(IndexedAncillary), "ancillary chunks between CEND and the next clip"
-    )
 
 
 class Index(Record):
     """The content of INDX, inflated."""
 
     head: bytes = field(SIZED, "payload of HEAD")
-    shared: list[IndexedChunk] = field(
-        counted(IndexedChunk), "SKEL, MODL and SRCE chunks, the first of each id"
+    shared: Table[IndexedChunk] = field(
+        columns(IndexedChunk), "SKEL, MODL and SRCE chunks, the first of each id"
     )
-    attachments: list[IndexedAttachment] = field(counted(IndexedAttachment), "attached files")
-    aliases: list[Alia] = field(counted(Alia), "copies of the ALIA chunks")
-    clips: list[IndexedClip] = field(counted(IndexedClip), "the clips, in file order")
+    attachments: Table[IndexedAttachment] = field(columns(IndexedAttachment), "attached files")
+    parts: Table[IndexedPart] = field(columns(IndexedPart), "the parts of all attached files")
+    aliases: Table[IndexedAlias] = field(columns(IndexedAlias), "aliases")
+    skeletons: list[bytes] = field(counted(ID), "ids of the SKEL of clips, each once")
+    clips: Table[IndexedClip] = field(columns(IndexedClip), "the clips")
+    signals: Table[IndexedSignal] = field(columns(IndexedSignal), "the signals of all clips")
+    segments: Table[IndexedSegment] = field(columns(IndexedSegment), "the segments of all clips")
+    n_behind: int = field(UVARINT, "the first ancillary chunks, of the last clip of INDX before")
+    ancillary: Table[IndexedAncillary] = field(
+        columns(IndexedAncillary), "the ancillary chunks of all clips"
+    )
     extension: bytes = field(EXTENSION, "ignored", default=b"")

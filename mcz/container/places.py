@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mcz.container.chunks import Chunk
+from mcz.container.chunks import INDEX, Chunk
 from mcz.container.directory import ClipRow, Directory
 
 _PLACE = struct.Struct("<QQB")  # of a segment: offset, size, kind of its packet
@@ -54,7 +54,7 @@ class Places:
             clip.cend = chunk
         elif chunk.type == b"DATA" and chunk.length is not None:
             clip.segment(chunk.payload_offset, chunk.length)
-        elif chunk.flags and clip.cend is not None:
+        elif chunk.flags and chunk.type != INDEX and clip.cend is not None:
             clip.ancillary.append(chunk)
 
     def differences(self, listed: Directory) -> list[str]:

@@ -13,9 +13,8 @@ from weakref import finalize
 from mcz.container import payloads
 from mcz.container.attachments import joined_parts
 from mcz.container.chunks import (
-    CRC,
     FOOT,
-    HEADER,
+    FRAMING,
     META,
     SIGNATURE,
     Chunk,
@@ -37,7 +36,7 @@ from mcz.container.directory import (
     parse_head,
     signal_rows,
 )
-from mcz.container.index import parse_index
+from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.metadata import Placed, Record, Remembered, applied, records_in
 from mcz.container.overlay import Overlay
@@ -130,7 +129,7 @@ class Container:
             return scan(self.source).directory
         self.index = foot
         head = None if self.source.remote else self._head()  # HEAD-01
-        directory = self._index(foot, tail)
+        directory = self._directory(foot, tail)
         directory.end = self.source.size
         if head not in (None, directory.head):
             raise FormatError("HEAD is not what the index says")
@@ -156,20 +155,20 @@ class Container:
             raise TruncatedError(f"the file ends at {self.source.size} without a FOOT")
         return foot
 
-    def _index(self, foot: Foot, tail: bytes) -> Directory:
-        start = foot.index_offset - (self.source.size - len(tail))
-        stop = start + foot.index_length
-        length = foot.index_length - HEADER.size - CRC.size
-        if length < 0:
+    def _directory(self, foot: Foot, tail: bytes) -> Directory:
+        """What INDX says, and those that it continues."""
+        if foot.index_length < FRAMING:
             raise FormatError(f"FOOT: an index of {foot.index_length} bytes")
-        chunk = Chunk(b"INDX", 0, foot.index_offset, length)
-        data = tail[start:stop] if start >= 0 else self._outside(foot, tail, -start)
-        return parse_index(check_chunk(data, chunk), index_limit(self.source.size))
+        begin = self.source.size - len(tail)
 
-    def _outside(self, foot: Foot, tail: bytes, missing: int) -> bytes:
-        """The INDX chunk, its first ``missing`` bytes read now, the others from ``tail``."""
-        head = self.source.read(foot.index_offset, min(missing, foot.index_length))
-        return head + tail[: foot.index_length - len(head)]
+        def fetch(offset: int, length: int) -> bytes:
+            if offset >= begin:
+                return tail[offset - begin :][:length]
+            missing = self.source.read(offset, min(begin - offset, length))
+            return missing + tail[: length - len(missing)]
+
+        limit = index_limit(self.source.size)
+        return directory_of(read_indexes(fetch, foot.index_offset, foot.index_length, limit))
 
     def payload(self, chunk: Chunk) -> bytes:
         """The checked payload of ``chunk``."""
@@ -181,8 +180,7 @@ class Container:
     @cached_property
     def _records(self) -> Placed:
         """What META chunks say of each name, read once."""
-        rows = self.directory.clips.values()
-        chunks = [chunk for row in rows for chunk in row.ancillary if chunk.type == META]
+        chunks = self.directory.clips.ancillary(META)
         return records_in(chunks, self.payload, self.source.size, lenient=self.salvage)
 
     def said_of(self, name: str) -> list[Record]:

@@ -23,7 +23,7 @@ from mcz.container.chunks import (
 )
 from mcz.container.copies import Copy, parse_copies
 from mcz.container.directory import Directory, Found, parse_head
-from mcz.container.index import parse_index
+from mcz.container.index_reader import Listed, directory_of, read_indexes
 from mcz.container.limits import BASE, index_limit
 from mcz.container.overlay import Overlay
 from mcz.container.packets import read_packets
@@ -205,12 +205,16 @@ def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
 
 
 def _last_index(source: ByteSource, found: Found) -> Directory | None:
-    """The last index of a damaged file, where it is whole."""
+    """What the last INDX says that is whole, and those that it continues up to a damaged one."""
     for chunk in reversed(found.chunks):
         if chunk.type == b"INDX":
+            whole: list[Listed] = []
             with suppress(FormatError):
-                payload = read_payload(source, chunk, chunk.size)
-                return parse_index(payload, index_limit(source.size))
+                limit = index_limit(source.size)
+                whole.extend(read_indexes(source.read, chunk.offset, chunk.size, limit))
+            with suppress(FormatError):
+                if whole:
+                    return directory_of(whole)
     return None
 
 

@@ -24,6 +24,7 @@ from mcz.container.directory import (
 )
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.grammar import CRITICAL, OTHER
+from mcz.container.index_check import IndexCheck
 from mcz.container.limits import check, index_limit
 from mcz.container.parser import ALL, PASS, Parser
 from mcz.container.segments import parse_header
@@ -53,6 +54,7 @@ class Scanner:
         self.clip: ClipRow | None = None
         self.first: list[int] = []  # the next frame of each signal of the open clip
         self._size, self._whole, self._payload_of = size, whole, payload_of
+        self._indexes = IndexCheck()
         self._templates: dict[bytes, int] = {}  # the source format of each SRCE
         self._model_bytes = 0
         self._sourced: set[tuple[int, bytes]] = set()  # what aliases may stand for
@@ -231,14 +233,14 @@ class Scanner:
     def _index(self, chunk: Chunk, payload: bytes) -> None:
         if self.strict and self._size is not None:  # STRICT-04
             limit = index_limit(self._size)
-            strict.check_index(payload, chunk, self.found.directory, limit)  # INDX-02, STRICT-04
+            self._indexes.check(payload, chunk, self.found.directory, limit)  # INDX-02, STRICT-04
 
     def _ancillary(self, chunk: Chunk, payload: bytes) -> None:
         if self.strict:
             self._check_ancillary(chunk, payload)
-        if self.clip is None and self.found.directory.clips:
-            last = next(reversed(self.found.directory.clips))
-            self.found.directory.clips[last].ancillary.append(chunk)
+        last = self.found.directory.clips.last
+        if self.clip is None and last is not None:
+            last.ancillary.append(chunk)
 
     def _check_ancillary(self, chunk: Chunk, payload: bytes) -> None:
         if chunk.type == META and self.clip is not None:  # META-02

@@ -9,9 +9,7 @@ from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
 
 from mcz.container import payloads
-from mcz.container.chunks import Chunk
-from mcz.container.directory import ClipRow, Directory
-from mcz.container.index import parse_index
+from mcz.container.directory import Directory
 from mcz.container.limits import Profile, check
 from mcz.container.packed import parse_skel, words
 from mcz.container.skeletons import parse_skeleton
@@ -113,33 +111,3 @@ def check_target(fields: payloads.Alia, where: str, sourced: Collection[tuple[in
     """Check that what an alias stands for is there before it, and can be restored."""
     if (fields.of, bytes(fields.target)) not in sourced:  # GRAM-04
         raise FormatError(f"chunk {where}: nothing before it with a source is {fields.target!r}")
-
-
-def check_index(payload: bytes, chunk: Chunk, directory: Directory, limit: int) -> None:
-    """Compare INDX with what the walk has found."""
-    listed = parse_index(payload, limit)
-    if listed.head != directory.head:
-        raise FormatError("its copy of HEAD differs from HEAD", where=f"chunk {chunk.label}")
-    for what in ("shared", "attachments", "aliases", "clips"):
-        ours, theirs = getattr(directory, what), getattr(listed, what)
-        if list(ours) != list(theirs):  # INDX-04, INDX-05
-            raise FormatError(
-                f"it lists other {what} than there are, or in another order",
-                where=f"chunk {chunk.label}",
-            )
-        for key, row in ours.items():
-            if row != theirs[key]:  # INDX-05
-                raise FormatError(
-                    f"{_name(key)} is {_short(row)}, but INDX says {_short(theirs[key])}",
-                    where=f"chunk {chunk.label}",
-                )
-
-
-def _name(key: str | tuple[bytes, bytes]) -> str:
-    return repr(key) if isinstance(key, str) else f"{key[0].decode('latin-1')} {key[1].hex()}"
-
-
-def _short(row: object) -> str:
-    if isinstance(row, ClipRow):
-        return f"{row.n_frames} frames in {len(row.segments)} segments, {row.signals}, {row.clip}"
-    return str(row)

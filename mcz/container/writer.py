@@ -176,8 +176,9 @@ class Writer:
         """Write an ancillary chunk; between clips it belongs to the clip before."""
         flags = ANCILLARY | (SAFE_TO_COPY if safe_to_copy else 0)
         chunk = self.chunk(kind, payload, flags)
-        if self._clip is None and self.directory.clips:
-            self.directory.clips[next(reversed(self.directory.clips))].ancillary.append(chunk)
+        last = self.directory.clips.last
+        if self._clip is None and last is not None:
+            last.ancillary.append(chunk)
 
     def begin_clip(self, record: payloads.Clip, n_channels: Sequence[int]) -> None:
         """Write CLIP; ``n_channels`` of each signal is for the index."""

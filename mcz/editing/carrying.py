@@ -14,6 +14,7 @@ from mcz.container import payloads
 from mcz.container.chunks import (
     COPY,
     FOOT,
+    INDEX,
     META,
     RECOVERY,
     SAFE_TO_COPY,
@@ -23,7 +24,8 @@ from mcz.container.chunks import (
     read_chunk,
 )
 from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
-from mcz.container.index import packed_segments, parse_segments
+from mcz.container.index import packed_segments
+from mcz.container.index_reader import parse_segments
 from mcz.container.metadata import Record, as_one
 from mcz.container.packed import parse_skel
 from mcz.container.packets import read_packets
@@ -111,7 +113,7 @@ class Carrier:
                 at += FOOT.size
                 continue
             chunk = read_chunk(source, at)
-            if chunk.flags:
+            if chunk.flags and chunk.type != INDEX:
                 self.ancillary(chunk)
             at += chunk.size
 

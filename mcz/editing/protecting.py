@@ -145,7 +145,7 @@ def chunk_bytes(shape: Shape, packets: Iterator[bytes]) -> Iterator[bytes]:
 
 def _settled(directory: Directory, start: int, end: int, redundancy: float) -> tuple[Shape, bytes]:
     """The shape, and the INDX and FOOT that name a chunk of its size."""
-    last = next(reversed(directory.clips.values()), None)
+    last = directory.clips.last
     t_size = FOOT.size
     for _ in range(TRIES):
         shape = shape_for(start, end - start, t_size, redundancy)

@@ -74,8 +74,8 @@ def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress 
 
 def _clip_at(repairer: Repairer, offset: int) -> str:
     """The clip of the new file that lies at ``offset``; "" where none does."""
-    rows = repairer.writer.directory.clips.values()
-    return next((row.name for row in reversed(rows) if row.clip.offset <= offset), "")
+    rows = repairer.writer.directory.clips
+    return next((name for name in reversed(rows) if rows[name].clip.offset <= offset), "")
 
 
 def _gone(container: Container) -> Iterator[str]:

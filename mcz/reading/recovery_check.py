@@ -17,9 +17,8 @@ from mcz.recovery.shape import Shape
 
 def recovery_chunks(container: Container) -> list[Chunk]:
     """The RECV chunks of a file; without a clip no index lists them, and the file is walked."""
-    rows = container.directory.clips.values()
-    if rows:
-        return [c for row in rows for c in row.ancillary if c.type == RECOVERY]
+    if container.directory.clips:
+        return container.directory.clips.ancillary(RECOVERY)
     return [chunk for chunk in scan(container.source).chunks if chunk.type == RECOVERY]
 
 

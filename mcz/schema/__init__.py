@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+from mcz.schema.columns import Table as Table
+from mcz.schema.columns import columns as columns
 from mcz.schema.deflating import MAX_RATIO as MAX_RATIO
 from mcz.schema.deflating import deflate as deflate
 from mcz.schema.deflating import inflate as inflate

@@ -94,5 +94,5 @@ class Draft:
 def _snapshot(directory: Directory) -> Directory:
     kept = copy(directory)
     for name in ("shared", "attachments", "aliases", "clips"):
-        setattr(kept, name, dict(getattr(directory, name)))
+        setattr(kept, name, getattr(directory, name).copy())
     return kept

@@ -1,0 +1,309 @@
+"""INDX as a Directory: tables are read in bulk, rows of clips made when they are asked for.
+
+SPEC.md, "INDX", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from mcz.container import payloads
+from mcz.container.chunks import (
+    ANCILLARY,
+    CRC,
+    FRAMING,
+    Chunk,
+    check_chunk,
+)
+from mcz.container.directory import (
+    AttachmentRow,
+    ClipRow,
+    ClipRows,
+    Directory,
+    IndexPlace,
+    Packed,
+    PackedClipRow,
+    SegmentRow,
+    SignalRow,
+)
+from mcz.container.index import PACKETS, SEGMENT_COLUMNS, SIGNAL
+from mcz.container.index_records import (
+    Index,
+)
+from mcz.container.limits import check
+from mcz.container.packets import SHORT
+from mcz.container.segments import FRESH, SegmentHeader
+from mcz.errors import FormatError
+from mcz.schema import MAX_COUNT, Table, inflate, parse
+from mcz.schema.columns import Numbers
+
+MOST_INDEXES = 8  # that continue each other
+
+T = TypeVar("T")
+Fetch = Callable[[int, int], bytes]  # the bytes at an offset, so many
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """An INDX that was read: where it lies, what it continues, and its content."""
+
+    offset: int
+    length: int
+    crc: int
+    previous: payloads.PreviousIndex | None
+    n_bytes: int
+    index: Index
+
+    @property
+    def start(self) -> int:
+        """The offset from which on it lists what there is."""
+        return 0 if self.previous is None else self.previous.offset + self.previous.length
+
+
+def parse_index(data: bytes, offset: int, limit: int) -> Listed:
+    """The INDX in ``data``, the bytes of the whole chunk at ``offset``.
+
+    ``limit`` bounds its inflated size.
+    """
+    chunk = Chunk(b"INDX", ANCILLARY, offset, len(data) - FRAMING)
+    outer = parse(payloads.Indx, check_chunk(data, chunk), "INDX")
+    index = parse(Index, inflated(outer, limit), "INDX")
+    (crc,) = CRC.unpack(data[-CRC.size :])
+    if outer.previous is not None:
+        check_order(outer.previous, offset)
+    return Listed(offset, len(data), crc, outer.previous, outer.size, index)
+
+
+def inflated(outer: payloads.Indx, limit: int) -> bytes:
+    """The content of an INDX."""
+    check("INDX: inflated size", outer.size, limit)
+    return inflate(outer.data, outer.size, "INDX")
+
+
+def check_order(previous: payloads.PreviousIndex, offset: int) -> None:
+    """Refuse an INDX at ``offset`` that continues one which does not lie before it."""
+    if previous.length < FRAMING or previous.offset + previous.length > offset:  # INDX-06
+        raise FormatError(
+            f"INDX at {offset} continues one of {previous.length} bytes at {previous.offset}"
+        )
+
+
+def read_indexes(fetch: Fetch, offset: int, length: int, limit: int) -> Iterator[Listed]:
+    """The INDX chunk there, then the one that it continues, and so on; raises FormatError."""
+    crc: int | None = None
+    for _ in range(MOST_INDEXES):
+        listed = parse_index(fetch(offset, length), offset, limit)
+        if crc not in (None, listed.crc):  # INDX-06
+            raise FormatError(f"INDX at {offset} is not the one that another continues")
+        yield listed
+        if listed.previous is None:
+            return
+        offset, length, crc = listed.previous.offset, listed.previous.length, listed.previous.crc
+    raise FormatError(f"more than {MOST_INDEXES} INDX continue each other")  # INDX-07
+
+
+def directory_of(found: Iterable[Listed]) -> Directory:
+    """The Directory that these say together, the last one first."""
+    each = list(found)[::-1]
+    directory = Directory(head=each[-1].index.head)
+    clips = _Clips()
+    for listed in each:
+        if listed.index.head != directory.head:
+            raise FormatError("two INDX differ in their copies of HEAD")
+        _add_shared(directory, listed)
+        _add_attachments(directory, listed)
+        for row in listed.index.aliases:
+            _add(directory.aliases, row.name, (row.of, row.target))
+        clips.add(_ClipTables(listed))
+        chunk = Chunk(b"INDX", ANCILLARY, listed.offset, listed.length - FRAMING)
+        directory.clips = ClipRows(clips.names, clips.row, clips.having)
+        directory.indexes += (place_of(chunk, listed.crc, listed.n_bytes, directory),)
+    if len(directory.clips) < len(clips.names):
+        raise FormatError("INDX: two clips have the same name")
+    return directory
+
+
+def place_of(chunk: Chunk, crc: int, n_bytes: int, directory: Directory) -> IndexPlace:
+    """The place of an INDX, behind which ``directory`` is all there is so far."""
+    return IndexPlace(
+        chunk.offset,
+        chunk.size,
+        crc,
+        n_bytes,
+        len(directory.shared),
+        len(directory.attachments),
+        len(directory.aliases),
+        len(directory.clips),
+    )
+
+
+def _add_shared(directory: Directory, listed: Listed) -> None:
+    table = listed.index.shared
+    for kind, id_, chunk in zip(
+        table.blobs("type"), table.blobs("id"), _chunks(table, listed.start), strict=True
+    ):
+        if (kind, id_) in directory.shared:
+            raise FormatError(f"INDX: two entries of {kind!r} have the id {id_.hex()}")
+        directory.shared[kind, id_] = Chunk(kind, 0, chunk.offset, chunk.length)
+
+
+def _add_attachments(directory: Directory, listed: Listed) -> None:
+    table, chunks = listed.index.attachments, _chunks(listed.index.parts, listed.start)
+    bounds = _bounds(table.numbers("n_parts"), len(chunks), "parts").tolist()
+    for row, first, stop in zip(table, bounds[:-1], bounds[1:], strict=True):
+        _add(directory.attachments, row.name, AttachmentRow(row.name, row.size, chunks[first:stop]))
+
+
+def _add(table: dict[str, T], name: str, row: T) -> None:
+    if name in table:
+        raise FormatError(f"INDX: two entries are named {name!r}")
+    table[name] = row
+
+
+def _bounds(counts: Numbers, total: int, what: str) -> Numbers:
+    """Where the items of each begin in a table of ``total`` items, and where the last ones end."""
+    if counts.sum(dtype=np.float64) != total:  # INDX-08
+        raise FormatError(f"INDX: {what} are not as many as their counts say")
+    return np.concatenate(([0], np.cumsum(counts)))
+
+
+def _ends(sizes: Numbers, start: int) -> Numbers:
+    """Where things of these sizes end that lie one after the other from ``start`` on."""
+    if start + sizes.sum(dtype=np.float64) > MAX_COUNT:  # CONV-01
+        raise FormatError("INDX: an offset beyond 2^53 - 1")
+    return start + np.cumsum(sizes)
+
+
+def _chunks(table: Table[Any], start: int, kind: bytes = b"ATTA") -> list[Chunk]:
+    """The chunks of a table with ``gap`` and ``length``, the first behind ``start``."""
+    lengths = table.numbers("length")
+    ends = _ends(table.numbers("gap") + lengths + FRAMING, start)
+    offsets = (ends - lengths - FRAMING).tolist()
+    return [Chunk(kind, 0, at, n) for at, n in zip(offsets, lengths.tolist(), strict=True)]
+
+
+class _ClipTables:
+    """The clips that one INDX lists."""
+
+    def __init__(self, listed: Listed) -> None:
+        index = listed.index
+        clips = self.clips = index.clips
+        self.index, self.start = index, listed.start
+        self.names = clips.texts("name")
+        self.signal_bounds = _bounds(clips.numbers("n_signals"), len(index.signals), "signals")
+        self.segment_bounds = _bounds(clips.numbers("n_segments"), len(index.segments), "segments")
+        behind = np.concatenate(([index.n_behind], clips.numbers("n_ancillary")))
+        self.ancillary_bounds = _bounds(behind, len(index.ancillary), "ancillary chunks")
+        if len(clips) and int(clips.numbers("skeleton").max()) >= len(index.skeletons):  # INDX-08
+            raise FormatError("INDX: a clip of a skeleton that it does not list")
+        self.offsets = self._offsets()
+        self._signals: dict[tuple[int, ...], SignalRow] = {}  # those of an archive are few
+
+    def _offsets(self) -> Numbers:
+        """The offset of each CLIP."""  # INDX-01
+        number = self.clips.numbers
+        segments = self.index.segments
+        inside = np.concatenate(([0], _ends(segments.numbers("gap") + segments.numbers("size"), 0)))
+        data = np.diff(inside[self.segment_bounds])
+        rest = number("length") + data + number("cend_gap") + number("cend_length") + 2 * FRAMING
+        return _ends(number("gap") + rest, self.start) - rest
+
+    def row(self, number: int) -> ClipRow:
+        """The row of a clip."""
+        fields = self.clips[number]
+        first, stop = self.segment_bounds[number : number + 2]
+        row = PackedClipRow(
+            fields.name,
+            self.index.skeletons[fields.skeleton],
+            fields.n_frames,
+            fields.rate_numerator,
+            fields.rate_denominator,
+            self.signals(number),
+            Chunk(b"CLIP", 0, int(self.offsets[number]), fields.length),
+        )
+        packed = self.index.segments[first:stop], fields.cend_gap, fields.cend_length
+        row.keep_packed(packed, parse_segments)
+        if fields.n_ancillary:
+            assert row.cend is not None
+            row.ancillary = self.ancillary(number + 1, row.cend.offset + row.cend.size)
+        return row
+
+    def signals(self, number: int) -> tuple[SignalRow, ...]:
+        first, stop = self.signal_bounds[number : number + 2].tolist()
+        found = []
+        for index in range(first, stop):
+            key = tuple(int(self.index.signals.numbers(name)[index]) for name in SIGNAL)
+            if key not in self._signals:
+                self._signals[key] = SignalRow(**dict(zip(SIGNAL, key, strict=True)))
+            found.append(self._signals[key])
+        return tuple(found)
+
+    def ancillary(self, group: int, start: int) -> list[Chunk]:
+        """The ancillary chunks behind clip ``group`` - 1, or of group 0 behind the clips before."""
+        first, stop = self.ancillary_bounds[group : group + 2]
+        table = self.index.ancillary[first:stop]
+        return [
+            Chunk(kind, ANCILLARY, chunk.offset, chunk.length)
+            for kind, chunk in zip(table.blobs("type"), _chunks(table, start), strict=True)
+        ]
+
+    def having(self, kind: bytes) -> Iterator[int]:
+        """The groups that have an ancillary chunk of a type."""
+        found = [n for n, one in enumerate(self.index.ancillary.blobs("type")) if one == kind]
+        yield from (np.searchsorted(self.ancillary_bounds, found, side="right") - 1).tolist()
+
+
+class _Clips:
+    """The clips of several INDX, in file order."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self._tables: list[tuple[int, _ClipTables]] = []  # with the number of the first clip
+        self._behind: dict[int, list[Chunk]] = {}
+
+    def add(self, tables: _ClipTables) -> None:
+        if tables.index.n_behind:
+            if not self.names:
+                raise FormatError("INDX: ancillary chunks of a clip before the first")
+            chunks = tables.ancillary(0, tables.start)
+            self._behind.setdefault(len(self.names) - 1, []).extend(chunks)
+        self._tables.append((len(self.names), tables))
+        self.names += tables.names
+
+    def row(self, number: int) -> ClipRow:
+        """The row of a clip."""
+        first, tables = next(pair for pair in reversed(self._tables) if pair[0] <= number)
+        row = tables.row(number - first)
+        row.ancillary += self._behind.get(number, ())
+        return row
+
+    def having(self, kind: bytes) -> set[int]:
+        """The numbers of the clips with an ancillary chunk of a type."""
+        return {
+            first + group - 1 for first, tables in self._tables for group in tables.having(kind)
+        }
+
+
+def parse_segments(clip: ClipRow, packed: Packed) -> tuple[list[SegmentRow], Chunk]:
+    """The segments of a clip, and its CEND."""
+    table, cend_gap, length = packed
+    segments: list[SegmentRow] = []
+    first, where = [0] * len(clip.signals), f"INDX: clip {clip.name!r}"
+    end = clip.clip.offset + clip.clip.size  # INDX-01
+    lists = [table.numbers(name).tolist() for name in SEGMENT_COLUMNS]
+    for gap, size, signal, n_frames, lead, tail, flags in zip(*lists, strict=True):
+        if signal >= len(first):
+            raise FormatError(f"{where} has a segment of signal {signal}")
+        kind = next((kind for kind, bit in PACKETS.items() if flags & bit), 0)
+        flags &= ~PACKETS.get(kind, 0)
+        header = SegmentHeader(signal, first[signal], n_frames, lead, tail, flags)
+        if kind in SHORT and header != SegmentHeader(0, first[0], 1, flags=flags & FRESH):
+            raise FormatError(f"{where} has {header} as a packet of kind {kind}")
+        segments.append(SegmentRow(end + gap, size, header, kind))
+        first[signal] += n_frames
+        end += gap + size
+    return segments, Chunk(b"CEND", 0, end + cend_gap, length)
