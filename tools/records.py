@@ -7,15 +7,17 @@ mappings, which become the records of ``mcz.schema``.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import Any, TypeVar
 
 import construct
+import numpy as np
 
-from mcz.schema import Record, build
+from mcz.schema import Record, build, read_varint
+from mcz.schema.columns import Columns, read_column, read_varints
 from mcz.schema.records import RecordType
-from mcz.schema.types import Counted
+from mcz.schema.types import Checked, Counted, Exactly, Sized
 
 R = TypeVar("R", bound=Record)
 
@@ -69,11 +71,14 @@ def span(kind: Any, payload: bytes, path: str) -> tuple[int, int]:
     """
     stream, type_ = BytesIO(payload), kind
     start = 0
-    for name in path.split("."):
+    names = path.split(".")
+    for depth, name in enumerate(names):
         stream.seek(start)
         context = empty_context()
-        while not isinstance(type_, type | RecordType | Counted):
+        while not isinstance(type_, type | RecordType | Counted | Columns):
             type_ = _inner(type_)
+        if isinstance(type_, Columns):
+            return _span_in_columns(type_, payload, start, path, names[depth:])
         if isinstance(type_, Counted):
             count = type_.count(stream, context, "")
             if not int(name) < count:
@@ -84,12 +89,46 @@ def span(kind: Any, payload: bytes, path: str) -> tuple[int, int]:
             items = record.rows
         for field, inner in items:
             start, type_ = stream.tell(), inner
+            if field == name and isinstance(inner, Columns) and name != names[-1]:
+                break  # it need not be sound
             context[field] = inner._parsereport(stream, context, "")
             if field == name:
                 break
         else:
             raise KeyError(path)
     return start, stream.tell()
+
+
+def _span_in_columns(
+    type_: Columns, payload: bytes, start: int, path: str, rest: Sequence[str]
+) -> tuple[int, int]:
+    """The range of a value in a table by columns: "3.name", or "3.name.size" of its length."""
+    count, at = read_varint(payload, start)
+    number, wanted, *size = rest
+    data = np.frombuffer(payload, np.uint8)
+    if int(number) >= count:
+        raise KeyError(path)
+    for name, kind in type_.rows:
+        if name == wanted:
+            return _span_in_column(kind, data, at, count, int(number), bool(size))
+        _, at = read_column(kind, data, at, count)
+    raise KeyError(path)
+
+
+def _span_in_column(
+    kind: Any, data: np.ndarray, at: int, count: int, number: int, is_size: bool
+) -> tuple[int, int]:
+    while isinstance(kind, Checked):
+        kind = kind.subcon
+    if kind is construct.Int8ul or isinstance(kind, Exactly):
+        size = kind.sizeof()
+        return at + number * size, at + (number + 1) * size
+    first = read_varints(data, at, number)[1] if number else at
+    own = first, read_varints(data, first, 1)[1]
+    if not isinstance(kind, Sized) or is_size:
+        return own
+    sizes, at = read_varints(data, at, count)
+    return at + int(sizes[:number].sum()), at + int(sizes[: number + 1].sum())
 
 
 def update(record: Record, changes: Mapping[str, Any]) -> None:

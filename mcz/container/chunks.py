@@ -64,6 +64,11 @@ class Chunk:
         return self.length + FRAMING
 
     @property
+    def stop(self) -> int:
+        """The offset after it."""
+        return self.offset + self.size
+
+    @property
     def label(self) -> str:
         return f"{self.type.decode('latin-1')} at {self.offset}"
 

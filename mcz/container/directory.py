@@ -159,7 +159,7 @@ class PackedClipRow(ClipRow):
         if self._cend is None and self._packed is not None:
             table, gap, length = self._packed
             inside = int(table.numbers("gap").sum() + table.numbers("size").sum())
-            self._cend = Chunk(b"CEND", 0, self.clip.offset + self.clip.size + inside + gap, length)
+            self._cend = Chunk(b"CEND", 0, self.clip.stop + inside + gap, length)
         return self._cend
 
     @cend.setter

@@ -5,10 +5,9 @@ SPEC.md, "INDX", is normative; ``index_reader.py`` has the way back.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
@@ -46,8 +45,8 @@ PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
 INDEXES = 4  # of these a writer leaves no more, so that few requests open a file
 GROWTH = 27  # times the bytes of what is new: a smaller INDX is made part of it
 
-SIGNAL = tuple(f.name for f in fields(IndexedSignal))
-SEGMENT_COLUMNS = tuple(f.name for f in fields(IndexedSegment))
+SIGNAL_ROW = tuple(f.name for f in fields(IndexedSignal))
+SEGMENT_ROW = tuple(f.name for f in fields(IndexedSegment))
 
 
 def build_index(directory: Directory) -> bytes:
@@ -77,42 +76,113 @@ def index_content(directory: Directory, since: IndexPlace | None = None) -> byte
 
 def index_record(directory: Directory, since: IndexPlace | None = None) -> Index:
     """The same as a record."""
-    start = 0 if since is None else since.stop
-    shared = list(islice(directory.shared.items(), since.n_shared if since else 0, None))
-    skip = since.n_attachments if since else 0
-    attachments = [*islice(directory.attachments.values(), skip, None)]
-    aliases = list(islice(directory.aliases.items(), since.n_aliases if since else 0, None))
-    names = list(islice(directory.clips, since.n_clips if since else 0, None))
-    clips = [directory.clips[name] for name in names]
-    behind: list[Chunk] = []
-    if since is not None and since.n_clips:
-        last = next(islice(directory.clips, since.n_clips - 1, None))
-        behind = [chunk for chunk in directory.clips[last].ancillary if chunk.offset >= start]
-    return Index(
+    if since is None:
+        return Listing(directory).record()
+    new = Directory(
         head=directory.head,
-        shared=Table.of(
-            IndexedChunk,
-            type=[kind for (kind, _), _ in shared],
-            id=[id_ for (_, id_), _ in shared],
-            **_places((chunk for _, chunk in shared), start),
-        ),
-        attachments=Table.of(
-            IndexedAttachment,
-            name=[row.name for row in attachments],
-            size=[row.size for row in attachments],
-            n_parts=[len(row.parts) for row in attachments],
-        ),
-        parts=Table.of(
-            IndexedPart, **_places((part for row in attachments for part in row.parts), start)
-        ),
-        aliases=Table.of(
-            IndexedAlias,
-            name=[name for name, _ in aliases],
-            of=[of for _, (of, _) in aliases],
-            target=[target for _, (_, target) in aliases],
-        ),
-        **_clip_tables(clips, behind, start),
+        shared=dict(islice(directory.shared.items(), since.n_shared, None)),
+        attachments=dict(islice(directory.attachments.items(), since.n_attachments, None)),
+        aliases=dict(islice(directory.aliases.items(), since.n_aliases, None)),
     )
+    for name in islice(directory.clips, since.n_clips, None):
+        new.clips[name] = directory.clips[name]
+    behind: list[Chunk] = []
+    if since.n_clips:
+        last = directory.clips[next(islice(directory.clips, since.n_clips - 1, None))]
+        behind = [chunk for chunk in last.ancillary if chunk.offset >= since.stop]
+    return Listing(new, since.stop, behind).record()
+
+
+@dataclass(slots=True)
+class Listing:
+    """What an index lists: all of ``new``, which lies behind ``start``.
+
+    ``behind``: new ancillary chunks of the clip before.
+    """
+
+    new: Directory
+    start: int = 0
+    behind: list[Chunk] = field(default_factory=list)
+
+    def record(self) -> Index:
+        """The content of INDX; raises FormatError for a clip without CEND."""
+        attachments, clips = list(self.new.attachments.values()), list(self.new.clips.values())
+        parts = [part for row in attachments for part in row.parts]
+        signals = [signal for clip in clips for signal in clip.signals]
+        tables = [clip.packed or packed_segments(clip) for clip in clips]
+        skeletons = {id_: n for n, id_ in enumerate(dict.fromkeys(c.skeleton for c in clips))}
+        return Index(
+            head=self.new.head,
+            shared=Table.of(
+                IndexedChunk,
+                type=[kind for kind, _ in self.new.shared],
+                id=[id_ for _, id_ in self.new.shared],
+                **_places(self.new.shared.values(), self.start),
+            ),
+            attachments=Table.of(
+                IndexedAttachment,
+                name=[row.name for row in attachments],
+                size=[row.size for row in attachments],
+                n_parts=[len(row.parts) for row in attachments],
+            ),
+            parts=Table.of(IndexedPart, **_places(parts, self.start)),
+            aliases=Table.of(
+                IndexedAlias,
+                name=list(self.new.aliases),
+                of=[of for of, _ in self.new.aliases.values()],
+                target=[target for _, target in self.new.aliases.values()],
+            ),
+            skeletons=list(skeletons),
+            clips=self._clips(clips, tables, skeletons),
+            signals=Table.of(
+                IndexedSignal, **{name: [getattr(s, name) for s in signals] for name in SIGNAL_ROW}
+            ),
+            segments=Table.of(
+                IndexedSegment,
+                **{n: _joined(table.numbers(n) for table, _, _ in tables) for n in SEGMENT_ROW},
+            ),
+            n_behind=len(self.behind),
+            ancillary=self._ancillary(clips),
+        )
+
+    def _clips(
+        self, clips: Sequence[ClipRow], tables: Sequence[Packed], skeletons: Mapping[bytes, int]
+    ) -> Table[IndexedClip]:
+        ends = [self.start, *(_cend_of(clip).stop for clip in clips)]
+        return Table.of(
+            IndexedClip,
+            name=[clip.name for clip in clips],
+            skeleton=[skeletons[clip.skeleton] for clip in clips],
+            n_frames=[clip.n_frames for clip in clips],
+            rate_numerator=[clip.rate_numerator for clip in clips],
+            rate_denominator=[clip.rate_denominator for clip in clips],
+            n_signals=[len(clip.signals) for clip in clips],
+            gap=[clip.clip.offset - end for clip, end in zip(clips, ends, strict=False)],
+            length=[clip.clip.size - FRAMING for clip in clips],
+            n_segments=[len(table) for table, _, _ in tables],
+            cend_gap=[gap for _, gap, _ in tables],
+            cend_length=[length for _, _, length in tables],
+            n_ancillary=[len(clip.ancillary) for clip in clips],
+        )
+
+    def _ancillary(self, clips: Sequence[ClipRow]) -> Table[IndexedAncillary]:
+        groups = [
+            (self.behind, self.start),
+            *((clip.ancillary, _cend_of(clip).stop) for clip in clips),
+        ]
+        places = [_places(chunks, start) for chunks, start in groups]
+        return Table.of(
+            IndexedAncillary,
+            type=[chunk.type for chunks, _ in groups for chunk in chunks],
+            gap=[gap for columns in places for gap in columns["gap"]],
+            length=[length for columns in places for length in columns["length"]],
+        )
+
+
+def _cend_of(clip: ClipRow) -> Chunk:
+    if clip.cend is None or clip.cend.length is None:
+        raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
+    return clip.cend
 
 
 def _places(chunks: Iterable[Chunk], end: int) -> dict[str, list[int]]:
@@ -121,59 +191,8 @@ def _places(chunks: Iterable[Chunk], end: int) -> dict[str, list[int]]:
     for chunk in chunks:
         gaps.append(chunk.offset - end)
         lengths.append(chunk.size - FRAMING)
-        end = chunk.offset + chunk.size
+        end = chunk.stop
     return {"gap": gaps, "length": lengths}
-
-
-def _clip_tables(clips: Sequence[ClipRow], behind: Sequence[Chunk], start: int) -> dict[str, Any]:
-    """The fields of an index that are about clips."""
-    skeletons: dict[bytes, int] = {}
-    packed = [clip.packed or packed_segments(clip) for clip in clips]
-    ancillary: dict[str, list[int]] = {"gap": [], "length": []}
-    at, gaps = start, []
-    for name, column in _places(behind, start).items():
-        ancillary[name] += column
-    for clip in clips:
-        skeletons.setdefault(clip.skeleton, len(skeletons))
-        gaps.append(clip.clip.offset - at)
-        assert clip.cend is not None
-        at = clip.cend.offset + clip.cend.size
-        for name, column in _places(clip.ancillary, at).items():
-            ancillary[name] += column
-    signals = [signal for clip in clips for signal in clip.signals]
-    chunks = [*behind, *(chunk for clip in clips for chunk in clip.ancillary)]
-    return {
-        "skeletons": list(skeletons),
-        "clips": Table.of(
-            IndexedClip,
-            name=[clip.name for clip in clips],
-            skeleton=[skeletons[clip.skeleton] for clip in clips],
-            n_frames=[clip.n_frames for clip in clips],
-            rate_numerator=[clip.rate_numerator for clip in clips],
-            rate_denominator=[clip.rate_denominator for clip in clips],
-            n_signals=[len(clip.signals) for clip in clips],
-            gap=gaps,
-            length=[clip.clip.size - FRAMING for clip in clips],
-            n_segments=[len(table) for table, _, _ in packed],
-            cend_gap=[gap for _, gap, _ in packed],
-            cend_length=[length for _, _, length in packed],
-            n_ancillary=[len(clip.ancillary) for clip in clips],
-        ),
-        "signals": Table.of(
-            IndexedSignal, **{name: [getattr(s, name) for s in signals] for name in SIGNAL}
-        ),
-        "segments": Table.of(
-            IndexedSegment,
-            **{
-                name: np.concatenate(
-                    [np.zeros(0, np.int64), *(t.numbers(name) for t, _, _ in packed)]
-                )
-                for name in SEGMENT_COLUMNS
-            },
-        ),
-        "n_behind": len(behind),
-        "ancillary": Table.of(IndexedAncillary, type=[chunk.type for chunk in chunks], **ancillary),
-    }
 
 
 def _joined(columns: Iterable[Numbers]) -> Numbers:
@@ -182,15 +201,14 @@ def _joined(columns: Iterable[Numbers]) -> Numbers:
 
 def packed_segments(clip: ClipRow) -> Packed:
     """The segments of a clip as columns, and the fields ``cend_gap`` and ``cend_length``."""
-    if clip.cend is None or clip.cend.length is None:
-        raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
-    rows, end = [], clip.clip.offset + clip.clip.size
+    cend = _cend_of(clip)
+    rows, end = [], clip.clip.stop
     for row in clip.segments:
         header = row.header
         flags = header.flags | PACKETS.get(row.packet, 0)
         covers = header.signal, header.n_frames, header.lead, header.tail
         rows.append((row.offset - end, row.size, *covers, flags))
         end = row.stop
-    values = np.array(rows, np.int64).reshape(-1, len(SEGMENT_COLUMNS)).T
-    table = Table.of(IndexedSegment, **dict(zip(SEGMENT_COLUMNS, values, strict=True)))
-    return table, clip.cend.offset - end, clip.cend.length
+    values = np.array(rows, np.int64).reshape(-1, len(SEGMENT_ROW)).T
+    table = Table.of(IndexedSegment, **dict(zip(SEGMENT_ROW, values, strict=True)))
+    return table, cend.offset - end, cend.size - FRAMING

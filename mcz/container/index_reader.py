@@ -30,7 +30,7 @@ from mcz.container.directory import (
     SegmentRow,
     SignalRow,
 )
-from mcz.container.index import PACKETS, SEGMENT_COLUMNS, SIGNAL
+from mcz.container.index import PACKETS, SEGMENT_ROW, SIGNAL_ROW
 from mcz.container.index_records import (
     Index,
 )
@@ -118,7 +118,7 @@ def directory_of(found: Iterable[Listed]) -> Directory:
         _add_attachments(directory, listed)
         for row in listed.index.aliases:
             _add(directory.aliases, row.name, (row.of, row.target))
-        clips.add(_ClipTables(listed))
+        clips.add(ClipTables(listed))
         chunk = Chunk(b"INDX", ANCILLARY, listed.offset, listed.length - FRAMING)
         directory.clips = ClipRows(clips.names, clips.row, clips.having)
         directory.indexes += (place_of(chunk, listed.crc, listed.n_bytes, directory),)
@@ -186,7 +186,7 @@ def _chunks(table: Table[Any], start: int, kind: bytes = b"ATTA") -> list[Chunk]
     return [Chunk(kind, 0, at, n) for at, n in zip(offsets, lengths.tolist(), strict=True)]
 
 
-class _ClipTables:
+class ClipTables:
     """The clips that one INDX lists."""
 
     def __init__(self, listed: Listed) -> None:
@@ -229,16 +229,16 @@ class _ClipTables:
         row.keep_packed(packed, parse_segments)
         if fields.n_ancillary:
             assert row.cend is not None
-            row.ancillary = self.ancillary(number + 1, row.cend.offset + row.cend.size)
+            row.ancillary = self.ancillary(number + 1, row.cend.stop)
         return row
 
     def signals(self, number: int) -> tuple[SignalRow, ...]:
         first, stop = self.signal_bounds[number : number + 2].tolist()
         found = []
         for index in range(first, stop):
-            key = tuple(int(self.index.signals.numbers(name)[index]) for name in SIGNAL)
+            key = tuple(int(self.index.signals.numbers(name)[index]) for name in SIGNAL_ROW)
             if key not in self._signals:
-                self._signals[key] = SignalRow(**dict(zip(SIGNAL, key, strict=True)))
+                self._signals[key] = SignalRow(**dict(zip(SIGNAL_ROW, key, strict=True)))
             found.append(self._signals[key])
         return tuple(found)
 
@@ -262,13 +262,13 @@ class _Clips:
 
     def __init__(self) -> None:
         self.names: list[str] = []
-        self._tables: list[tuple[int, _ClipTables]] = []  # with the number of the first clip
+        self._tables: list[tuple[int, ClipTables]] = []  # with the number of the first clip
         self._behind: dict[int, list[Chunk]] = {}
 
-    def add(self, tables: _ClipTables) -> None:
-        if tables.index.n_behind:
-            if not self.names:
-                raise FormatError("INDX: ancillary chunks of a clip before the first")
+    def add(self, tables: ClipTables) -> None:
+        if tables.index.n_behind and not (self.names or tables.start):
+            raise FormatError("INDX: ancillary chunks of a clip before the first")
+        if tables.index.n_behind and self.names:
             chunks = tables.ancillary(0, tables.start)
             self._behind.setdefault(len(self.names) - 1, []).extend(chunks)
         self._tables.append((len(self.names), tables))
@@ -293,8 +293,8 @@ def parse_segments(clip: ClipRow, packed: Packed) -> tuple[list[SegmentRow], Chu
     table, cend_gap, length = packed
     segments: list[SegmentRow] = []
     first, where = [0] * len(clip.signals), f"INDX: clip {clip.name!r}"
-    end = clip.clip.offset + clip.clip.size  # INDX-01
-    lists = [table.numbers(name).tolist() for name in SEGMENT_COLUMNS]
+    end = clip.clip.stop  # INDX-01
+    lists = [table.numbers(name).tolist() for name in SEGMENT_ROW]
     for gap, size, signal, n_frames, lead, tail, flags in zip(*lists, strict=True):
         if signal >= len(first):
             raise FormatError(f"{where} has a segment of signal {signal}")

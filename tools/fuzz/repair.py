@@ -17,6 +17,7 @@ from unittest import mock
 import mcz
 from mcz.container import payloads
 from mcz.container.chunks import (
+    ANCILLARY,
     CRC,
     FOOT,
     OPEN_LENGTH,
@@ -49,7 +50,6 @@ from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
 from mcz.schema import build, deflate, inflate, parse, read_varint, varint
-from tools.records import built
 
 SHARED = (b"SKEL", b"SRCE", b"MODL")  # chunks with an id
 MOST_TABLE = 4096  # bytes of a stream table that is looked for
@@ -152,7 +152,8 @@ def _index_of(data: bytes) -> bytes:
         try:
             found = scan(whole, salvage=True)
             directory = found.directory
-            directory.clips = {n: row for n, row in directory.clips.items() if row.cend is not None}
+            for name in [n for n, row in directory.clips.items() if row.cend is None]:
+                del directory.clips[name]
             head = next((chunk for chunk in found.chunks if chunk.type == b"HEAD"), None)
             directory.head = _payload(data, head) if head else directory.head
         except MczError:
@@ -169,11 +170,10 @@ def _payload(data: bytes, chunk: Chunk) -> bytes:
 
 def changed_index(index: bytes, change: Callable[[bytes], bytes]) -> bytes:
     """The INDX chunk with its inflated content passed through ``change``."""
-    start = len(index) - CRC.size
-    outer = parse(payloads.Indx, index[16:start], "INDX")
+    outer = parse(payloads.Indx, index[16 : -CRC.size], "INDX")
     content = change(inflate(outer.data, outer.size, "INDX"))
-    fields = {"size": len(content), "data": deflate(content)}
-    return build_chunk(b"INDX", built(payloads.Indx, fields, "INDX"))
+    outer.size, outer.data = len(content), deflate(content)
+    return build_chunk(b"INDX", build(outer, "INDX"), ANCILLARY)
 
 
 def with_payload(pieces: Sequence[Piece], which: int, payload: bytes) -> Pieces:

@@ -29,7 +29,7 @@ const FLAGS_OF = {
   CLIP: 0,
   DATA: 0,
   CEND: 0,
-  INDX: 0,
+  INDX: FLAG_ANCILLARY,
   QUAL: FLAG_ANCILLARY | FLAG_SAFE_TO_COPY,
   REPT: FLAG_ANCILLARY,
   COPY: FLAG_ANCILLARY,
@@ -51,10 +51,11 @@ export function checkSignature(bytes) {
 /**
  * @typedef {object} Chunk
  * @property {string} type four letters
- * @property {boolean} ancillary
+ * @property {boolean} ancillary INDX is not, for it is a part of the grammar
  * @property {boolean} open an open DATA: its packets follow, `payload` and `end` are null
  * @property {number} offset where the chunk begins in the file
  * @property {Uint8Array | null} payload
+ * @property {number} [crc] of a closed chunk
  * @property {number | null} end where the chunk ends, its crc included
  */
 
@@ -73,9 +74,10 @@ export function readChunk(bytes, offset, payloadLimit) {
   within(length, payloadLimit, `bytes of ${type} at ${offset}`);
   const payload = reader.take(length);
   const crcAt = reader.at;
-  if (reader.u32() !== crc32(bytes, offset, crcAt)) reader.refuse("the crc is wrong");
+  const crc = reader.u32();
+  if (crc !== crc32(bytes, offset, crcAt)) reader.refuse("the crc is wrong");
   if (!ancillary && !(type in FLAGS_OF)) throw new Unsupported(`critical chunks ${type}`);
-  return { type, ancillary, open, offset, payload, end: reader.at };
+  return { type, ancillary, open, offset, payload, crc, end: reader.at };
 }
 
 /**
@@ -102,7 +104,7 @@ export function readHeader(bytes, offset) {
     reader.refuse("reserved bits are set");
   }
   checkFlags(type, flags, reader);
-  const ancillary = (flags & FLAG_ANCILLARY) !== 0;
+  const ancillary = (flags & FLAG_ANCILLARY) !== 0 && type !== "INDX";
   if (allOnes && type === "DATA") return { type, ancillary, open: true, length: null, reader };
   reader.at = lengthAt;
   return { type, ancillary, open: false, length: reader.u64(), reader };

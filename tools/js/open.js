@@ -11,7 +11,7 @@ import {
 } from "./chunks.js";
 import { clipList } from "./clip-list.js";
 import { DecodedRuns } from "./decoded-runs.js";
-import { readIndex } from "./directory.js";
+import { readDirectory } from "./directory.js";
 import { Refused } from "./errors.js";
 import { readHead } from "./head.js";
 import { decodedLimit, within } from "./limits.js";
@@ -19,7 +19,7 @@ import { guarded, guardedLater } from "./memory.js";
 import { apply, readRecords } from "./metadata.js";
 import { supplied } from "./missing.js";
 import { openClip } from "./ranged-clip.js";
-import { Ranges, payloadIn } from "./ranges.js";
+import { Ranges } from "./ranges.js";
 import { salvaged } from "./salvage.js";
 import { SharedChunks } from "./shared-chunks.js";
 import { Attachment } from "./shared.js";
@@ -63,19 +63,27 @@ async function directoryOf(ranges, limit) {
   }
   if (foot === null || foot.indexLength === 0) return walked(ranges, limit);
   const { indexOffset: offset, indexLength } = foot;
-  const length = indexLength - FRAMING_SIZE;
   const end = size - FOOT_SIZE;
-  if (length < 0 || offset + indexLength !== end || indexLength > MOST_INDEX) {
+  if (indexLength < FRAMING_SIZE || offset + indexLength !== end) {
     throw new Refused(`FOOT at ${end}: an index of ${indexLength} bytes at ${offset}`);
   }
-  const before = offset < start ? await ranges.read(offset, start) : new Uint8Array(0);
-  const bytes = new Uint8Array(indexLength);
-  bytes.set(before);
-  const from = Math.max(0, offset - start);
-  bytes.set(tail.subarray(from, tail.length - FOOT_SIZE), before.length);
-  const directory = readIndex(payloadIn(bytes, { type: "INDX", offset, length }), size);
+  const read = (at, n) => bytesOf(ranges, at, n, start, tail);
+  const directory = await readDirectory(read, offset, indexLength, size);
   if (!ranges.remote) await compareHead(ranges, directory.head);
   return directory;
+}
+
+/** The bytes of an INDX, those from `start` on out of `tail`. */
+async function bytesOf(ranges, offset, length, start, tail) {
+  within(length, MOST_INDEX, "bytes of an index");
+  const stop = offset + length;
+  if (offset >= start) return tail.subarray(offset - start, stop - start);
+  const before = await ranges.read(offset, Math.min(start, stop));
+  if (stop <= start) return before;
+  const bytes = new Uint8Array(length);
+  bytes.set(before);
+  bytes.set(tail.subarray(0, stop - start), before.length);
+  return bytes;
 }
 
 /** The FOOT at the end of a file; null where there is none. */

@@ -1,6 +1,6 @@
 // SPEC.md, "Salvage": what a damaged file still holds, with what its copies give back.
 
-import { readIndex } from "./directory.js";
+import { readDirectory } from "./directory.js";
 import { MczError, Refused } from "./errors.js";
 import { readHead } from "./head.js";
 import { decodedLimit } from "./limits.js";
@@ -33,7 +33,7 @@ export async function salvaged(ranges, limit = decodedLimit(ranges.size)) {
       await scan.run();
     }
   }
-  const listed = scan.damage.losses.length > 0 ? indexIn(scan.lastIndex, ranges.size) : null;
+  const listed = scan.damage.losses.length > 0 ? await indexIn(scan.lastIndex, better) : null;
   const owners = scan.hasDoubts && listed !== null ? ownersOf(listed) : new Map();
   if (owners.size > 0) {
     scan = new Scan(better, limit, scan.repeated, owners);
@@ -46,10 +46,13 @@ export async function salvaged(ranges, limit = decodedLimit(ranges.size)) {
   return { ranges: better, directory: { ...directory, damage } };
 }
 
-/** What the last index says that is whole, null without one. */
-function indexIn(payload, fileBytes) {
+/** What the last index says that is whole, and those that it continues; null without one. */
+async function indexIn(index, ranges) {
+  if (index === null) return null;
+  const { offset, end } = index;
+  const read = (at, length) => ranges.read(at, at + length);
   try {
-    return payload === null ? null : readIndex(payload, fileBytes);
+    return await readDirectory(read, offset, end - offset, ranges.size, true);
   } catch (error) {
     if (!(error instanceof Refused)) throw error;
     return null;

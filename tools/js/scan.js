@@ -61,7 +61,7 @@ export class Scan extends Walk {
     this.faultAt = null; // where what cannot be taken in began, up to here
     this.isInDoubt = false; // the open clip may have ended in bytes that are lost
     this.hasDoubts = false;
-    this.lastIndex = null; // payload of the last INDX that is whole
+    this.lastIndex = null; // the last INDX that is whole
     const { skeletons, templates } = this.file;
     this.references = {
       ...this.file,
@@ -223,7 +223,7 @@ export class Scan extends Walk {
   readInBody(chunk) {
     const { type } = chunk;
     if (type === "DATA" || type === "CEND") this.orphan(chunk);
-    else if (type === "INDX") [this.index, this.lastIndex] = [chunk, chunk.payload];
+    else if (type === "INDX") [this.index, this.lastIndex] = [chunk, chunk];
     else super.readInBody(chunk);
   }
 

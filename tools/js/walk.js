@@ -68,6 +68,7 @@ export class Walk {
     this.lastClip = null; // the clip that ended last
     this.attachment = null; // the attachment of which a part came last, until it is complete
     this.index = null; // the INDX that came last, until its FOOT
+    this.indexes = []; // all so far
     this.endOfFoot = 0; // of the last FOOT
     this.copied = new Map(); // the chunks so far that a COPY may have, by offset
   }
@@ -263,7 +264,7 @@ export class Walk {
       aliases: [...aliases.values()],
       clips: [...clips.values()],
     };
-    checkIndex(chunk.payload, found, this.file.size);
+    this.indexes.push(checkIndex(chunk, found, this.indexes, this.file.size));
     this.index = chunk;
   }
 }

@@ -29,7 +29,7 @@ from mcz.container.chunks import (
     parse_header,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
-from mcz.container.index import build_index
+from mcz.container.index import index_record
 from mcz.container.limits import BASE, Profile
 from mcz.container.packets import (
     CHECK_SIZE,
@@ -45,7 +45,7 @@ from mcz.container.value_hash import canonical
 from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer, payload_id
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import deflate, inflate, parse, varint
+from mcz.schema import deflate, parse, varint
 from mcz.writing.clip_writer import write_clip, write_skeleton
 from tools.records import built, update
 from tools.vectors.build.edits import Edit, Made, put
@@ -245,13 +245,12 @@ class Crafter(Writer):
         self._write(self.edited("FOOT", build_foot(start, length)))
 
     def _index_chunk(self) -> bytes:
-        whole = build_index(self.directory)
-        outer = parse(payloads.Indx, whole[16:-4], "INDX")
-        fields = parse(index_records.Index, inflate(outer.data, outer.size, "INDX"), "INDX")
+        fields = index_record(self.directory)
         self.edited("table", fields)
         content = built(index_records.Index, fields, "INDX")
         packed = {"size": len(content), "data": deflate(content)}
-        return build_chunk(b"INDX", self.edited("INDX", built(payloads.Indx, packed, "INDX")))
+        payload = self.edited("INDX", built(payloads.Indx, packed, "INDX"))
+        return build_chunk(b"INDX", payload, ANCILLARY)
 
 
 def file_of(
@@ -379,7 +378,7 @@ def attached(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
         return built(payloads.Atta, fields, "ATTA")
 
     def row(fields: Any) -> Any:
-        fields.attachments[0].size = size
+        fields.attachments.numbers("size")[0] = size
         return fields
 
     crafter = Crafter(ATTA=edit, table=row)

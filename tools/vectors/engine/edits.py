@@ -11,12 +11,20 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from mcz.container.chunks import ANCILLARY
-from mcz.container.index_records import Index, IndexedAncillary
+from mcz.container.chunks import ANCILLARY, Chunk
+from mcz.container.index_records import Index
 from mcz.container.packets import body_check
 from mcz.schema import build, read_varint, varint
 from tools.vectors.engine.fields import SCHEMAS, STREAMS, VIEWS, place_of, swapped
-from tools.vectors.engine.layout import Layout, Part, foot_of, index_of, index_payload
+from tools.vectors.engine.layout import (
+    Layout,
+    Part,
+    foot_of,
+    index_payload,
+    listing_of,
+    previous_of,
+    stop_of,
+)
 from tools.vectors.engine.notation import integer, read_bytes
 
 FIELD = re.compile(
@@ -24,6 +32,7 @@ FIELD = re.compile(
     r"(?P<path>(?:\.\w+)*)(?:\[(?P<slice>[-\w:]+)\])?"
 )
 EDIT = re.compile(FIELD.pattern + r"\s*(?P<operator>=|\+=|\^=)\s*(?P<value>.*)", re.DOTALL)
+FRONT = 16  # bytes of a chunk before its payload
 HEADER = {"signal", "first", "n_frames", "lead", "tail", "flags"}
 PACKET = {"kind", "sequence", "fresh"}
 LATE = ("INDEX", "INDX", "FOOT", "file")
@@ -82,9 +91,10 @@ class Editor:
         layout.place()
         feet = indexes = 0
         index: Part | None = None
+        places: dict[int, Part] = {}  # of the INDX of the base file, by their offsets there
         for part in list(layout.parts):
             if part.type == b"INDX":
-                self._index(part, indexes, late)
+                self._index(part, indexes, late, places)
                 layout.place()
                 index, indexes = part, indexes + 1
             elif part.type == b"FOOT":
@@ -103,19 +113,22 @@ class Editor:
                 whole = self._changed(None, whole, Target.of(match), match)
         return whole
 
-    def _index(self, part: Part, number: int, late: Sequence[str]) -> None:
-        content = index_of(part)
-        self.layout.indexed(content)
+    def _index(self, part: Part, number: int, late: Sequence[str], places: dict[int, Part]) -> None:
+        was, previous = listing_of(part, self.layout.data)
+        if previous is not None:
+            before = places[previous.offset]
+            was.start, previous = stop_of(before), previous_of(before)
+        places[(part.place or 0) - FRONT] = part
+        listing = self.layout.indexed(was)
         for chunk, owner in self.indexed:
-            for clip in content.clips:
-                if clip.offset == owner.offset - 16:
-                    row = IndexedAncillary(
-                        type=chunk.type, offset=chunk.offset - 16, length=len(chunk.payload)
-                    )
-                    clip.ancillary.append(row)
-        made = Part(b"INDX", build(content, "INDX"))
+            row = Chunk(chunk.type, 1, chunk.offset - FRONT, len(chunk.payload))
+            if row.offset >= listing.start and row.offset < part.offset:
+                clips = listing.new.clips.values()
+                own = [clip for clip in clips if clip.clip.payload_offset == owner.offset]
+                (own[0].ancillary if own else listing.behind).append(row)
+        made = Part(b"INDX", build(listing.record(), "INDX"))
         self._late(made, "INDEX", number, late)
-        part.payload = index_payload(made.payload)
+        part.payload = index_payload(made.payload, previous)
         self._late(part, "INDX", number, late)
 
     def _late(self, part: Part, name: str, number: int, late: Sequence[str]) -> None:

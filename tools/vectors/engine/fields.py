@@ -12,7 +12,7 @@ from mcz.container.packed import words
 from mcz.formats import notes
 from mcz.formats.c3d_layout import C3dDetail, C3dTemplate
 from mcz.formats.layout import Detail, Template
-from mcz.schema import Record, deflate, inflate, parse, read_varint, varint
+from mcz.schema import Record, build, deflate, inflate, parse, read_varint, varint
 from tools.records import built, span
 
 SCHEMAS: dict[str, Any] = {
@@ -135,5 +135,13 @@ def place_of(schema: Any, data: bytes, path: str, slice_: str | None) -> tuple[i
 
 def swapped(schema: Any, data: bytes, path: str, other: str) -> bytes:
     """``data`` with two items of a list in each other's place."""
+    table, _, one = path.rpartition(".")
+    if schema is Index:
+        record = parse(Index, data, "INDEX")
+        order = list(range(len(getattr(record, table))))
+        i, j = int(one), int(other.rpartition(".")[2])
+        order[i], order[j] = j, i
+        setattr(record, table, [getattr(record, table)[n] for n in order])
+        return build(record, "INDEX")
     (a, b), (c, d) = sorted((span(schema, data, path), span(schema, data, other)))
     return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]

@@ -8,13 +8,24 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from mcz.container import payloads
-from mcz.container.chunks import FOOT, HEADER, SIGNATURE, build_foot, parse_header
-from mcz.container.index import PACKETS
-from mcz.container.index_records import Index, IndexedClip
+from mcz.container.chunks import (
+    CRC,
+    FOOT,
+    FRAMING,
+    HEADER,
+    SIGNATURE,
+    Chunk,
+    build_foot,
+    parse_header,
+)
+from mcz.container.directory import ClipRow, Directory, SegmentRow
+from mcz.container.index import Listing, packed_segments
+from mcz.container.index_reader import ClipTables, directory_of, parse_index
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -23,10 +34,12 @@ from mcz.container.packets import (
     build_packet,
     read_packet,
 )
+from mcz.container.payloads import PreviousIndex
 from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.segments import parse_header as parse_segment
 from mcz.container.writer import payload_id
-from mcz.schema import build, deflate, inflate, parse, read_varint, varint
+from mcz.errors import FormatError, MczError
+from mcz.schema import build, deflate, parse, read_varint
 
 SHARED = (b"SKEL", b"MODL", b"SRCE")
 REFER = (b"SKEL", b"CLIP", b"ALIA")  # chunks that name shared ones
@@ -167,7 +180,7 @@ class Layout:
 
     def __init__(self, data: bytes) -> None:
         self.parts = list(parts_of(data))
-        self.signature = data[: len(SIGNATURE)]
+        self.data, self.signature = data, data[: len(SIGNATURE)]
         self.ids = {part: payload_id(part.payload) for part in self.parts if part.type in SHARED}
         self.headers = {part: part.taken_apart().header for part in self.parts if has_segment(part)}
         self.payloads = {part: part.payload for part in self.parts}
@@ -204,63 +217,81 @@ class Layout:
             part.offset = at + part.head_size
             at += len(part.build())
 
-    def indexed(self, content: Index) -> None:
-        """Make what an INDX says agree with the parts as they are placed."""
+    def indexed(self, listing: Listing) -> Listing:
+        """What an INDX has to say where it said ``listing`` of the base file."""
         moved = {part.place: part for part in self.parts if part.place is not None}
-        self._move_shared(content, moved)
+        was, new = listing.new, Directory(aliases=listing.new.aliases)
         heads = [part for part in self.parts if part.type == b"HEAD"]
-        content.head = heads[0].payload if heads else content.head
-        for clip in content.clips:
+        new.head = heads[0].payload if heads else was.head
+        shared = [
+            (chunk, (kind, self.renamed.get(id_, id_)))
+            for (kind, id_), old in was.shared.items()
+            if (chunk := _moved(old, moved)) is not None
+        ]
+        new.shared = {key: chunk for chunk, key in sorted(shared, key=lambda row: row[0].offset)}
+        for name, row in was.attachments.items():
+            parts = [chunk for old in row.parts if (chunk := _moved(old, moved)) is not None]
+            new.attachments[name] = replace(row, parts=sorted(parts, key=lambda one: one.offset))
+        for clip in was.clips.values():
             self._move_clip(clip, moved)
+        for clip in sorted(was.clips.values(), key=lambda row: row.clip.offset):
+            if clip.clip.offset:
+                new.clips[str(len(new.clips))] = clip  # two may have a name
+        behind = [chunk for old in listing.behind if (chunk := _moved(old, moved)) is not None]
+        return Listing(new, listing.start, behind)
 
-    def _move_shared(self, content: Index, moved: dict[int | None, Part]) -> None:
-        for row in [*content.shared, *(p for a in content.attachments for p in a.parts)]:
-            part = moved.get(row.offset + HEADER.size)
-            if part is not None:
-                row.offset, row.length = part.offset - HEADER.size, len(part.payload)
-        for row in content.shared:
-            row.id = self.renamed.get(row.id, row.id)
-
-    def _move_clip(self, clip: IndexedClip, moved: dict[int | None, Part]) -> None:
+    def _move_clip(self, clip: ClipRow, moved: Moved) -> None:
         clip.skeleton = self.renamed.get(clip.skeleton, clip.skeleton)
-        start = clip.offset + HEADER.size
-        was = start + clip.length + 4
-        part = moved.get(start)
-        if part is None:
+        start, end = _moved(clip.clip, moved), clip.clip.stop
+        if start is None:
+            clip.clip = replace(clip.clip, offset=0)
             return
-        clip.offset, clip.length = part.offset - HEADER.size, len(part.payload)
-        end = part.offset + clip.length + 4
-        rows, at = [], 0
-        while at < len(clip.segments):
-            numbers = []
-            for _ in range(7):
-                value, at = read_varint(clip.segments, at)
-                numbers.append(value)
-            was += numbers[0]
-            found, was = moved.get(was), was + numbers[1]
-            if found is not None:
-                rows.append((found, numbers))
-        listed = b""
-        for found, numbers in sorted(rows, key=lambda row: row[0].offset):
-            listed += self._segment_row(found, numbers, end)
-            end = found.offset + len(found.payload)
-        cend = moved.get(was + clip.cend_gap + HEADER.size)
-        clip.segments = listed
-        if cend is not None:
-            clip.cend_gap = cend.offset - HEADER.size - end
-            clip.cend_length = len(cend.payload)
-        for row in clip.ancillary:
-            other = moved.get(row.offset + HEADER.size)
-            if other is not None:
-                row.offset, row.length = other.offset - HEADER.size, len(other.payload)
+        packed, cend = packed_segments(clip), clip.cend
+        gap = packed[1]
+        was = {row.offset: row for row in clip.segments}
+        clip.name = self._name(moved[clip.clip.payload_offset], clip.name)
+        clip.clip, clip.segments = start, list(self._segment_rows(start, was))
+        end = clip.segments[-1].stop if clip.segments else start.stop
+        found = None if cend is None else _moved(cend, moved)
+        clip.cend = found or Chunk(b"CEND", 0, end + gap, packed[2])
+        ancillary = (_moved(chunk, moved) for chunk in clip.ancillary)
+        clip.ancillary = sorted(
+            (chunk for chunk in ancillary if chunk and chunk.offset >= clip.cend.stop),
+            key=lambda chunk: chunk.offset,
+        )
 
-    def _segment_row(self, part: Part, numbers: list[int], end: int) -> bytes:
-        header = part.segment.header if part.segment else None
-        if header is not None and header != self.headers.get(part):
-            flags = header.flags | (PACKETS[SEGMENT] if part.packet else 0)
-            numbers[2:] = [header.signal, header.n_frames, header.lead, header.tail, flags]
-        numbers[:2] = [part.offset - end, len(part.payload)]
-        return b"".join(map(varint, numbers))
+    def _name(self, part: Part, was: str) -> str:
+        try:
+            return parse(payloads.Clip, part.payload, "CLIP").name
+        except MczError:
+            return was
+
+    def _segment_rows(self, clip: Chunk, was: Mapping[int, SegmentRow]) -> Iterator[SegmentRow]:
+        """The segments between a CLIP and what ends the clip."""
+        first = next(n for n, part in enumerate(self.parts) if part.offset > clip.payload_offset)
+        for part in self.parts[first:]:
+            if part.type in (b"CEND", b"CLIP", b"FOOT"):
+                return
+            row = was.get(part.place or -1)
+            packet = 0 if part.packet is None else part.packet.kind
+            if part.type not in (b"DATA", b"packet") or part.open or (packet == END and not row):
+                continue
+            header = row.header if row else SegmentHeader(0, 0, 1)
+            if has_segment(part):
+                with suppress(FormatError):
+                    header = parse_segment(part.payload)[0]
+            yield SegmentRow(part.offset, len(part.payload), header, packet)
+
+
+Moved = Mapping[int | None, Part]
+
+
+def _moved(chunk: Chunk, moved: Moved) -> Chunk | None:
+    """Where a chunk of the base file lies now; None where it is not there any more."""
+    part = moved.get(chunk.payload_offset)
+    if part is None:
+        return None
+    return replace(chunk, offset=part.offset - HEADER.size, length=len(part.payload))
 
 
 def has_segment(part: Part) -> bool:
@@ -270,14 +301,31 @@ def has_segment(part: Part) -> bool:
     return part.type == b"DATA" and not part.open
 
 
-def index_of(part: Part) -> Index:
-    """The content of an INDX."""
-    outer = parse(payloads.Indx, part.payload, "INDX")
-    return parse(Index, inflate(outer.data, outer.size, "INDX"), "INDX")
+def listing_of(part: Part, data: bytes) -> tuple[Listing, PreviousIndex | None]:
+    """What an INDX of the file ``data`` lists, and which one it continues."""
+    at = (part.place or 0) - HEADER.size
+    chunk = data[at : at + len(part.payload) + FRAMING]
+    listed = parse_index(chunk, at, LIMIT)
+    behind = ClipTables(listed).ancillary(0, listed.start)
+    return Listing(directory_of([listed]), listed.start, behind), listed.previous
 
 
-def index_payload(content: bytes) -> bytes:
-    return build(payloads.Indx(size=len(content), data=deflate(content)), "INDX")
+def index_payload(content: bytes, previous: PreviousIndex | None) -> bytes:
+    flags = 0 if previous is None else payloads.CONTINUES
+    record = payloads.Indx(flags=flags, previous=previous, size=len(content), data=deflate(content))
+    return build(record, "INDX")
+
+
+def stop_of(part: Part) -> int:
+    """The offset after a chunk."""
+    return part.offset - HEADER.size + len(part.build())
+
+
+def previous_of(part: Part) -> PreviousIndex:
+    """How an INDX names this one that it continues."""
+    chunk = part.build()
+    (crc,) = CRC.unpack(chunk[-CRC.size :])
+    return PreviousIndex(offset=part.offset - HEADER.size, length=len(chunk), crc=crc)
 
 
 def foot_of(index: Part | None) -> bytes:
