@@ -1,7 +1,9 @@
-"""INDX by hand against its schema: the same bytes, the same fields, the same refusals."""
+"""INDX: its tables against a plain reading of its record, chains of INDX, and what vectors list."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -10,34 +12,101 @@ from hypothesis import strategies as st
 
 import conformance
 import mcz
-from mcz.container import index_records
+from mcz.codecs import raw
 from mcz.container.chunks import Chunk
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
-from mcz.container.index import index_content, parse_content
+from mcz.container.index import build_index, index_chunk, index_content
+from mcz.container.index_reader import directory_of, parse_index, read_indexes
+from mcz.container.index_records import Index
+from mcz.container.scan import scan
 from mcz.container.segments import SegmentHeader
-from mcz.schema import parse
-from tools.records import built
+from mcz.container.source import open_source
+from mcz.container.writer import Writer
+from mcz.schema import Table, build, columns, field, parse
+from mcz.schema.records import Record
+from mcz.schema.types import SIZED, TEXT, UVARINT, Exactly
+from mcz.writing.clip_writer import write_clip
+from tests.motions import smooth
+
+VECTORS = Path(conformance.__file__).parent / "vectors" / "valid"
 
 NUMBERS = st.integers(0, 2**53 - 1)
 SMALL = st.integers(0, 2**20)
 NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=12)
+LIMIT = 2**20
+
+
+class Item(Record):
+    """A row of a table of every type of column."""
+
+    name: str = field(TEXT, "a text")
+    number: int = field(UVARINT, "a number")
+    tag: bytes = field(Exactly(2), "two bytes")
+    data: bytes = field(SIZED, "bytes")
+
+
+class Items(Record):
+    """A table, and what follows it."""
+
+    items: Table[Item] = field(columns(Item), "the table")
+    last: int = field(UVARINT, "a number")
+
+
+ITEMS = st.builds(
+    Item, name=NAMES, number=NUMBERS, tag=st.binary(min_size=2, max_size=2), data=st.binary()
+)
+
+
+@given(st.lists(ITEMS, max_size=5), NUMBERS)
+def test_a_table_is_its_columns(items: list[Item], last: int) -> None:
+    from mcz.schema.varints import varint
+
+    made = build(Items(items=items, last=last), "items")
+    plain = varint(len(items))
+    texts = [item.name.encode() for item in items]
+    plain += b"".join(varint(len(text)) for text in texts) + b"".join(texts)
+    plain += b"".join(varint(item.number) for item in items)
+    plain += b"".join(item.tag for item in items)
+    plain += b"".join(varint(len(item.data)) for item in items)
+    plain += b"".join(item.data for item in items) + varint(last)
+    assert made == plain
+    found = parse(Items, made, "items")
+    assert list(found.items) == items == [found.items[n] for n in range(len(items))]
+    assert found.last == last
+    for stop in range(len(made)):
+        with pytest.raises(mcz.TruncatedError):
+            parse(Items, made[:stop], "items")
+
+
+@pytest.mark.parametrize(
+    ("column", "error"),
+    [
+        (b"\x80\x00", "shortest form"),
+        (b"\xff" * 7 + b"\x1f", "2\\^53"),
+        (b"\x80" * 9 + b"\x01", "2\\^53"),
+        (b"\x80", "past the end"),
+    ],
+)
+def test_columns_have_the_varints_of_the_format(column: bytes, error: str) -> None:
+    with pytest.raises(mcz.FormatError, match=error):
+        parse(Items, b"\x02\x00\x00\x05" + column, "items")
 
 
 @st.composite
-def rows(draw: st.DrawFn, name: str) -> ClipRow:
+def rows(draw: st.DrawFn, name: str, at: int) -> ClipRow:
     numbers = st.tuples(*[SMALL] * 6)
     signals = tuple(
         SignalRow(*fields) for fields in draw(st.lists(numbers, min_size=1, max_size=2))
     )
-    clip = Chunk(b"CLIP", 0, draw(SMALL), draw(SMALL))
+    clip = Chunk(b"CLIP", 0, at + draw(SMALL), draw(SMALL))
     row = ClipRow(
         name,
-        draw(st.binary(min_size=16, max_size=16)),
-        *draw(st.tuples(*[NUMBERS] * 3)),
+        draw(st.sampled_from([bytes(16), bytes(range(16))])),
+        *draw(st.tuples(NUMBERS, NUMBERS, st.integers(1, 2**53 - 1))),
         signals,
         clip,
     )
-    end, first = clip.offset + clip.size, [0] * len(signals)
+    end, first = clip.stop, [0] * len(signals)
     for _ in range(draw(st.integers(0, 3))):
         gap, size, n_frames = draw(SMALL), draw(SMALL), draw(SMALL)
         signal = draw(st.integers(0, len(signals) - 1))
@@ -46,59 +115,131 @@ def rows(draw: st.DrawFn, name: str) -> ClipRow:
         first[signal] += n_frames
         end += gap + size
     row.cend = Chunk(b"CEND", 0, end + draw(SMALL), draw(SMALL))
-    row.ancillary += [Chunk(b"QUAL", 1, draw(SMALL), draw(SMALL)) for _ in range(draw(SMALL) % 3)]
+    row.ancillary += _chunks(draw, row.cend.stop, draw(SMALL) % 3, b"QUAL")
     return row
 
 
-@st.composite
-def directories(draw: st.DrawFn) -> Directory:
-    held = Directory(head=draw(st.binary(max_size=9)))
-    for id_ in draw(st.sets(st.binary(min_size=16, max_size=16), max_size=2)):
-        held.shared[b"SKEL", id_] = Chunk(b"SKEL", 0, draw(NUMBERS), draw(SMALL))
-    for name in draw(st.sets(NAMES, max_size=2)):
-        parts = [Chunk(b"ATTA", 0, draw(SMALL), draw(SMALL)) for _ in range(draw(SMALL) % 2 + 1)]
-        held.attachments[name] = AttachmentRow(name, draw(NUMBERS), parts)
-    for name in draw(st.sets(NAMES, max_size=2)):
-        held.aliases[name] = draw(st.integers(0, 2)), draw(st.binary(max_size=20))
-    for name in draw(st.lists(NAMES, max_size=3, unique=True)):
-        held.clips[name] = draw(rows(name))
-    return held
+def _chunks(draw: st.DrawFn, at: int, count: int, kind: bytes) -> list[Chunk]:
+    found = []
+    for _ in range(count):
+        found.append(Chunk(kind, 0, at + draw(SMALL), draw(SMALL)))
+        at = found[-1].stop
+    return found
 
 
-@given(directories())
-def test_what_is_built_is_read_by_hand_and_by_schema(held: Directory) -> None:
+def _end(row: ClipRow) -> int:
+    return [row.cend, *row.ancillary][-1].stop
+
+
+def _grow(draw: st.DrawFn, held: Directory, at: int, number: int) -> int:
+    """Let a file have more of everything behind ``at``; return where it ends."""
+    ends = [at]
+    if held.clips.last is not None:
+        held.clips.last.ancillary += _chunks(draw, at, draw(SMALL) % 3, b"xtra")
+        ends.append(_end(held.clips.last))
+    for id_, chunk in zip(
+        draw(st.sets(st.binary(min_size=16, max_size=16), max_size=2)),
+        _chunks(draw, at, 2, b"SKEL"),
+        strict=False,
+    ):
+        held.shared.setdefault((b"SKEL", id_), chunk)
+        ends.append(chunk.stop)
+    name = f"{number} {draw(NAMES)}"
+    parts = _chunks(draw, at, draw(SMALL) % 2 + 1, b"ATTA")
+    held.attachments[name] = AttachmentRow(name, draw(NUMBERS), parts)
+    ends.append(parts[-1].stop)
+    held.aliases[name] = draw(st.integers(0, 2)), draw(st.binary(max_size=20))
+    for one in draw(st.lists(NAMES, max_size=3, unique=True)):
+        row = draw(rows(f"{number} {one}", max(ends)))
+        held.clips[row.name] = row
+        ends.append(_end(row))
+    return max(ends)
+
+
+@given(st.data())
+def test_what_is_built_is_read(data: st.DataObject) -> None:
+    held = Directory(head=data.draw(st.binary(max_size=9)))
+    _grow(data.draw, held, 0, 0)
     content = index_content(held)
-    again = parse_content(content)
-    assert index_content(again) == content  # from what is packed still
+    again = directory_of([parse_index(index_chunk(content), 0, LIMIT)])
+    assert index_content(again) == content  # from tables still
     assert again == held
-    assert index_content(again) == content  # and from what was unpacked
-    fields = parse(index_records.Index, content, "INDX")
-    assert built(index_records.Index, fields, "INDX") == content
+    assert index_content(again) == content  # and from rows
+    fields = parse(Index, content, "INDX")
+    assert build(fields, "INDX") == content
     assert [row.name for row in fields.clips] == list(held.clips)
 
 
-@given(directories(), st.data())
-def test_a_changed_index_is_refused_by_both_or_by_neither(
-    held: Directory, data: st.DataObject
-) -> None:
+@given(st.data())
+def test_indexes_that_continue_each_other_say_what_one_says(data: st.DataObject) -> None:
+    held = Directory(head=b"head")
+    file, end = {}, 0
+    for number in range(data.draw(st.integers(1, 4))):
+        offset = _grow(data.draw, held, end, number)
+        since = held.indexes[-1] if held.indexes else None
+        file[offset] = index_chunk(index_content(held, since), since)
+        end = offset + len(file[offset])
+        listed = read_indexes(lambda at, n: file[at][:n], offset, len(file[offset]), LIMIT)
+        again = directory_of(listed)
+        assert again == held
+        held.indexes = again.indexes
+    assert [place.offset for place in held.indexes] == list(file)
+
+
+@given(st.data())
+def test_a_changed_index_is_read_or_refused(data: st.DataObject) -> None:
+    held = Directory(head=b"head")
+    _grow(data.draw, held, 0, 0)
     content = bytearray(index_content(held))
     at = data.draw(st.integers(0, len(content) - 1))
     content[at] ^= 1 << data.draw(st.integers(0, 7))
     del content[data.draw(st.integers(at, len(content))) :]
     try:
-        parse(index_records.Index, bytes(content), "INDX")
+        found = directory_of([parse_index(index_chunk(bytes(content)), 0, LIMIT)])
+        for row in found.clips.values():
+            _ = row.cend, row.segments, row.ancillary
     except mcz.MczError:
-        with pytest.raises(mcz.MczError):
-            parse_content(bytes(content))
+        pass
+
+
+def test_appends_leave_few_indexes_and_write_little() -> None:
+    """The INDX of one more clip lists few, and no more than four are to be read."""
+    sink, sizes = BytesIO(), []
+    writer = Writer(sink)
+    for number in range(300):
+        write_clip(writer, smooth(1, name=f"first {number}"), raw.CODEC, {})
+    writer.finish()
+    for number in range(80):
+        with mcz.open(sink.getvalue()) as file:
+            directory = file.container.directory
+            assert len(directory.indexes) <= 4
+        writer = Writer(sink, directory=directory, offset=len(sink.getvalue()))
+        write_clip(writer, smooth(1, name=f"more {number}"), raw.CODEC, {})
+        before = writer.offset
+        writer.finish()
+        sizes.append(writer.offset - before)
+    with mcz.open(sink.getvalue()) as file:
+        names = [f"first {n}" for n in range(300)] + [f"more {n}" for n in range(80)]
+        assert list(file.clips) == names
+        whole = len(build_index(replace(file.container.directory, indexes=())))
+    assert not mcz.verify(sink.getvalue())
+    assert sorted(sizes)[40] < whole / 4
+
+
+def test_a_rewriter_makes_one_index_and_copies_none(tmp_path: Path) -> None:
+    path = VECTORS / "container" / "index-continued.mcz"
+    with mcz.open(path) as file:
+        assert len(file.container.directory.indexes) == 3
+    mcz.extract(path, tmp_path / "new.mcz")
+    with mcz.open(tmp_path / "new.mcz") as file:
+        assert len(file.container.directory.indexes) == 1
+        types = [chunk.type for chunk in scan(file.container.source, whole=True).chunks]
+    assert types.count(b"INDX") == 1
 
 
 def test_every_vector_with_an_index_lists_what_its_walk_finds() -> None:
-    from mcz.container.scan import scan
-    from mcz.container.source import open_source
-
-    folder = Path(conformance.__file__).parent / "vectors" / "valid" / "container"
     seen = 0
-    for path in sorted(folder.rglob("*.mcz")):
+    for path in sorted((VECTORS / "container").rglob("*.mcz")):
         with mcz.open(path) as file:
             if file.container.index is None:
                 continue

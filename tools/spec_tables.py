@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # so that it ru
 from mcz import numbers, schema
 from mcz.container import payloads
 from mcz.schema import types
+from mcz.schema.columns import Columns
 from mcz.schema.records import RecordType
 from tools import spec_trace
 
@@ -33,7 +34,6 @@ MODULES = (
     "mcz.container.payloads",
     "mcz.container.index_records",
     "mcz.container.copies",
-    "mcz.container.index",
     "mcz.container.metadata",
     "mcz.codecs.wavelet.shared",
     "mcz.codecs.curves.qbc",
@@ -121,6 +121,8 @@ def type_name(field: Any) -> str:
             return table_name(field.record)
         case types.Optional():
             return f"optional {type_name(field.subcon.subcon)}"
+        case Columns():
+            return f"columns {type_name(field.subcon)}"
         case types.Counted():
             return f"counted {type_name(field.subcon)}"
         case construct.Array():

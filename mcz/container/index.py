@@ -27,11 +27,10 @@ from mcz.container.directory import (
 from mcz.container.index_records import (
     Index,
     IndexedAlias,
-    IndexedAncillary,
     IndexedAttachment,
     IndexedChunk,
     IndexedClip,
-    IndexedPart,
+    IndexedPlace,
     IndexedSegment,
     IndexedSignal,
 )
@@ -64,9 +63,13 @@ def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
     """The INDX chunk of this content."""
     record = payloads.Indx(size=len(content), data=deflate(content))
     if since is not None:
-        place = payloads.PreviousIndex(offset=since.offset, length=since.length, crc=since.crc)
-        record.flags, record.previous = payloads.CONTINUES, place
+        record.flags, record.previous = payloads.CONTINUES, previous_of(since)
     return build_chunk(b"INDX", build(record, "INDX"), ANCILLARY)
+
+
+def previous_of(place: IndexPlace) -> payloads.PreviousIndex:
+    """How an INDX names the one that it continues."""
+    return payloads.PreviousIndex(offset=place.offset, length=place.length, crc=place.crc)
 
 
 def index_content(directory: Directory, since: IndexPlace | None = None) -> bytes:
@@ -125,7 +128,7 @@ class Listing:
                 size=[row.size for row in attachments],
                 n_parts=[len(row.parts) for row in attachments],
             ),
-            parts=Table.of(IndexedPart, **_places(parts, self.start)),
+            parts=Table.of(IndexedPlace, type=[b"ATTA"] * len(parts), **_places(parts, self.start)),
             aliases=Table.of(
                 IndexedAlias,
                 name=list(self.new.aliases),
@@ -165,14 +168,14 @@ class Listing:
             n_ancillary=[len(clip.ancillary) for clip in clips],
         )
 
-    def _ancillary(self, clips: Sequence[ClipRow]) -> Table[IndexedAncillary]:
+    def _ancillary(self, clips: Sequence[ClipRow]) -> Table[IndexedPlace]:
         groups = [
             (self.behind, self.start),
             *((clip.ancillary, _cend_of(clip).stop) for clip in clips),
         ]
         places = [_places(chunks, start) for chunks, start in groups]
         return Table.of(
-            IndexedAncillary,
+            IndexedPlace,
             type=[chunk.type for chunks, _ in groups for chunk in chunks],
             gap=[gap for columns in places for gap in columns["gap"]],
             length=[length for columns in places for length in columns["length"]],

@@ -38,13 +38,6 @@ class IndexedAttachment(Record):
     n_parts: int = field(POSITIVE, "its ATTA chunks, at least 1")
 
 
-class IndexedPart(Record):
-    """An ATTA in INDEX."""
-
-    gap: int = field(UVARINT, "bytes to the chunk from the end of the one before")
-    length: int = field(UVARINT, "bytes of its payload")
-
-
 class IndexedAlias(Record):
     """An ALIA in INDEX."""
 
@@ -95,8 +88,8 @@ class IndexedSegment(Record):
     )
 
 
-class IndexedAncillary(Record):
-    """An ancillary chunk in INDEX."""
+class IndexedPlace(Record):
+    """An ATTA or ancillary chunk in INDEX."""
 
     type: bytes = field(Exactly(4), "chunk type")
     gap: int = field(UVARINT, "bytes to the chunk from the end of the one before, or of CEND")
@@ -111,14 +104,14 @@ class Index(Record):
         columns(IndexedChunk), "SKEL, MODL and SRCE chunks, the first of each id"
     )
     attachments: Table[IndexedAttachment] = field(columns(IndexedAttachment), "attached files")
-    parts: Table[IndexedPart] = field(columns(IndexedPart), "the parts of all attached files")
+    parts: Table[IndexedPlace] = field(columns(IndexedPlace), "the ATTA of all attached files")
     aliases: Table[IndexedAlias] = field(columns(IndexedAlias), "aliases")
     skeletons: list[bytes] = field(counted(ID), "ids of the SKEL of clips, each once")
     clips: Table[IndexedClip] = field(columns(IndexedClip), "the clips")
     signals: Table[IndexedSignal] = field(columns(IndexedSignal), "the signals of all clips")
     segments: Table[IndexedSegment] = field(columns(IndexedSegment), "the segments of all clips")
     n_behind: int = field(UVARINT, "the first ancillary chunks, of the last clip of INDX before")
-    ancillary: Table[IndexedAncillary] = field(
-        columns(IndexedAncillary), "the ancillary chunks of all clips"
+    ancillary: Table[IndexedPlace] = field(
+        columns(IndexedPlace), "the ancillary chunks of all clips"
     )
     extension: bytes = field(EXTENSION, "ignored", default=b"")

@@ -8,7 +8,7 @@ const utf8 = new TextEncoder();
 export const TABLES = {
   shared: { type: 4, id: 16, gap: "varint", length: "varint" },
   attachments: { name: "text", size: "varint", nParts: "varint" },
-  parts: { gap: "varint", length: "varint" },
+  parts: { type: 4, gap: "varint", length: "varint" },
   aliases: { name: "text", of: "u8", target: "sized" },
   clips: {
     name: "text",

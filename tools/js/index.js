@@ -88,7 +88,7 @@ function writeIndex(writer, { head, ...found }, since, start) {
   const attachments = news("attachments");
   const files = attachments.map(({ name, size, chunks }) => ({ name, size, nParts: chunks.length }));
   writeTable(writer, "attachments", files);
-  const chunks = attachments.flatMap((one) => one.chunks);
+  const chunks = attachments.flatMap((one) => one.chunks.map((part) => ({ type: "ATTA", ...part })));
   writeTable(writer, "parts", chunks.map(placer(start)));
   writeTable(writer, "aliases", news("aliases").map(aliasRow));
   writeClips(writer, news("clips"), found.clips[since.clips - 1], start);

@@ -41,7 +41,7 @@ class Base:
 
     def __or__(self, other: Base) -> Base:
         bodies = (*(self.bodies or (self,)), other)
-        return Base(self.motions + other.motions, None, self.sources, self.attached, bodies)
+        return Base(self.motions + other.motions, None, self.sources + other.sources, (), bodies)
 
     def __add__(self, other: Base) -> Base:
         sources = self.sources + other.sources
@@ -242,7 +242,10 @@ def attached(name: str, content: str, alias: str = "") -> Base:
 
 
 def _with_attachments(found: Base, index: bool = True) -> bytes:
-    crafter = Crafter()
+    return _body(Crafter(), found, index)
+
+
+def _body(crafter: Crafter, found: Base, index: bool) -> bytes:
     for (name, content), (_, alias) in zip(found.sources, found.attached, strict=True):
         crafter.parts(name, content)
         if alias:
@@ -250,10 +253,11 @@ def _with_attachments(found: Base, index: bool = True) -> bytes:
     return finished(crafter, *found.motions, index=index)
 
 
-def _appended(found: Base, index: bool = True) -> bytes:
+def _appended(found: Base, index: bool = True, continued: bool = False) -> bytes:
     crafter = Crafter()
+    crafter.continued = continued
     for body in found.bodies:
-        finished(crafter, *body.motions, index=index)
+        _body(crafter, body, index)
     return crafter.data
 
 

@@ -19,6 +19,7 @@ from mcz.codecs.contract import Codec
 from mcz.container import index_records, payloads
 from mcz.container.chunks import (
     ANCILLARY,
+    FRAMING,
     HEADER,
     REPEAT,
     REPEATED,
@@ -29,7 +30,8 @@ from mcz.container.chunks import (
     parse_header,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
-from mcz.container.index import index_record
+from mcz.container.index import index_record, previous_of
+from mcz.container.index_reader import place_of
 from mcz.container.limits import BASE, Profile
 from mcz.container.packets import (
     CHECK_SIZE,
@@ -86,7 +88,8 @@ class Crafter(Writer):
     "end_packet" edit their bytes. ``frames``: those of signal 0 from this number on that have one
     stream alone are packets of kind 2, ``numbered`` of kind 3; "number" changes what their checks
     say. ``anew``: a segment that starts fresh begins an open DATA. ``repeat``: a REPT, which "REPT"
-    edits, precedes the open DATA of these numbers, from 0.
+    edits, precedes the open DATA of these numbers, from 0. ``continued``: each INDX continues the
+    one before.
     """
 
     def __init__(
@@ -104,6 +107,7 @@ class Crafter(Writer):
         self.anew = anew
         self.numbered = numbered
         self.repeat = repeat
+        self.continued = False
         self._n_data = 0
         self.packets = packets
         self.frames = frames
@@ -241,14 +245,21 @@ class Crafter(Writer):
         if index:
             chunk = self.edited("INDX_frame", self._index_chunk())
             start, length = self.offset, len(chunk)
+            if self.continued:
+                place = Chunk(b"INDX", ANCILLARY, start, length - FRAMING)
+                crc = int.from_bytes(chunk[-4:], "little")
+                self.directory.indexes += (place_of(place, crc, 0, self.directory),)
             self._write(chunk)
         self._write(self.edited("FOOT", build_foot(start, length)))
 
     def _index_chunk(self) -> bytes:
-        fields = index_record(self.directory)
+        since = self.directory.indexes[-1] if self.directory.indexes else None
+        fields = index_record(self.directory, since)
         self.edited("table", fields)
         content = built(index_records.Index, fields, "INDX")
         packed = {"size": len(content), "data": deflate(content)}
+        if since is not None:
+            packed |= {"flags": payloads.CONTINUES, "previous": previous_of(since)}
         payload = self.edited("INDX", built(payloads.Indx, packed, "INDX"))
         return build_chunk(b"INDX", payload, ANCILLARY)
 

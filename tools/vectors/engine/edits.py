@@ -196,8 +196,8 @@ class Editor:
         place = self._place(where, anchor)
         self.layout.parts.insert(place, part)
         before = [p for p in self.layout.parts[:place] if p.type in (b"CLIP", b"CEND", b"FOOT")]
-        if part.flags & ANCILLARY and before and before[-1].type == b"CEND":
-            clips = [p for p in self.layout.parts[:place] if p.type == b"CLIP"]
+        clips = [p for p in before if p.type == b"CLIP"]
+        if part.flags & ANCILLARY and clips and before[-1].type != b"CLIP":
             self.indexed.append((part, clips[-1]))
 
     def _swap(self, rest: str) -> None:
