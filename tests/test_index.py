@@ -230,7 +230,7 @@ def test_a_rewriter_makes_one_index_and_copies_none(tmp_path: Path) -> None:
     path = VECTORS / "container" / "index-continued.mcz"
     with mcz.open(path) as file:
         assert len(file.container.directory.indexes) == 3
-    mcz.extract(path, tmp_path / "new.mcz")
+    mcz.extract(path, tmp_path / "new.mcz", frames=(0, 1))
     with mcz.open(tmp_path / "new.mcz") as file:
         assert len(file.container.directory.indexes) == 1
         types = [chunk.type for chunk in scan(file.container.source, whole=True).chunks]
