@@ -16,11 +16,10 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk
-from mcz.container.index_records import IndexedSegment
 from mcz.container.limits import PROFILES, Profile
 from mcz.container.segments import SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
-from mcz.schema import MAX_COUNT, Table, parse
+from mcz.schema import MAX_COUNT, parse
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +76,8 @@ def _signal_row(signal: Any, clip: Any, where: str) -> SignalRow:
     return SignalRow(n_channels, signal.samples_per_frame, *codec, *cut)
 
 
-# Of an indexed clip: the columns of its segments, ``cend_gap`` and ``cend_length``.
-Packed = tuple["Table[IndexedSegment]", int, int]
+# The segments of an indexed clip, each the fields of an IndexedSegment in their order.
+Packed = Sequence[tuple[int, ...]]
 
 
 @dataclass(slots=True, eq=False)
@@ -99,7 +98,7 @@ class ClipRow:
 
     @property
     def packed(self) -> Packed | None:
-        """What an index says of segments and CEND, where they were not unpacked yet."""
+        """What an index says of the segments, where they were not unpacked yet."""
         return None
 
     def __eq__(self, other: object) -> bool:
@@ -120,53 +119,36 @@ class ClipRow:
 
 
 class PackedClipRow(ClipRow):
-    """That of an index: ``segments`` and ``cend`` stay packed until they are asked for.
+    """That of an index: ``segments`` stay packed until they are asked for.
 
-    Both raise FormatError where the index is wrong.
+    They raise FormatError where the index is wrong.
     """
 
-    __slots__ = ("_cend", "_packed", "_segments", "_unpack")
+    __slots__ = ("_pack", "_segments", "_unpack")
 
     def keep_packed(
         self,
-        packed: Packed,
-        unpack: Callable[[ClipRow, Packed], tuple[list[SegmentRow], Chunk]],
+        pack: Callable[[], Packed],
+        unpack: Callable[[ClipRow, Packed], list[SegmentRow]],
     ) -> None:
-        """Let segments and CEND be what ``unpack`` makes of ``packed`` when they are asked for."""
-        self._packed: Packed | None = packed
+        """Let segments be what ``unpack`` makes of what ``pack`` returns."""
+        self._pack: Callable[[], Packed] | None = pack
         self._unpack = unpack
 
     @property
     def packed(self) -> Packed | None:
-        return self._packed
-
-    def _unpacked(self) -> None:
-        if self._packed is not None:
-            self._segments, self._cend = self._unpack(self, self._packed)
-            self._packed = None
+        return None if self._pack is None else self._pack()
 
     @property
     def segments(self) -> list[SegmentRow]:
-        self._unpacked()
+        if self._pack is not None:
+            self._segments = self._unpack(self, self._pack())
+            self._pack = None
         return self._segments
 
     @segments.setter
     def segments(self, segments: list[SegmentRow]) -> None:
-        self._segments, self._packed = segments, None
-
-    @property
-    def cend(self) -> Chunk | None:
-        if self._cend is None and self._packed is not None:
-            table, gap, length = self._packed
-            inside = int(table.numbers("gap").sum() + table.numbers("size").sum())
-            self._cend = Chunk(b"CEND", 0, self.clip.stop + inside + gap, length)
-        return self._cend
-
-    @cend.setter
-    def cend(self, chunk: Any) -> None:
-        if chunk is not None:
-            self._unpacked()
-        self._cend = chunk
+        self._segments, self._pack = segments, None
 
 
 class ClipRows(MutableMapping[str, ClipRow]):

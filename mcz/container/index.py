@@ -37,7 +37,6 @@ from mcz.container.index_records import (
 from mcz.container.packets import FRAME, NUMBERED, SEGMENT
 from mcz.errors import FormatError
 from mcz.schema import Table, build, deflate
-from mcz.schema.columns import Numbers
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
 PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
@@ -112,7 +111,8 @@ class Listing:
         attachments, clips = list(self.new.attachments.values()), list(self.new.clips.values())
         parts = [part for row in attachments for part in row.parts]
         signals = [signal for clip in clips for signal in clip.signals]
-        tables = [clip.packed or packed_segments(clip) for clip in clips]
+        segments = [segment_rows(clip) for clip in clips]
+        columns = np.array([row for rows in segments for row in rows], np.int64)
         skeletons = {id_: n for n, id_ in enumerate(dict.fromkeys(c.skeleton for c in clips))}
         return Index(
             head=self.new.head,
@@ -136,20 +136,20 @@ class Listing:
                 target=[target for _, target in self.new.aliases.values()],
             ),
             skeletons=list(skeletons),
-            clips=self._clips(clips, tables, skeletons),
+            clips=self._clips(clips, segments, skeletons),
             signals=Table.of(
                 IndexedSignal, **{name: [getattr(s, name) for s in signals] for name in SIGNAL_ROW}
             ),
             segments=Table.of(
                 IndexedSegment,
-                **{n: _joined(table.numbers(n) for table, _, _ in tables) for n in SEGMENT_ROW},
+                **dict(zip(SEGMENT_ROW, columns.reshape(-1, len(SEGMENT_ROW)).T, strict=True)),
             ),
             n_behind=len(self.behind),
             ancillary=self._ancillary(clips),
         )
 
     def _clips(
-        self, clips: Sequence[ClipRow], tables: Sequence[Packed], skeletons: Mapping[bytes, int]
+        self, clips: Sequence[ClipRow], segments: Sequence[Packed], skeletons: Mapping[bytes, int]
     ) -> Table[IndexedClip]:
         ends = [self.start, *(_cend_of(clip).stop for clip in clips)]
         return Table.of(
@@ -162,9 +162,12 @@ class Listing:
             n_signals=[len(clip.signals) for clip in clips],
             gap=[clip.clip.offset - end for clip, end in zip(clips, ends, strict=False)],
             length=[clip.clip.size - FRAMING for clip in clips],
-            n_segments=[len(table) for table, _, _ in tables],
-            cend_gap=[gap for _, gap, _ in tables],
-            cend_length=[length for _, _, length in tables],
+            n_segments=[len(rows) for rows in segments],
+            cend_gap=[
+                _cend_of(clip).offset - end_of(clip, rows)
+                for clip, rows in zip(clips, segments, strict=True)
+            ],
+            cend_length=[_cend_of(clip).size - FRAMING for clip in clips],
             n_ancillary=[len(clip.ancillary) for clip in clips],
         )
 
@@ -198,13 +201,10 @@ def _places(chunks: Iterable[Chunk], end: int) -> dict[str, list[int]]:
     return {"gap": gaps, "length": lengths}
 
 
-def _joined(columns: Iterable[Numbers]) -> Numbers:
-    return np.concatenate([np.zeros(0, np.int64), *columns])
-
-
-def packed_segments(clip: ClipRow) -> Packed:
-    """The segments of a clip as columns, and the fields ``cend_gap`` and ``cend_length``."""
-    cend = _cend_of(clip)
+def segment_rows(clip: ClipRow) -> Packed:
+    """The segments of a clip, each the fields of an IndexedSegment in their order."""
+    if (packed := clip.packed) is not None:
+        return packed
     rows, end = [], clip.clip.stop
     for row in clip.segments:
         header = row.header
@@ -212,6 +212,9 @@ def packed_segments(clip: ClipRow) -> Packed:
         covers = header.signal, header.n_frames, header.lead, header.tail
         rows.append((row.offset - end, row.size, *covers, flags))
         end = row.stop
-    values = np.array(rows, np.int64).reshape(-1, len(SEGMENT_ROW)).T
-    table = Table.of(IndexedSegment, **dict(zip(SEGMENT_ROW, values, strict=True)))
-    return table, cend.offset - end, cend.size - FRAMING
+    return rows
+
+
+def end_of(clip: ClipRow, rows: Packed) -> int:
+    """Where the last of these segments of a clip ends, or its CLIP."""
+    return clip.clip.stop + sum(gap + size for gap, size, *_ in rows)

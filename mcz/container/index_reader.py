@@ -5,8 +5,9 @@ SPEC.md, "INDX", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -33,6 +34,10 @@ from mcz.container.directory import (
 from mcz.container.index import PACKETS, SEGMENT_ROW, SIGNAL_ROW
 from mcz.container.index_records import (
     Index,
+    IndexedChunk,
+    IndexedPlace,
+    IndexedSegment,
+    IndexedSignal,
 )
 from mcz.container.limits import check
 from mcz.container.packets import SHORT
@@ -44,6 +49,7 @@ from mcz.schema.columns import Numbers
 MOST_INDEXES = 8  # that continue each other
 
 T = TypeVar("T")
+Places = Table[IndexedChunk] | Table[IndexedPlace]
 Fetch = Callable[[int, int], bytes]  # the bytes at an offset, so many
 
 
@@ -178,7 +184,7 @@ def _ends(sizes: Numbers, start: int) -> Numbers:
     return start + np.cumsum(sizes)
 
 
-def _chunks(table: Table[Any], start: int, kind: bytes = b"ATTA") -> list[Chunk]:
+def _chunks(table: Places, start: int, kind: bytes = b"ATTA") -> list[Chunk]:
     """The chunks of a table with ``gap`` and ``length``, the first behind ``start``."""
     lengths = table.numbers("length")
     ends = _ends(table.numbers("gap") + lengths + FRAMING, start)
@@ -200,47 +206,64 @@ class ClipTables:
         self.ancillary_bounds = _bounds(behind, len(index.ancillary), "ancillary chunks")
         if len(clips) and int(clips.numbers("skeleton").max()) >= len(index.skeletons):  # INDX-08
             raise FormatError("INDX: a clip of a skeleton that it does not list")
-        self.offsets = self._offsets()
+        self.ends = self._ends()
         self._signals: dict[tuple[int, ...], SignalRow] = {}  # those of an archive are few
 
-    def _offsets(self) -> Numbers:
-        """The offset of each CLIP."""  # INDX-01
-        number = self.clips.numbers
-        segments = self.index.segments
+    def _ends(self) -> Numbers:
+        """Where the CEND of each clip ends."""  # INDX-01
+        number, segments = self.clips.numbers, self.index.segments
         inside = np.concatenate(([0], _ends(segments.numbers("gap") + segments.numbers("size"), 0)))
         data = np.diff(inside[self.segment_bounds])
         rest = number("length") + data + number("cend_gap") + number("cend_length") + 2 * FRAMING
-        return _ends(number("gap") + rest, self.start) - rest
+        ends = _ends(number("gap") + rest, self.start)
+        self.offsets = ends - rest
+        return ends
+
+    @cached_property
+    def _fields(self) -> list[tuple[Any, ...]]:
+        """Of each clip the fields of its row, and places in other tables."""
+        number, bounds = self.clips.numbers, (self.signal_bounds, self.segment_bounds)
+        columns = [
+            *(number(name) for name in ("skeleton", "n_frames")),
+            *(number(name) for name in ("rate_numerator", "rate_denominator")),
+            *(self.offsets, number("length"), self.ends, number("cend_length")),
+            *(side for bound in bounds for side in (bound[:-1], bound[1:])),
+            number("n_ancillary"),
+        ]
+        return list(zip(self.names, *(column.tolist() for column in columns), strict=True))
+
+    @cached_property
+    def _segments(self) -> Packed:
+        return _rows(self.index.segments, SEGMENT_ROW)
+
+    @cached_property
+    def _signal_rows(self) -> list[tuple[int, ...]]:
+        return _rows(self.index.signals, SIGNAL_ROW)
 
     def row(self, number: int) -> ClipRow:
         """The row of a clip."""
-        fields = self.clips[number]
-        first, stop = self.segment_bounds[number : number + 2]
+        name, skeleton, n_frames, numerator, denominator, *places = self._fields[number]
+        at, length, end, cend_length, first, stop, first_segment, stop_segment, more = places
         row = PackedClipRow(
-            fields.name,
-            self.index.skeletons[fields.skeleton],
-            fields.n_frames,
-            fields.rate_numerator,
-            fields.rate_denominator,
-            self.signals(number),
-            Chunk(b"CLIP", 0, int(self.offsets[number]), fields.length),
+            name,
+            self.index.skeletons[skeleton],
+            n_frames,
+            numerator,
+            denominator,
+            tuple(map(self._signal, self._signal_rows[first:stop])),
+            Chunk(b"CLIP", 0, at, length),
+            cend=Chunk(b"CEND", 0, end - cend_length - FRAMING, cend_length),
         )
-        packed = self.index.segments[first:stop], fields.cend_gap, fields.cend_length
-        row.keep_packed(packed, parse_segments)
-        if fields.n_ancillary:
-            assert row.cend is not None
-            row.ancillary = self.ancillary(number + 1, row.cend.stop)
+        row.keep_packed(lambda: self._segments[first_segment:stop_segment], parse_segments)
+        if more:
+            row.ancillary = self.ancillary(number + 1, end)
         return row
 
-    def signals(self, number: int) -> tuple[SignalRow, ...]:
-        first, stop = self.signal_bounds[number : number + 2].tolist()
-        found = []
-        for index in range(first, stop):
-            key = tuple(int(self.index.signals.numbers(name)[index]) for name in SIGNAL_ROW)
-            if key not in self._signals:
-                self._signals[key] = SignalRow(**dict(zip(SIGNAL_ROW, key, strict=True)))
-            found.append(self._signals[key])
-        return tuple(found)
+    def _signal(self, fields: tuple[int, ...]) -> SignalRow:
+        found = self._signals.get(fields)
+        if found is None:
+            found = self._signals[fields] = SignalRow(**dict(zip(SIGNAL_ROW, fields, strict=True)))
+        return found
 
     def ancillary(self, group: int, start: int) -> list[Chunk]:
         """The ancillary chunks behind clip ``group`` - 1, or of group 0 behind the clips before."""
@@ -288,14 +311,19 @@ class _Clips:
         }
 
 
-def parse_segments(clip: ClipRow, packed: Packed) -> tuple[list[SegmentRow], Chunk]:
-    """The segments of a clip, and its CEND."""
-    table, cend_gap, length = packed
+def _rows(
+    table: Table[IndexedSegment] | Table[IndexedSignal], names: Sequence[str]
+) -> list[tuple[int, ...]]:
+    """The rows of a table of numbers."""
+    return list(zip(*(table.numbers(name).tolist() for name in names), strict=True))
+
+
+def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
+    """The segments of a clip."""
     segments: list[SegmentRow] = []
     first, where = [0] * len(clip.signals), f"INDX: clip {clip.name!r}"
     end = clip.clip.stop  # INDX-01
-    lists = [table.numbers(name).tolist() for name in SEGMENT_ROW]
-    for gap, size, signal, n_frames, lead, tail, flags in zip(*lists, strict=True):
+    for gap, size, signal, n_frames, lead, tail, flags in rows:
         if signal >= len(first):
             raise FormatError(f"{where} has a segment of signal {signal}")
         kind = next((kind for kind, bit in PACKETS.items() if flags & bit), 0)
@@ -306,4 +334,4 @@ def parse_segments(clip: ClipRow, packed: Packed) -> tuple[list[SegmentRow], Chu
         segments.append(SegmentRow(end + gap, size, header, kind))
         first[signal] += n_frames
         end += gap + size
-    return segments, Chunk(b"CEND", 0, end + cend_gap, length)
+    return segments

@@ -24,7 +24,7 @@ from mcz.container.chunks import (
     read_chunk,
 )
 from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
-from mcz.container.index import packed_segments
+from mcz.container.index import segment_rows
 from mcz.container.index_reader import parse_segments
 from mcz.container.metadata import Record, as_one
 from mcz.container.packed import parse_skel
@@ -167,7 +167,7 @@ class Carrier:
 
     def _body(self, row: ClipRow, new: PackedClipRow) -> None:
         """What lies between CLIP and CEND, and CEND; ``new`` learns where."""
-        packed, cend = row.packed, row.cend
+        packed, cend = segment_rows(row), row.cend
         if cend is None:
             raise FormatError(f"clip {row.name!r} has no CEND")
         source, at = self.container.source, row.clip.offset + row.clip.size
@@ -186,12 +186,12 @@ class Carrier:
                 moved.append((at, less))
         if at != cend.offset + cend.size:
             raise FormatError(f"{cend.label} is not where the index says", clip=row.name)
-        if not moved:
-            new.keep_packed(packed or packed_segments(row), parse_segments)
-            return
-        shift = new.clip.offset + new.clip.size - (row.clip.offset + row.clip.size)
-        new.segments = [_moved(segment, shift, moved) for segment in row.segments]
+        shift = new.clip.stop - row.clip.stop
         new.cend = replace(cend, offset=cend.offset + shift - less)
+        if moved:
+            new.segments = [_moved(segment, shift, moved) for segment in row.segments]
+        else:
+            new.keep_packed(lambda: packed, parse_segments)
 
     def _open_data(self, chunk: Chunk) -> int:
         """Carry an open DATA over, packets and all; return where it ends."""

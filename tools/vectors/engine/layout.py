@@ -24,7 +24,7 @@ from mcz.container.chunks import (
     parse_header,
 )
 from mcz.container.directory import ClipRow, Directory, SegmentRow
-from mcz.container.index import Listing, packed_segments
+from mcz.container.index import Listing, end_of, segment_rows
 from mcz.container.index_reader import ClipTables, directory_of, parse_index
 from mcz.container.packets import (
     CHECK_SIZE,
@@ -246,14 +246,14 @@ class Layout:
         if start is None:
             clip.clip = replace(clip.clip, offset=0)
             return
-        packed, cend = packed_segments(clip), clip.cend
-        gap = packed[1]
+        cend, last = clip.cend, end_of(clip, segment_rows(clip))
         was = {row.offset: row for row in clip.segments}
         clip.name = self._name(moved[clip.clip.payload_offset], clip.name)
         clip.clip, clip.segments = start, list(self._segment_rows(start, was))
         end = clip.segments[-1].stop if clip.segments else start.stop
         found = None if cend is None else _moved(cend, moved)
-        clip.cend = found or Chunk(b"CEND", 0, end + gap, packed[2])
+        assert cend is not None
+        clip.cend = found or replace(cend, offset=end + cend.offset - last)
         ancillary = (_moved(chunk, moved) for chunk in clip.ancillary)
         clip.ancillary = sorted(
             (chunk for chunk in ancillary if chunk and chunk.offset >= clip.cend.stop),
