@@ -11,7 +11,7 @@ from itertools import islice
 
 import numpy as np
 
-from mcz.container import payloads
+from mcz.container import index_records
 from mcz.container.chunks import (
     ANCILLARY,
     FRAMING,
@@ -60,15 +60,15 @@ def build_index(directory: Directory) -> bytes:
 
 def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
     """The INDX chunk of this content."""
-    record = payloads.Indx(size=len(content), data=deflate(content))
+    record = index_records.Indx(size=len(content), data=deflate(content))
     if since is not None:
-        record.flags, record.previous = payloads.CONTINUES, previous_of(since)
+        record.flags, record.previous = index_records.CONTINUES, previous_of(since)
     return build_chunk(b"INDX", build(record, "INDX"), ANCILLARY)
 
 
-def previous_of(place: IndexPlace) -> payloads.PreviousIndex:
+def previous_of(place: IndexPlace) -> index_records.PreviousIndex:
     """How an INDX names the one that it continues."""
-    return payloads.PreviousIndex(offset=place.offset, length=place.length, crc=place.crc)
+    return index_records.PreviousIndex(offset=place.offset, length=place.length, crc=place.crc)
 
 
 def index_content(directory: Directory, since: IndexPlace | None = None) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mcz.container import payloads
+from mcz.container import index_records
 from mcz.container.chunks import CRC, Chunk, build_chunk
 from mcz.container.directory import Directory, IndexPlace
 from mcz.container.index import index_record
@@ -24,7 +24,7 @@ class IndexCheck:
         ``limit`` bounds its inflated size.
         """
         where = f"chunk {chunk.label}"
-        outer = parse(payloads.Indx, payload, where)
+        outer = parse(index_records.Indx, payload, where)
         since = None if outer.previous is None else self._found(outer.previous, chunk, where)
         depth = 1 if since is None else self._depths[since] + 1
         if depth > MOST_INDEXES:  # INDX-07
@@ -38,7 +38,7 @@ class IndexCheck:
         (crc,) = CRC.unpack(build_chunk(chunk.type, payload, chunk.flags)[-CRC.size :])
         self._depths[place_of(chunk, crc, outer.size, directory)] = depth
 
-    def _found(self, previous: payloads.PreviousIndex, chunk: Chunk, where: str) -> IndexPlace:
+    def _found(self, previous: index_records.PreviousIndex, chunk: Chunk, where: str) -> IndexPlace:
         """The INDX that another one continues."""
         check_order(previous, chunk.offset)
         named = previous.offset, previous.length, previous.crc

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mcz.container import payloads
+from mcz.container import index_records
 from mcz.container.chunks import (
     ANCILLARY,
     CRC,
@@ -60,7 +60,7 @@ class Listed:
     offset: int
     length: int
     crc: int
-    previous: payloads.PreviousIndex | None
+    previous: index_records.PreviousIndex | None
     n_bytes: int
     index: Index
 
@@ -76,7 +76,7 @@ def parse_index(data: bytes, offset: int, limit: int) -> Listed:
     ``limit`` bounds its inflated size.
     """
     chunk = Chunk(b"INDX", ANCILLARY, offset, len(data) - FRAMING)
-    outer = parse(payloads.Indx, check_chunk(data, chunk), "INDX")
+    outer = parse(index_records.Indx, check_chunk(data, chunk), "INDX")
     index = parse(Index, inflated(outer, limit), "INDX")
     (crc,) = CRC.unpack(data[-CRC.size :])
     if outer.previous is not None:
@@ -84,13 +84,13 @@ def parse_index(data: bytes, offset: int, limit: int) -> Listed:
     return Listed(offset, len(data), crc, outer.previous, outer.size, index)
 
 
-def inflated(outer: payloads.Indx, limit: int) -> bytes:
+def inflated(outer: index_records.Indx, limit: int) -> bytes:
     """The content of an INDX."""
     check("INDX: inflated size", outer.size, limit)
     return inflate(outer.data, outer.size, "INDX")
 
 
-def check_order(previous: payloads.PreviousIndex, offset: int) -> None:
+def check_order(previous: index_records.PreviousIndex, offset: int) -> None:
     """Refuse an INDX at ``offset`` that continues one which does not lie before it."""
     if previous.length < FRAMING or previous.offset + previous.length > offset:  # INDX-06
         raise FormatError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from construct import Int8ul
+from construct import GreedyBytes, If, Int8ul, Int32ul, this
 
 from mcz.container.payloads import ID, OF_ATTACHMENT, OF_CLIP, OF_SKELETON
 from mcz.schema import (
@@ -17,8 +17,33 @@ from mcz.schema import (
     columns,
     counted,
     field,
+    flags,
     one_of,
 )
+from mcz.schema.types import as_construct
+
+CONTINUES = 1
+
+
+class PreviousIndex(Record):
+    """The INDX that another one continues."""
+
+    offset: int = field(UVARINT, "offset of the chunk")
+    length: int = field(UVARINT, "bytes of the whole chunk")
+    crc: int = field(Int32ul, "its crc")
+
+
+class Indx(Record):
+    """INDX, a cache of what a file holds and where."""
+
+    flags: int = field(flags("continues"), "bit 0: continues an INDX before it", default=0)
+    previous: PreviousIndex | None = field(
+        If(this.flags & CONTINUES, as_construct(PreviousIndex)),
+        "the one that it continues",
+        default=None,
+    )
+    size: int = field(UVARINT, "bytes of the index, inflated")
+    data: bytes = field(GreedyBytes, "the index, as raw deflate")
 
 
 class IndexedChunk(Record):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 
-from construct import GreedyBytes, If, Int8ul, Int32ul, this
+from construct import GreedyBytes, If, Int8ul, this
 
 from mcz.container.versions import FORMAT, NEEDS_MINOR
 from mcz.numbers import GRID, Grid
@@ -32,7 +32,6 @@ from mcz.schema import (
     only_if,
     optional,
 )
-from mcz.schema.types import as_construct
 
 ID = Exactly(16)
 SHA256 = Exactly(32)
@@ -405,27 +404,3 @@ class GroupNotes(Record):
     exceptions: list[OddToken] = field(
         counted(OddToken), "tokens that the grid does not print, sorted", default=[]
     )
-
-
-CONTINUES = 1
-
-
-class PreviousIndex(Record):
-    """The INDX that another one continues."""
-
-    offset: int = field(UVARINT, "offset of the chunk")
-    length: int = field(UVARINT, "bytes of the whole chunk")
-    crc: int = field(Int32ul, "its crc")
-
-
-class Indx(Record):
-    """INDX, a cache of what a file holds and where."""
-
-    flags: int = field(flags("continues"), "bit 0: continues an INDX before it", default=0)
-    previous: PreviousIndex | None = field(
-        If(this.flags & CONTINUES, as_construct(PreviousIndex)),
-        "the one that it continues",
-        default=None,
-    )
-    size: int = field(UVARINT, "bytes of the index, inflated")
-    data: bytes = field(GreedyBytes, "the index, as raw deflate")

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from unittest import mock
 
 import mcz
-from mcz.container import payloads
+from mcz.container import index_records, payloads
 from mcz.container.chunks import (
     ANCILLARY,
     CRC,
@@ -170,7 +170,7 @@ def _payload(data: bytes, chunk: Chunk) -> bytes:
 
 def changed_index(index: bytes, change: Callable[[bytes], bytes]) -> bytes:
     """The INDX chunk with its inflated content passed through ``change``."""
-    outer = parse(payloads.Indx, index[16 : -CRC.size], "INDX")
+    outer = parse(index_records.Indx, index[16 : -CRC.size], "INDX")
     content = change(inflate(outer.data, outer.size, "INDX"))
     outer.size, outer.data = len(content), deflate(content)
     return build_chunk(b"INDX", build(outer, "INDX"), ANCILLARY)

@@ -259,8 +259,8 @@ class Crafter(Writer):
         content = built(index_records.Index, fields, "INDX")
         packed = {"size": len(content), "data": deflate(content)}
         if since is not None:
-            packed |= {"flags": payloads.CONTINUES, "previous": previous_of(since)}
-        payload = self.edited("INDX", built(payloads.Indx, packed, "INDX"))
+            packed |= {"flags": index_records.CONTINUES, "previous": previous_of(since)}
+        payload = self.edited("INDX", built(index_records.Indx, packed, "INDX"))
         return build_chunk(b"INDX", payload, ANCILLARY)
 
 

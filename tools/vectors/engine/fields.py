@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.container import payloads
+from mcz.container import index_records, payloads
 from mcz.container.index_records import Index
 from mcz.container.packed import words
 from mcz.formats import notes
@@ -27,7 +27,7 @@ SCHEMAS: dict[str, Any] = {
     "COPY": payloads.Copy,
     "META": payloads.Meta,
     "QUAL": payloads.Qual,
-    "INDX": payloads.Indx,
+    "INDX": index_records.Indx,
     "INDEX": Index,
 }
 

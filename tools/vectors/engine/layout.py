@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
-from mcz.container import payloads
+from mcz.container import index_records, payloads
 from mcz.container.chunks import (
     CRC,
     FOOT,
@@ -26,6 +26,7 @@ from mcz.container.chunks import (
 from mcz.container.directory import ClipRow, Directory, SegmentRow
 from mcz.container.index import Listing, end_of, segment_rows
 from mcz.container.index_reader import ClipTables, directory_of, parse_index
+from mcz.container.index_records import PreviousIndex
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -34,7 +35,6 @@ from mcz.container.packets import (
     build_packet,
     read_packet,
 )
-from mcz.container.payloads import PreviousIndex
 from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.segments import parse_header as parse_segment
 from mcz.container.writer import payload_id
@@ -311,8 +311,10 @@ def listing_of(part: Part, data: bytes) -> tuple[Listing, PreviousIndex | None]:
 
 
 def index_payload(content: bytes, previous: PreviousIndex | None) -> bytes:
-    flags = 0 if previous is None else payloads.CONTINUES
-    record = payloads.Indx(flags=flags, previous=previous, size=len(content), data=deflate(content))
+    flags = 0 if previous is None else index_records.CONTINUES
+    record = index_records.Indx(
+        flags=flags, previous=previous, size=len(content), data=deflate(content)
+    )
     return build(record, "INDX")
 
 
