@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import LiveWriter, codecs
-from mcz.container.chunks import REPEAT, Chunk
+from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.scan import scan
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
@@ -322,9 +322,9 @@ def test_live_clips_with_packets_and_repeats_are_carried_over(
     ):
         for row in values:
             writer.push(row)
-    assert sum(chunk.type == REPEAT for chunk in chunks_of(path)) == 4
+    assert sum(chunk.type == ChunkType.REPT for chunk in chunks_of(path)) == 4
     mcz.rename_clips(path, {"live": "later"})
-    assert not any(chunk.type == REPEAT for chunk in chunks_of(path))
+    assert not any(chunk.type == ChunkType.REPT for chunk in chunks_of(path))
     with mcz.open(path) as file:
         np.testing.assert_array_equal(file.clips["later"].read(), values)
     sound(path)

@@ -13,7 +13,7 @@ import mcz
 from conformance.run import VECTORS
 from mcz.codecs import by_name
 from mcz.container import chunks, payloads
-from mcz.container.chunks import ANCILLARY, FOOT, HEADER, SAFE_TO_COPY, build_chunk, build_foot
+from mcz.container.chunks import FOOT, HEADER, ChunkFlag, build_chunk, build_foot
 from mcz.container.packets import (
     END,
     FRAME,
@@ -124,7 +124,7 @@ def with_chunk(data: bytes, chunk: bytes) -> bytes:
 
 
 def test_unknown_ancillary_chunk_is_skipped() -> None:
-    for flags in (ANCILLARY, ANCILLARY | SAFE_TO_COPY):
+    for flags in (ChunkFlag.ANCILLARY, ChunkFlag.ANCILLARY | ChunkFlag.SAFE_TO_COPY):
         data = with_chunk(written("a"), build_chunk(b"abCD", b"whatever", flags))
         use(data)
         assert [c.type for c in scan(open_source(data)).chunks].count(b"abCD") == 1
@@ -139,7 +139,7 @@ def test_unknown_ancillary_chunk_is_skipped() -> None:
         (build_chunk(b"HEAD", b"\0\x63\0\x63\0"), FormatError),
         (build_chunk(b"CEND", b"\0\0\0"), FormatError),
         (build_chunk(b"DATA", b"\0" * 20), FormatError),
-        (build_chunk(b"ALIA", b"\x01a\x00\x01b", ANCILLARY), FormatError),
+        (build_chunk(b"ALIA", b"\x01a\x00\x01b", ChunkFlag.ANCILLARY), FormatError),
     ],
 )
 def test_chunks_out_of_place(chunk: bytes, error: type[Exception]) -> None:

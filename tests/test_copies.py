@@ -15,7 +15,7 @@ import pytest
 
 import mcz
 from mcz import FormatError, MotionError
-from mcz.container.chunks import ANCILLARY, COPIED, COPY, Chunk, build_chunk
+from mcz.container.chunks import COPIED, Chunk, ChunkFlag, ChunkType, build_chunk
 from mcz.container.copies import MOST_BYTES, Copy, build_copies, parse_copies
 from mcz.container.limits import BASE
 from mcz.container.overlay import Overlay
@@ -139,11 +139,11 @@ def test_what_lies_before_the_signature_moves_all_alike(packed: bytes) -> None:
 def test_what_is_sound_is_kept(packed: bytes) -> None:
     """A COPY that tells another tale of chunks that are there changes none of them."""
     skel, *_ = chunks(packed, b"SKEL")
-    (copy,) = chunks(packed, COPY)
-    other = build_chunk(COPY, b"", ANCILLARY)
+    (copy,) = chunks(packed, ChunkType.COPY)
+    other = build_chunk(ChunkType.COPY, b"", ChunkFlag.ANCILLARY)
     for offset, size in ((skel.offset, skel.length or 0), (skel.offset + 3, 5), (skel.offset, 9)):
         lie = [Copy(offset, b"SKEL", bytes(size))]
-        other = build_chunk(COPY, build_copies(lie, copy.offset), ANCILLARY)
+        other = build_chunk(ChunkType.COPY, build_copies(lie, copy.offset), ChunkFlag.ANCILLARY)
         bad = packed[: copy.offset] + other + packed[copy.offset + copy.size :]
         with mcz.open(bad, salvage=True) as file:
             assert any("is not used: what lies there is sound" in line for line in file.damage)
@@ -160,7 +160,7 @@ def test_an_archive_within_an_archive(packed: bytes) -> None:
     mcz.open(packed).close()
     noise = random.Random(1).randbytes(len(packed))
     writer.attachment("a.bin", noise)
-    writer.chunk(b"xtra", packed, ANCILLARY)
+    writer.chunk(b"xtra", packed, ChunkFlag.ANCILLARY)
     writer.finish()
     data = out.getvalue()
     extra = next(chunk for chunk in chunks(data) if chunk.type == b"xtra")
@@ -266,7 +266,7 @@ def test_a_rept_changes_nothing_in_a_sound_file() -> None:
 def test_repair_loses_nothing_that_has_a_copy(packed: bytes, tmp_path: Path) -> None:
     bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
     whole = content(packed)
-    kinds = {chunk.type: chunk for chunk in chunks(packed, *COPIED, COPY)}
+    kinds = {chunk.type: chunk for chunk in chunks(packed, *COPIED, ChunkType.COPY)}
     for number, chunk in enumerate(kinds.values()):
         bad.write_bytes(changed(packed, chunk.offset + (2, 17)[number % 2]))
         found = mcz.repair(bad, sound, force=True)
@@ -274,7 +274,7 @@ def test_repair_loses_nothing_that_has_a_copy(packed: bytes, tmp_path: Path) -> 
         assert not found.lost
         assert content(sound.read_bytes()) == whole
         with mcz.open(sound) as file:
-            assert len(file.container.copies()) == (chunk.type != COPY)
+            assert len(file.container.copies()) == (chunk.type != ChunkType.COPY)
 
 
 # Writing -------------------------------------------------------------------------
@@ -340,7 +340,7 @@ def test_a_file_without_clips(folder: Path, tmp_path: Path) -> None:
     assert content(changed(data, skel.offset + 18), salvage=True) == content(data)
     mcz.append([folder / "walk.bvh"], path, codec="raw")
     assert n_copies(path) == 1  # those before any clip belong to none
-    assert len(chunks(path.read_bytes(), COPY)) == 2
+    assert len(chunks(path.read_bytes(), ChunkType.COPY)) == 2
 
 
 def test_a_step_that_failed_is_not_copied() -> None:
@@ -353,7 +353,7 @@ def test_a_step_that_failed_is_not_copied() -> None:
         draft.writer.template(3, b"another")
     draft.finish()
     data = out.getvalue()
-    (copy,) = chunks(data, COPY)
+    (copy,) = chunks(data, ChunkType.COPY)
     copies = parse_copies(data[copy.payload_offset :][: copy.length], copy, len(data))
     assert [one.type for one in copies] == [b"HEAD", b"SRCE"]
     assert mcz.verify(data) == []
@@ -366,7 +366,7 @@ def test_many_of_them_lie_in_several_chunks() -> None:
         writer.template(3, draw.randbytes(size))
     writer.finish()
     data = out.getvalue()
-    found = chunks(data, COPY)
+    found = chunks(data, ChunkType.COPY)
     sizes = []
     for chunk in found:
         copies = parse_copies(data[chunk.payload_offset :][: chunk.length], chunk, len(data))
@@ -396,13 +396,13 @@ def test_the_same_with_every_byte_cut_or_changed() -> None:
     out = io.BytesIO()
     mcz.write(smooth(3), out, codec="raw", copies=True)
     data = out.getvalue()
-    (copy,) = chunks(data, COPY)
+    (copy,) = chunks(data, ChunkType.COPY)
     for at in range(copy.offset, copy.offset + copy.size):
         use(changed(data, at), salvage=True)
         assert mcz.verify(changed(data, at))
     payload = data[copy.payload_offset :][: copy.length]
     for size in range(len(payload)):
-        other = build_chunk(COPY, payload[:size], ANCILLARY)
+        other = build_chunk(ChunkType.COPY, payload[:size], ChunkFlag.ANCILLARY)
         bad = data[: copy.offset] + other + data[copy.offset + copy.size :]
         with pytest.raises(FormatError):
             scan(open_source(bad), whole=True)

@@ -16,10 +16,10 @@ import mcz
 from mcz import codecs
 from mcz.container import payloads
 from mcz.container.chunks import (
-    ANCILLARY,
     OPEN_LENGTH,
-    REPEAT,
     SIGNATURE,
+    ChunkFlag,
+    ChunkType,
     build_chunk,
     build_foot,
     build_header,
@@ -129,8 +129,8 @@ def test_what_is_repeated(codec: str) -> None:
     use(data)
     use(data, salvage=True)
     found = scan(open_source(data))
-    repeats = [chunk for chunk in found.chunks if chunk.type == REPEAT]
-    assert [chunk.flags for chunk in repeats] == [ANCILLARY] * 5
+    repeats = [chunk for chunk in found.chunks if chunk.type == ChunkType.REPT]
+    assert [chunk.flags for chunk in repeats] == [ChunkFlag.ANCILLARY] * 5
     opening = pieces(codec)[0].removeprefix(SIGNATURE)
     for chunk in repeats:
         payload = data[chunk.payload_offset :][: chunk.length]
@@ -145,7 +145,7 @@ def test_what_is_repeated(codec: str) -> None:
 @pytest.mark.parametrize(("repeat", "found"), [(0, 0), (1, 5), (2, 2), (3, 1), (9, 0)])
 def test_every_so_many_fresh_frames_are_preceded_by_it(repeat: int, found: int) -> None:
     data = b"".join(pieces(repeat=repeat))
-    assert sum(chunk.type == REPEAT for chunk, _ in parts_of(data)) == found
+    assert sum(chunk.type == ChunkType.REPT for chunk, _ in parts_of(data)) == found
     assert mcz.verify(data) == []
     with pytest.raises(mcz.OptionError, match="repeat"):
         pieces(repeat=-1)
@@ -155,7 +155,7 @@ def test_rewriting_drops_it(tmp_path) -> None:
     path, other = tmp_path / "a.mcz", tmp_path / "b.mcz"
     path.write_bytes(b"".join(pieces()))
     mcz.extract(path, other, frames=(12, 47))
-    assert all(chunk.type != REPEAT for chunk, _ in parts_of(other.read_bytes()))
+    assert all(chunk.type != ChunkType.REPT for chunk, _ in parts_of(other.read_bytes()))
     assert mcz.verify(other) == []
     with mcz.open(path) as a, mcz.open(other) as b:
         np.testing.assert_array_equal(b.clips["live"].read(), a.clips["live"].read((12, 47)))
@@ -183,7 +183,9 @@ def test_salvage_finds_a_clip_in_it() -> None:
 
 def test_salvage_is_not_misled_by_what_a_damaged_one_holds() -> None:
     data = b"".join(pieces())
-    at = next(chunk for chunk in scan(open_source(data)).chunks if chunk.type == REPEAT).offset
+    at = next(
+        chunk for chunk in scan(open_source(data)).chunks if chunk.type == ChunkType.REPT
+    ).offset
     for byte in (at, at + 5, at + 7, at + 9):
         with mcz.open(flipped(data, byte, 1), salvage=True) as file:
             assert list(file.clips) == ["live"]
@@ -468,7 +470,7 @@ def test_where_one_can_join() -> None:
             writer.push(row)
     found = [None if at is None else data[at : at + 4] for data, at in sent]
     none = [None] * 3
-    assert found == [None, b"DATA", *none, REPEAT, *none, REPEAT, None, b"CEND"]
+    assert found == [None, b"DATA", *none, ChunkType.REPT, *none, ChunkType.REPT, None, b"CEND"]
 
 
 # Cut off and damaged -----------------------------------------------------------------
@@ -830,7 +832,11 @@ def test_what_a_stream_may_repeat() -> None:
     opening = parts[0].removeprefix(SIGNATURE)
     head = chunks_in(opening, 0)[0]
     for payload in (b"", head.data, opening[:-1], opening + opening, b"noise"):
-        data = parts[0] + build_chunk(REPEAT, payload, ANCILLARY) + b"".join(parts[1:])
+        data = (
+            parts[0]
+            + build_chunk(ChunkType.REPT, payload, ChunkFlag.ANCILLARY)
+            + b"".join(parts[1:])
+        )
         found, summary = read(data, lost="hold")
         assert states(found) == "d" * 60
         assert summary.n_faults == 1
@@ -851,7 +857,7 @@ def test_critical_chunks_that_are_not_known() -> None:
     data = parts[0] + build_chunk(b"WHAT", b"") + b"".join(parts[1:])
     with pytest.raises(mcz.UnsupportedError, match="critical"):
         read(data, lost="hold")
-    data = parts[0] + build_chunk(b"what", b"x" * 2**21, ANCILLARY) + b"".join(parts[1:])
+    data = parts[0] + build_chunk(b"what", b"x" * 2**21, ChunkFlag.ANCILLARY) + b"".join(parts[1:])
     assert states(read(data, lost="hold")[0]) == "d" * 60
 
 

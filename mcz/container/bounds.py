@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from mcz.container.chunks import FRAMING
+from mcz.container.chunks import FRAMING, ChunkType
 from mcz.container.repeats import chunks_in
 from mcz.errors import FormatError
 
@@ -51,7 +51,7 @@ class Bounds:
         ``offset``: where that begins; ``own``: the payload of the CLIP that is open.
         """
         try:
-            held = [c.payload for c in chunks_in(payload, offset) if c.chunk.type == b"CLIP"]
+            held = [c.payload for c in chunks_in(payload, offset) if c.chunk.type == ChunkType.CLIP]
         except FormatError:  # what is no REPT says nothing
             return True
         self.doubt = held != [own]

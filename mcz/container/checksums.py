@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from mcz.container.chunks import Chunk
+from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.directory import parse_head
 from mcz.container.events import ChunkEvent, Event, Fault, PacketEvent
 from mcz.container.feeding import events
@@ -23,8 +23,8 @@ from mcz.container.source import ByteSource
 from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, UnsupportedError
 
-SHARED = (b"SKEL", b"MODL", b"SRCE")
-KEPT = (b"HEAD", *SHARED)  # chunks whose payloads the pass needs
+SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)
+KEPT = (ChunkType.HEAD, *SHARED)  # chunks whose payloads the pass needs
 
 Told = Callable[[int, int], object]
 
@@ -102,7 +102,7 @@ class _Check:
         elif fault.is_lost:
             self._has_lost = True
         elif chunk is not None:
-            self._has_lost = self._has_lost or chunk.type in (*KEPT, b"INDX")
+            self._has_lost = self._has_lost or chunk.type in (*KEPT, ChunkType.INDX)
             self.seen.n_chunks += 1
             self._places.add(chunk)
 
@@ -110,7 +110,7 @@ class _Check:
         """Learn what the pass has to know of a sound chunk."""
         chunk = event.chunk
         self.seen.n_chunks += 1
-        if chunk.type == b"HEAD":
+        if chunk.type == ChunkType.HEAD:
             self._places.head = event.payload
             try:
                 self.parser.profile = parse_head(event.payload)

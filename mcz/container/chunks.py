@@ -8,6 +8,7 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass, field
+from enum import Enum, IntFlag
 
 from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
@@ -21,26 +22,50 @@ FRAMING = HEADER.size + CRC.size
 FOOT = struct.Struct("<IIQQ8s")  # flags, crc, index offset, index length, end magic
 OPEN_LENGTH = 2**64 - 1
 
-ANCILLARY = 1  # a reader that does not know the type skips the chunk
-SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
-KNOWN_FLAGS = ANCILLARY | SAFE_TO_COPY
 
-INDEX = b"INDX"  # flags: ANCILLARY alone
-REPEAT = b"REPT"  # flags: ANCILLARY alone
-COPY = b"COPY"  # flags: ANCILLARY alone, for what it says is true of this file only
-RECOVERY = b"RECV"  # flags: ANCILLARY alone
-META = b"META"  # flags: ANCILLARY and SAFE_TO_COPY
-# CHUNK-16, CHUNK-17, CHUNK-18, CHUNK-19, CHUNK-20
-FLAGS_OF = {
-    INDEX: ANCILLARY,
-    b"QUAL": ANCILLARY | SAFE_TO_COPY,
-    REPEAT: ANCILLARY,
-    COPY: ANCILLARY,
-    META: ANCILLARY | SAFE_TO_COPY,
-    RECOVERY: ANCILLARY,
+class ChunkFlag(IntFlag):
+    """The flags of a chunk."""
+
+    ANCILLARY = 1  # a reader that does not know the type skips the chunk
+    SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
+
+
+# An int, since ~ of a ChunkFlag has no other bits.
+KNOWN_FLAGS = int(ChunkFlag.ANCILLARY | ChunkFlag.SAFE_TO_COPY)
+
+
+class ChunkType(bytes, Enum):
+    """The types of chunks that SPEC.md has, with their bytes."""
+
+    HEAD = b"HEAD"
+    SKEL = b"SKEL"
+    MODL = b"MODL"
+    SRCE = b"SRCE"
+    ATTA = b"ATTA"
+    ALIA = b"ALIA"
+    CLIP = b"CLIP"
+    DATA = b"DATA"
+    CEND = b"CEND"
+    INDX = b"INDX"
+    QUAL = b"QUAL"
+    REPT = b"REPT"
+    COPY = b"COPY"
+    META = b"META"
+    RECV = b"RECV"
+
+
+# CHUNK-16, CHUNK-17, CHUNK-18, CHUNK-19, CHUNK-20, CHUNK-21
+FLAGS_OF: dict[bytes, ChunkFlag] = {  # of those that are not critical
+    ChunkType.INDX: ChunkFlag.ANCILLARY,
+    ChunkType.QUAL: ChunkFlag.ANCILLARY | ChunkFlag.SAFE_TO_COPY,
+    ChunkType.REPT: ChunkFlag.ANCILLARY,
+    ChunkType.COPY: ChunkFlag.ANCILLARY,  # what it says is true of this file alone
+    ChunkType.META: ChunkFlag.ANCILLARY | ChunkFlag.SAFE_TO_COPY,
+    ChunkType.RECV: ChunkFlag.ANCILLARY,
 }
-REPEATED = (b"HEAD", b"SKEL", b"MODL", b"CLIP")  # the chunks that a REPT holds again
-COPIED = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ALIA", b"CLIP", b"CEND")  # and a COPY
+# The chunks that a REPT holds again, and those of a COPY.
+REPEATED = (ChunkType.HEAD, ChunkType.SKEL, ChunkType.MODL, ChunkType.CLIP)
+COPIED = (*REPEATED, ChunkType.SRCE, ChunkType.ALIA, ChunkType.CEND)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +136,7 @@ def parse_header(data: bytes, offset: int) -> Chunk:
             f"chunk {kind.decode()} at {offset}: flags {flags:#x}, reserved {reserved}"
         )
     if length == OPEN_LENGTH:
-        if kind != b"DATA":  # CHUNK-10
+        if kind != ChunkType.DATA:  # CHUNK-10
             raise FormatError(f"chunk {kind.decode()} at {offset} is open; only DATA may be")
         return Chunk(kind, flags, offset, None)
     if length > MAX_COUNT:

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from mcz.container import payloads
 from mcz.container.chunks import (
     COPIED,
-    COPY,
     FOOT,
     FRAMING,
     SIGNATURE,
     Chunk,
+    ChunkType,
     build_chunk,
     is_foot_at,
     read_chunk,
@@ -71,7 +71,7 @@ def runs(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
 
 def worth_it(copy: Copy, n_bytes: int) -> bool:
     """Whether a file of ``n_bytes`` should have it: no model that is a large part of the file."""
-    return copy.type != b"MODL" or len(copy.payload) * SMALL_PART <= n_bytes
+    return copy.type != ChunkType.MODL or len(copy.payload) * SMALL_PART <= n_bytes
 
 
 def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
@@ -117,7 +117,7 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
 def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
     """The COPY chunks of a file that belong to a clip; without clips all, up to a fault."""
     if directory.clips:
-        return directory.clips.ancillary(COPY)
+        return directory.clips.ancillary(ChunkType.COPY)
     found, at = [], len(SIGNATURE)
     with suppress(FormatError):
         while at < source.size:
@@ -125,7 +125,7 @@ def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
                 at += FOOT.size
                 continue
             chunk = read_chunk(source, at)
-            if chunk.type == COPY:
+            if chunk.type == ChunkType.COPY:
                 found.append(chunk)
             at += chunk.size
     return found
@@ -137,7 +137,10 @@ def uncopied(
     """Copies of the chunks behind the last COPY of a file; of aliases the directory knows none."""
     held = copy_chunks(source, directory)
     last = held[-1].offset if held else 0
-    chunks = [Chunk(b"HEAD", 0, len(SIGNATURE), len(directory.head)), *directory.shared.values()]
+    chunks = [
+        Chunk(ChunkType.HEAD, 0, len(SIGNATURE), len(directory.head)),
+        *directory.shared.values(),
+    ]
     for row in directory.clips.values():
         chunks += [chunk for chunk in (row.clip, row.cend) if chunk is not None]
     chunks = sorted((c for c in chunks if c.offset > last), key=lambda chunk: chunk.offset)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from mcz.container import payloads
-from mcz.container.chunks import HEADER, Chunk
+from mcz.container.chunks import HEADER, Chunk, ChunkType
 from mcz.container.limits import PROFILES, Profile
 from mcz.container.segments import SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
@@ -43,7 +43,7 @@ class SegmentRow:
         """The closed DATA chunk around the payload."""
         if self.packet:
             raise FormatError(f"the segment at {self.offset} is a packet, not a chunk")
-        return Chunk(b"DATA", 0, self.offset - HEADER.size, self.size)
+        return Chunk(ChunkType.DATA, 0, self.offset - HEADER.size, self.size)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mcz.container.chunks import ANCILLARY, FLAGS_OF, Chunk
+from mcz.container.chunks import FLAGS_OF, Chunk, ChunkFlag, ChunkType
 from mcz.errors import FormatError, UnsupportedError
 
 # States: what was read last, and so what may follow.
@@ -32,10 +32,7 @@ GRAMMAR: dict[str, dict[str, str]] = {
     FOOT: {BODY: FILE, INDEX: FILE, FILE: FILE},
     END: {FILE: END},
 }
-CRITICAL = {
-    name.encode(): name
-    for name in ("HEAD", "SKEL", "MODL", "SRCE", "ATTA", "ALIA", "CLIP", "DATA", "CEND", "INDX")
-}
+CRITICAL: dict[bytes, str] = {kind: kind.name for kind in ChunkType if kind.name in GRAMMAR}
 
 
 def thing_of(chunk: Chunk) -> str:
@@ -45,7 +42,7 @@ def thing_of(chunk: Chunk) -> str:
         raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, not those of its type")
     if thing is not None:
         return thing
-    if chunk.flags & ANCILLARY:  # CHUNK-12
+    if chunk.flags & ChunkFlag.ANCILLARY:  # CHUNK-12
         return OTHER
     raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")  # CHUNK-11
 

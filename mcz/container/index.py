@@ -12,12 +12,7 @@ from itertools import islice
 import numpy as np
 
 from mcz.container import index_records
-from mcz.container.chunks import (
-    ANCILLARY,
-    FRAMING,
-    Chunk,
-    build_chunk,
-)
+from mcz.container.chunks import FRAMING, Chunk, ChunkFlag, ChunkType, build_chunk
 from mcz.container.directory import (
     ClipRow,
     Directory,
@@ -63,7 +58,7 @@ def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
     record = index_records.Indx(size=len(content), data=deflate(content))
     if since is not None:
         record.flags, record.previous = index_records.CONTINUES, previous_of(since)
-    return build_chunk(b"INDX", build(record, "INDX"), ANCILLARY)
+    return build_chunk(ChunkType.INDX, build(record, "INDX"), ChunkFlag.ANCILLARY)
 
 
 def previous_of(place: IndexPlace) -> index_records.PreviousIndex:
@@ -128,7 +123,9 @@ class Listing:
                 size=[row.size for row in attachments],
                 n_parts=[len(row.parts) for row in attachments],
             ),
-            parts=Table.of(IndexedPlace, type=[b"ATTA"] * len(parts), **_places(parts, self.start)),
+            parts=Table.of(
+                IndexedPlace, type=[ChunkType.ATTA] * len(parts), **_places(parts, self.start)
+            ),
             aliases=Table.of(
                 IndexedAlias,
                 name=list(self.new.aliases),

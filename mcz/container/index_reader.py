@@ -13,13 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mcz.container import index_records
-from mcz.container.chunks import (
-    ANCILLARY,
-    CRC,
-    FRAMING,
-    Chunk,
-    check_chunk,
-)
+from mcz.container.chunks import CRC, FRAMING, Chunk, ChunkFlag, ChunkType, check_chunk
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -75,7 +69,7 @@ def parse_index(data: bytes, offset: int, limit: int) -> Listed:
 
     ``limit`` bounds its inflated size.
     """
-    chunk = Chunk(b"INDX", ANCILLARY, offset, len(data) - FRAMING)
+    chunk = Chunk(ChunkType.INDX, ChunkFlag.ANCILLARY, offset, len(data) - FRAMING)
     outer = parse(index_records.Indx, check_chunk(data, chunk), "INDX")
     index = parse(Index, inflated(outer, limit), "INDX")
     (crc,) = CRC.unpack(data[-CRC.size :])
@@ -125,7 +119,7 @@ def directory_of(found: Iterable[Listed]) -> Directory:
         for row in listed.index.aliases:
             _add(directory.aliases, row.name, (row.of, row.target))
         clips.add(ClipTables(listed))
-        chunk = Chunk(b"INDX", ANCILLARY, listed.offset, listed.length - FRAMING)
+        chunk = Chunk(ChunkType.INDX, ChunkFlag.ANCILLARY, listed.offset, listed.length - FRAMING)
         directory.clips = ClipRows(clips.names, clips.row, clips.having)
         directory.indexes += (place_of(chunk, listed.crc, listed.n_bytes, directory),)
     if len(directory.clips) < len(clips.names):
@@ -184,7 +178,7 @@ def _ends(sizes: Numbers, start: int) -> Numbers:
     return start + np.cumsum(sizes)
 
 
-def _chunks(table: Places, start: int, kind: bytes = b"ATTA") -> list[Chunk]:
+def _chunks(table: Places, start: int, kind: bytes = ChunkType.ATTA) -> list[Chunk]:
     """The chunks of a table with ``gap`` and ``length``, the first behind ``start``."""
     lengths = table.numbers("length")
     ends = _ends(table.numbers("gap") + lengths + FRAMING, start)
@@ -251,8 +245,8 @@ class ClipTables:
             numerator,
             denominator,
             tuple(map(self._signal, self._signal_rows[first:stop])),
-            Chunk(b"CLIP", 0, at, length),
-            cend=Chunk(b"CEND", 0, end - cend_length - FRAMING, cend_length),
+            Chunk(ChunkType.CLIP, 0, at, length),
+            cend=Chunk(ChunkType.CEND, 0, end - cend_length - FRAMING, cend_length),
         )
         row.keep_packed(lambda: self._segments[first_segment:stop_segment], parse_segments)
         if more:
@@ -270,7 +264,7 @@ class ClipTables:
         first, stop = self.ancillary_bounds[group : group + 2]
         table = self.index.ancillary[first:stop]
         return [
-            Chunk(kind, ANCILLARY, chunk.offset, chunk.length)
+            Chunk(kind, ChunkFlag.ANCILLARY, chunk.offset, chunk.length)
             for kind, chunk in zip(table.blobs("type"), _chunks(table, start), strict=True)
         ]
 

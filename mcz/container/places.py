@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mcz.container.chunks import INDEX, Chunk
+from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.directory import ClipRow, Directory
 
 _PLACE = struct.Struct("<QQB")  # of a segment: offset, size, kind of its packet
@@ -42,19 +42,19 @@ class Places:
     def add(self, chunk: Chunk) -> None:
         """Take in the next chunk, whatever it is; those in ``shared`` come by themselves."""
         clip = self.clips[-1] if self.clips else None
-        if chunk.type == b"CLIP":
+        if chunk.type == ChunkType.CLIP:
             self.clips.append(ClipPlaces(chunk))
-        elif chunk.type == b"ATTA":
+        elif chunk.type == ChunkType.ATTA:
             self.attachments.append(chunk)
-        elif chunk.type == b"ALIA":
+        elif chunk.type == ChunkType.ALIA:
             self.n_aliases += 1
         elif clip is None:
             return
-        elif chunk.type == b"CEND":
+        elif chunk.type == ChunkType.CEND:
             clip.cend = chunk
-        elif chunk.type == b"DATA" and chunk.length is not None:
+        elif chunk.type == ChunkType.DATA and chunk.length is not None:
             clip.segment(chunk.payload_offset, chunk.length)
-        elif chunk.flags and chunk.type != INDEX and clip.cend is not None:
+        elif chunk.flags and chunk.type != ChunkType.INDX and clip.cend is not None:
             clip.ancillary.append(chunk)
 
     def differences(self, listed: Directory) -> list[str]:

@@ -15,9 +15,9 @@ from mcz.container.attachments import joined_parts
 from mcz.container.chunks import (
     FOOT,
     FRAMING,
-    META,
     SIGNATURE,
     Chunk,
+    ChunkType,
     Foot,
     build_chunk,
     check_chunk,
@@ -138,7 +138,7 @@ class Container:
     def _head(self) -> bytes:
         """The payload of HEAD; raises UnsupportedError: behind it nothing is known then."""
         head = read_chunk(self.source, len(SIGNATURE))
-        if head.type != b"HEAD":
+        if head.type != ChunkType.HEAD:
             raise FormatError(f"the first chunk is {head.label}, not HEAD")
         payload = read_payload(self.source, head, BASE.chunk_bytes)
         parse_head(payload)
@@ -180,7 +180,7 @@ class Container:
     @cached_property
     def _records(self) -> Placed:
         """What META chunks say of each name, read once."""
-        chunks = self.directory.clips.ancillary(META)
+        chunks = self.directory.clips.ancillary(ChunkType.META)
         return records_in(chunks, self.payload, self.source.size, lenient=self.salvage)
 
     def said_of(self, name: str) -> list[Record]:
@@ -212,7 +212,7 @@ class Container:
 
     def model(self, id_: bytes) -> payloads.Modl:
         """The MODL with this id, its hash checked."""
-        return parse(payloads.Modl, *self._shared_payload(b"MODL", id_))
+        return parse(payloads.Modl, *self._shared_payload(ChunkType.MODL, id_))
 
     def _shared_payload(self, kind: bytes, id_: bytes) -> tuple[bytes, str]:
         chunk = self.directory.shared.get((kind, id_))
@@ -234,7 +234,7 @@ class Container:
         """Both; the last ones are kept, since the clips of a file share them."""
         found = self._skeletons.get(id_)
         if found is None:
-            fields = parse_skel(*self._shared_payload(b"SKEL", id_), self.profile)
+            fields = parse_skel(*self._shared_payload(ChunkType.SKEL, id_), self.profile)
             found = fields, parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
             while len(self._skeletons) >= KEPT_SKELETONS:
                 self._skeletons.pop(next(iter(self._skeletons)), None)
@@ -243,7 +243,7 @@ class Container:
 
     def template(self, id_: bytes, format_id: int) -> bytes:
         """The template in the SRCE with this id."""
-        fields = parse(payloads.Srce, *self._shared_payload(b"SRCE", id_))
+        fields = parse(payloads.Srce, *self._shared_payload(ChunkType.SRCE, id_))
         if fields.format != format_id:  # CLIP-03, SKEL-04
             raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
         check(f"SRCE {id_.hex()}: bytes", fields.size, self.profile.text_bytes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mcz.container.chunks import REPEAT
+from mcz.container.chunks import ChunkType
 from mcz.container.events import ChunkEvent, Fault
 from mcz.container.grammar import START
 from mcz.container.parser import Parser
@@ -19,11 +19,11 @@ def chunks_in(payload: bytes, offset: int) -> list[ChunkEvent]:
         if isinstance(event, Fault):
             raise event.error
         if not isinstance(event, ChunkEvent):
-            raise FormatError(f"{REPEAT.decode()} before {offset} holds other things than chunks")
+            raise FormatError(f"REPT before {offset} holds other things than chunks")
         found.append(event)
     kinds = [event.chunk.type for event in found]
-    middle = set(kinds[1:-1]) <= {b"SKEL", b"MODL"}
-    if kinds[:1] != [b"HEAD"] or kinds[-1:] != [b"CLIP"] or not middle:
+    middle = set(kinds[1:-1]) <= {ChunkType.SKEL, ChunkType.MODL}
+    if kinds[:1] != [ChunkType.HEAD] or kinds[-1:] != [ChunkType.CLIP] or not middle:
         held = " ".join(kind.decode() for kind in kinds)
-        raise FormatError(f"{REPEAT.decode()} before {offset} holds {held or 'nothing'}")
+        raise FormatError(f"REPT before {offset} holds {held or 'nothing'}")
     return found

@@ -11,11 +11,11 @@ from operator import eq
 from mcz.container import payloads
 from mcz.container.chunks import (
     COPIED,
-    COPY,
     CRC,
     FOOT,
     HEADER,
     Chunk,
+    ChunkType,
     build_chunk,
     parse_header,
     read_chunk,
@@ -97,7 +97,7 @@ def _mended_headers(source: ByteSource, found: Found) -> Iterator[tuple[int, byt
                 header = (given ^ 1 << bit).to_bytes(HEADER.size, "little")
                 with suppress(FormatError):
                     mended = parse_header(header, offset)
-                    if mended.type == COPY:  # those are made anew
+                    if mended.type == ChunkType.COPY:  # those are made anew
                         continue
                     left -= HEADER.size if mended.length is None else mended.size
                     if left < 0:
@@ -153,7 +153,7 @@ def _copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy
     """The copies in every COPY that is whole; together they are no longer than the file."""
     left = source.size
     for chunk in found.chunks:
-        if chunk.type != COPY:
+        if chunk.type != ChunkType.COPY:
             continue
         try:
             copies = parse_copies(read_payload(source, chunk, chunk.size), chunk, left)
@@ -207,7 +207,7 @@ def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
 def _last_index(source: ByteSource, found: Found) -> Directory | None:
     """What the last INDX says that is whole, and those that it continues up to a damaged one."""
     for chunk in reversed(found.chunks):
-        if chunk.type == b"INDX":
+        if chunk.type == ChunkType.INDX:
             whole: list[Listed] = []
             with suppress(FormatError):
                 limit = index_limit(source.size)
@@ -235,7 +235,7 @@ def restore_from_index(source: ByteSource, found: Found) -> list[str]:
             directory.aliases[name] = of, target
             notes.append(f"the alias {name!r} is lost; it is taken from the index")
             record = payloads.Alia(name=name, of=of, target=target)
-            alias = build_chunk(b"ALIA", build(record, "ALIA"))
+            alias = build_chunk(ChunkType.ALIA, build(record, "ALIA"))
             found.broken = [b for b in found.broken if not is_like(source, b[0], alias)]
     if not directory.head:
         notes.append("no HEAD; the file is read as one of this version")

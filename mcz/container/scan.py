@@ -9,7 +9,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from mcz.container.bounds import NOBODY, Bounds, Owners
-from mcz.container.chunks import FOOT, REPEAT, REPEATED, Chunk, read_payload
+from mcz.container.chunks import FOOT, REPEATED, Chunk, ChunkType, read_payload
 from mcz.container.directory import Found, SegmentRow
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.feeding import events
@@ -78,7 +78,7 @@ class Salvager(Scanner):
                 else:
                     self._take(event)
             except FormatError as error:
-                of_head = getattr(getattr(event, "chunk", None), "type", b"") == b"HEAD"
+                of_head = getattr(getattr(event, "chunk", None), "type", b"") == ChunkType.HEAD
                 if of_head and isinstance(error, UnsupportedError):
                     raise  # nothing is known of a file of another version
                 self._note(error)  # SALV-03
@@ -104,7 +104,7 @@ class Salvager(Scanner):
                 return
             if BODY in GRAMMAR[event.thing]:
                 self._close_clip()  # GRAM-01
-            if BODY in GRAMMAR[event.thing] or (kind == b"HEAD" and not head):
+            if BODY in GRAMMAR[event.thing] or (kind == ChunkType.HEAD and not head):
                 self._take(event)
                 return
         elif event is None and chunk is not None and not fault.is_lost:
@@ -123,9 +123,9 @@ class Salvager(Scanner):
         if kind not in REPEATED:
             return False
         payload = event.payload
-        if kind == b"HEAD":
+        if kind == ChunkType.HEAD:
             return payload == self.found.directory.head
-        if kind == b"CLIP":
+        if kind == ChunkType.CLIP:
             return payload == self._opening
         return (kind, payload_id(payload)) in self.found.directory.shared
 
@@ -203,7 +203,7 @@ class Salvager(Scanner):
         return []
 
     def _ancillary(self, chunk: Chunk, payload: bytes) -> None:
-        if chunk.type == REPEAT:  # REPT-03
+        if chunk.type == ChunkType.REPT:  # REPT-03
             self._repeat(chunk, payload)
         super()._ancillary(chunk, payload)
 

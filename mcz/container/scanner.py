@@ -8,11 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mcz.container import payloads, strict
-from mcz.container.chunks import (
-    HEADER,
-    META,
-    Chunk,
-)
+from mcz.container.chunks import HEADER, Chunk, ChunkType
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -75,7 +71,7 @@ class Scanner:
     def _wanted(self, chunk: Chunk) -> int:
         if self._whole:
             return ALL
-        if chunk.type == b"DATA":
+        if chunk.type == ChunkType.DATA:
             return PEEK
         return ALL if chunk.type in CRITICAL else PASS
 
@@ -121,14 +117,14 @@ class Scanner:
         self.found.directory.shared.setdefault((chunk.type, id_), chunk)  # GRAM-05
 
     def _check_shared(self, chunk: Chunk, id_: bytes, payload: bytes) -> None:
-        if chunk.type == b"SKEL":
+        if chunk.type == ChunkType.SKEL:
             directory = self.found.directory
             # ALIA-01
             if strict.check_skeleton(
                 payload, chunk.label, directory, self._templates, self.parser.profile
             ):
                 self._sourced.add((payloads.OF_SKELETON, id_))
-        elif chunk.type == b"SRCE":
+        elif chunk.type == ChunkType.SRCE:
             self._templates[id_] = strict.check_template(payload, chunk.label, self.parser.profile)
         else:
             parse(payloads.Modl, payload, chunk.label)
@@ -243,7 +239,7 @@ class Scanner:
             last.ancillary.append(chunk)
 
     def _check_ancillary(self, chunk: Chunk, payload: bytes) -> None:
-        if chunk.type == META and self.clip is not None:  # META-02
+        if chunk.type == ChunkType.META and self.clip is not None:  # META-02
             raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
         size = chunk.offset + chunk.size if self._size is None else self._size
         check_ancillary(chunk, payload, size, self.found, self._payload_of)

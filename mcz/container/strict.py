@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
 
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile, check
 from mcz.container.packed import parse_skel, words
@@ -51,7 +52,7 @@ def check_skeleton(
     fields = parse_skel(payload, where, profile)
     parse_skeleton(fields, profile, where)
     if fields.base is not None:
-        _refer(directory, b"SKEL", fields.base, where)  # SKEL-02
+        _refer(directory, ChunkType.SKEL, fields.base, where)  # SKEL-02
     if fields.source is not None:
         _check_source(fields.source, where, directory, templates, OF_CLIPS)
     return bool(fields.source)
@@ -74,7 +75,7 @@ def _check_source(
 ) -> None:
     """``others``: the formats that are known to be of the other sort."""
     id_ = bytes(source.template)
-    _refer(directory, b"SRCE", id_, where)  # GRAM-03
+    _refer(directory, ChunkType.SRCE, id_, where)  # GRAM-03
     if templates.get(id_, source.format) != source.format:  # CLIP-03, SKEL-04
         raise FormatError(
             f"source format {source.format}, its SRCE has {templates[id_]}", where=where
@@ -89,7 +90,7 @@ def check_clip(
     fields: payloads.Clip, where: str, directory: Directory, templates: Templates
 ) -> bool:
     """Check what CLIP refers to and names; return whether it has a source file."""
-    _refer(directory, b"SKEL", fields.skeleton, where)  # GRAM-02
+    _refer(directory, ChunkType.SKEL, fields.skeleton, where)  # GRAM-02
     if fields.source is not None:
         _check_source(fields.source, where, directory, templates, OF_SKELETONS)
         if fields.source.path:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mcz.container import payloads
-from mcz.container.chunks import COPY, META, Chunk
+from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.copies import check_copies, parse_copies
 from mcz.container.directory import Found
 from mcz.container.metadata import parse_meta
@@ -27,13 +27,13 @@ def check_ancillary(
 
     Without ``payload_of``, which reads that again, copies are not compared with it.
     """
-    if chunk.type == b"QUAL":
+    if chunk.type == ChunkType.QUAL:
         parse(payloads.Qual, payload, chunk.label)  # QUAL-02
-    elif chunk.type == META:
+    elif chunk.type == ChunkType.META:
         if not found.directory.clips:  # META-01
             raise FormatError(f"chunk {chunk.label} lies before the first clip")
         parse_meta(payload, chunk, file_bytes)
-    elif chunk.type == COPY:
+    elif chunk.type == ChunkType.COPY:
         copies = parse_copies(payload, chunk, file_bytes)
         if payload_of is not None:
             check_copies(copies, chunk, found.chunks, payload_of)

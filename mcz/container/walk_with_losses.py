@@ -13,16 +13,13 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from mcz.container.chunks import (
-    ANCILLARY,
-    COPY,
     END_MAGIC,
     FOOT,
     HEADER,
-    META,
-    RECOVERY,
-    REPEAT,
     REPEATED,
     SIGNATURE,
+    ChunkFlag,
+    ChunkType,
     check_chunk,
     parse_header,
 )
@@ -99,13 +96,12 @@ class PipeSource(ByteSource):
         return False
 
 
-TYPES = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ATTA", b"ALIA", b"CLIP", b"DATA", b"CEND")
-KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT, COPY, META, RECOVERY))
-WANTED = frozenset((*REPEATED, b"DATA", b"CEND", REPEAT))
+KNOWN = frozenset(ChunkType)
+WANTED = frozenset((*REPEATED, ChunkType.DATA, ChunkType.CEND, ChunkType.REPT))
 SMALL = MIB  # a chunk that is not wanted is checked up to this length, and skipped beyond
 TRY = 256  # bytes that a try counts as, beside those that it reads
 
-_CHUNK = b"(?=" + b"|".join(sorted(KNOWN)) + b")"
+_CHUNK = b"(?=" + b"|".join(sorted(kind.value for kind in KNOWN)) + b")"
 _ANY_CHUNK = re.compile(_CHUNK)
 _ANY_PACKET = re.compile(rb"[\x00-\x03\x80-\x83]|" + _CHUNK)
 _NAME_SIZE = 4
@@ -289,7 +285,10 @@ class WalkerWithLosses:
     def _chunk(self, at: int, most: int) -> tuple[Piece, int]:
         header = self.pipe.read(at, HEADER.size)
         chunk = parse_header(header, at)
-        if chunk.flags != (ANCILLARY if chunk.type == REPEAT else 0) and chunk.type in WANTED:
+        if (
+            chunk.flags != (ChunkFlag.ANCILLARY if chunk.type == ChunkType.REPT else 0)
+            and chunk.type in WANTED
+        ):
             raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}")
         if chunk.length is None:
             return Piece(chunk.type, header), chunk.payload_offset
@@ -300,7 +299,7 @@ class WalkerWithLosses:
             return Piece(chunk.type, b"", b""), at + chunk.size
         data = self.pipe.read(at, chunk.size)
         payload = check_chunk(data, chunk)
-        if chunk.type not in KNOWN and not chunk.flags & ANCILLARY:
+        if chunk.type not in KNOWN and not chunk.flags & ChunkFlag.ANCILLARY:
             raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")
         return Piece(chunk.type, data, payload), at + chunk.size
 

@@ -12,14 +12,12 @@ from typing import Protocol
 
 from mcz.container import payloads
 from mcz.container.chunks import (
-    ANCILLARY,
     COPIED,
-    COPY,
-    META,
     OPEN_LENGTH,
-    SAFE_TO_COPY,
     SIGNATURE,
     Chunk,
+    ChunkFlag,
+    ChunkType,
     build_chunk,
     build_foot,
     build_header,
@@ -105,7 +103,7 @@ class Writer:
     def _write_head(self, extension: bytes) -> None:
         self._write(SIGNATURE)
         self.directory.head = build_head(self.profile) + extension
-        self.chunk(b"HEAD", self.directory.head)
+        self.chunk(ChunkType.HEAD, self.directory.head)
 
     def _write(self, data: bytes) -> None:
         self._sink.write(data)
@@ -133,7 +131,7 @@ class Writer:
         check("template: bytes", len(template), self.profile.text_bytes)
         encoding, data = smallest(template, short=self.short)
         record = payloads.Srce(format=format_id, encoding=encoding, size=len(template), data=data)
-        return self.shared(b"SRCE", build(record, "SRCE"))
+        return self.shared(ChunkType.SRCE, build(record, "SRCE"))
 
     def attachment(self, name: str, data: bytes) -> None:
         """Write a whole file, opaque, in parts of 1 MiB."""
@@ -155,26 +153,26 @@ class Writer:
                 part_size=len(piece),
                 data=packed,
             )
-            row.parts.append(self.chunk(b"ATTA", build(record, "ATTA")))
+            row.parts.append(self.chunk(ChunkType.ATTA, build(record, "ATTA")))
         self.directory.attachments[name] = row
 
     def attachment_parts(self, name: str, size: int, parts: Sequence[bytes]) -> None:
         """Write an attachment from the payloads of its ATTA chunks."""
         self._between_clips("ATTA")
         self._new_name(name, self.directory.attachments)
-        row = AttachmentRow(name, size, [self.chunk(b"ATTA", part) for part in parts])
+        row = AttachmentRow(name, size, [self.chunk(ChunkType.ATTA, part) for part in parts])
         self.directory.attachments[name] = row
 
     def alias(self, name: str, of: int, target: bytes) -> None:
         """Write that the file ``name`` is identical to something that this file holds."""
         self._between_clips("ALIA")
         self._new_name(name, self.directory.aliases)
-        self.chunk(b"ALIA", build(payloads.Alia(name=name, of=of, target=target), "ALIA"))
+        self.chunk(ChunkType.ALIA, build(payloads.Alia(name=name, of=of, target=target), "ALIA"))
         self.directory.aliases[name] = (of, target)
 
     def ancillary(self, kind: bytes, payload: bytes, *, safe_to_copy: bool = True) -> None:
         """Write an ancillary chunk; between clips it belongs to the clip before."""
-        flags = ANCILLARY | (SAFE_TO_COPY if safe_to_copy else 0)
+        flags = ChunkFlag.ANCILLARY | (ChunkFlag.SAFE_TO_COPY if safe_to_copy else 0)
         chunk = self.chunk(kind, payload, flags)
         last = self.directory.clips.last
         if self._clip is None and last is not None:
@@ -187,7 +185,7 @@ class Writer:
         if not name:
             raise MotionError("a clip needs a name")
         self._new_name(name, self.directory.clips)
-        chunk = self.chunk(b"CLIP", build(record, f"clip {name!r}"))
+        chunk = self.chunk(ChunkType.CLIP, build(record, f"clip {name!r}"))
         signals = tuple(
             SignalRow(n, s.samples_per_frame, s.codec, s.codec_version, s.skip, s.spare)
             for n, s in zip(n_channels, record.signals, strict=True)
@@ -200,7 +198,7 @@ class Writer:
         clip = self._in_clip("DATA")
         payload = build_segment(header, streams)
         if self._next_packet is None:
-            chunk = self.chunk(b"DATA", payload)
+            chunk = self.chunk(ChunkType.DATA, payload)
             clip.segments.append(SegmentRow(chunk.payload_offset, len(payload), header))
         else:
             fresh = bool(header.flags & FRESH)
@@ -231,7 +229,7 @@ class Writer:
         self._in_clip("DATA")
         if self._next_packet is not None:
             raise FormatError("a DATA is open already")
-        self._write(build_header(b"DATA", 0, OPEN_LENGTH))
+        self._write(build_header(ChunkType.DATA, 0, OPEN_LENGTH))
         self._next_packet = 0
 
     def close_data(self) -> None:
@@ -263,7 +261,7 @@ class Writer:
             extension=extension,
         )
         clip.n_frames = n_frames
-        clip.cend = self.chunk(b"CEND", build(record, "CEND"))
+        clip.cend = self.chunk(ChunkType.CEND, build(record, "CEND"))
         self.directory.clips[clip.name] = clip
         self._clip = None
 
@@ -276,7 +274,7 @@ class Writer:
         if records and not self.directory.clips:
             raise MotionError("metadata in a file without a clip")  # META-01
         for payload in build_metas(records, short=self.short):
-            self.ancillary(META, payload)
+            self.ancillary(ChunkType.META, payload)
 
     def begin_carried(self, row: ClipRow, payload: bytes) -> None:
         """Write the CLIP ``payload`` of a clip whose chunks are carried over from another file.
@@ -286,7 +284,7 @@ class Writer:
         """
         self._between_clips("CLIP")
         self._new_name(row.name, self.directory.clips)
-        row.clip = self.chunk(b"CLIP", payload)
+        row.clip = self.chunk(ChunkType.CLIP, payload)
         self._clip = row
 
     def raw(self, data: bytes) -> None:
@@ -305,7 +303,7 @@ class Writer:
         self._between_clips("FOOT")
         copies = (copy for copy in self._copies or () if worth_it(copy, self.offset))
         for run in runs(copies):
-            self.ancillary(COPY, build_copies(run, self.offset), safe_to_copy=False)
+            self.ancillary(ChunkType.COPY, build_copies(run, self.offset), safe_to_copy=False)
         start, length = 0, 0
         if index and not (self.short and self.offset <= UNINDEXED):
             chunk = build_index(self.directory)

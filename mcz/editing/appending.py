@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, cast
 
 from mcz.container import payloads
-from mcz.container.chunks import FOOT, SIGNATURE, Chunk, read_payload
+from mcz.container.chunks import FOOT, SIGNATURE, Chunk, ChunkType, read_payload
 from mcz.container.locks import lock
 from mcz.container.reader import Container
 from mcz.container.scan import scan
@@ -161,10 +161,10 @@ def _whole_until(source: ByteSource, start: int) -> int:
     for chunk in found.chunks:
         if chunk.offset < start:
             continue
-        if chunk.offset != at or chunk.type == b"INDX":
+        if chunk.offset != at or chunk.type == ChunkType.INDX:
             break  # an INDX belongs to its FOOT
         at = found.ends[at] if chunk.length is None else at + chunk.size
-        inside = chunk.type == b"CLIP" or (inside and chunk.type != b"CEND")
+        inside = chunk.type == ChunkType.CLIP or (inside and chunk.type != ChunkType.CEND)
         if not inside and _is_last_part(source, chunk):
             end = at
     return end
@@ -172,7 +172,7 @@ def _whole_until(source: ByteSource, start: int) -> int:
 
 def _is_last_part(source: ByteSource, chunk: Chunk) -> bool:
     """Whether ``chunk`` ends a thing: of an attachment only the last part does."""
-    if chunk.type != b"ATTA":
+    if chunk.type != ChunkType.ATTA:
         return True
     fields = parse(payloads.Atta, read_payload(source, chunk, chunk.size), chunk.label)
     return bool(fields.part + 1 == fields.n_parts)

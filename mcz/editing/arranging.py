@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 
 from mcz.brief import counted, nearest, shown
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.editing.carrying import SAME, Change
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.rewriting import (
@@ -126,12 +127,14 @@ def _without(file: File, gone: Plan) -> Plan:
     for alias, (of, target) in file.aliases.items():
         if of == payloads.OF_SKELETON and alias in gone.aliases:
             lost |= used_by_skeleton(file.container, target)
-        elif of == payloads.OF_SKELETON and (b"SKEL", target) not in lost:
+        elif of == payloads.OF_SKELETON and (ChunkType.SKEL, target) not in lost:
             needed |= used_by_skeleton(file.container, target)
     lost -= needed
     plan.shared = [key for key in plan.shared if key not in lost]
     for alias, (of, target) in file.aliases.items():
-        if alias in gone.aliases or (of == payloads.OF_SKELETON and (b"SKEL", target) in lost):
+        if alias in gone.aliases or (
+            of == payloads.OF_SKELETON and (ChunkType.SKEL, target) in lost
+        ):
             del plan.aliases[alias]
     return plan
 
@@ -310,7 +313,7 @@ def _groups(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
         groups.setdefault(rest, []).extend(without)
     elif without or file.attachments or others:
         left = [(len(without), "clip"), (len(file.attachments), "attachment")]
-        left.append((sum(kind == b"SKEL" for kind, _ in others), "skeleton"))
+        left.append((sum(kind == ChunkType.SKEL for kind, _ in others), "skeleton"))
         said = ", ".join(counted(n, word) for n, word in left if n)
         if said:
             raise OptionError(f"{said} without {by}; name a file for the rest", path=file.name)
@@ -343,7 +346,11 @@ def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
         name = target.decode("utf-8", "replace")
         of_clip = of == payloads.OF_CLIP and name in plan.clips
         of_attachment = of == payloads.OF_ATTACHMENT and name in plan.attachments
-        if of_clip or of_attachment or (of == payloads.OF_SKELETON and (b"SKEL", target) in needed):
+        if (
+            of_clip
+            or of_attachment
+            or (of == payloads.OF_SKELETON and (ChunkType.SKEL, target) in needed)
+        ):
             plan.aliases[alias] = alias
     return plan
 

@@ -12,14 +12,11 @@ from fractions import Fraction
 
 from mcz.container import payloads
 from mcz.container.chunks import (
-    COPY,
     FOOT,
-    INDEX,
-    META,
-    RECOVERY,
-    SAFE_TO_COPY,
     SIGNATURE,
     Chunk,
+    ChunkFlag,
+    ChunkType,
     is_foot_at,
     read_chunk,
 )
@@ -85,15 +82,15 @@ class Carrier:
         """Carry a SKEL over after its bases and their templates, unless it is there."""
         chain: list[bytes] = []
         wanted: bytes | None = id_
-        while wanted and (b"SKEL", wanted) not in self.writer.directory.shared:
-            payload = self.stored(b"SKEL", wanted)
+        while wanted and (ChunkType.SKEL, wanted) not in self.writer.directory.shared:
+            payload = self.stored(ChunkType.SKEL, wanted)
             fields = parse_skel(payload, "SKEL", self.container.profile)
             if fields.source is not None:
-                self.shared(b"SRCE", fields.source.template)
+                self.shared(ChunkType.SRCE, fields.source.template)
             chain.append(payload)
             wanted = fields.base
         for payload in reversed(chain):
-            self.writer.shared(b"SKEL", payload)
+            self.writer.shared(ChunkType.SKEL, payload)
 
     def attachment(self, name: str, as_name: str | None = None) -> None:
         """Carry an attached file over, perhaps under another name."""
@@ -113,7 +110,7 @@ class Carrier:
                 at += FOOT.size
                 continue
             chunk = read_chunk(source, at)
-            if chunk.flags and chunk.type != INDEX:
+            if chunk.flags and chunk.type != ChunkType.INDX:
                 self.ancillary(chunk)
             at += chunk.size
 
@@ -122,15 +119,15 @@ class Carrier:
 
         META is not: it may speak of other clips, see ``said_of``.
         """
-        if chunk.type == META:
+        if chunk.type == ChunkType.META:
             return False
-        if chunk.flags & SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
+        if chunk.flags & ChunkFlag.SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
             self.writer.ancillary(chunk.type, self.container.payload(chunk))
             return True
-        if chunk.type == RECOVERY:
+        if chunk.type == ChunkType.RECV:
             if UNPROTECTED not in self.left_out:  # there is one more for each part that was added
                 self.left_out.append(UNPROTECTED)
-        elif chunk.type != COPY:  # those are made anew where they are wanted
+        elif chunk.type != ChunkType.COPY:  # those are made anew where they are wanted
             self.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
         return False
 
@@ -142,7 +139,7 @@ class Carrier:
         if head.name != name or head.skeleton != row.skeleton:
             raise FormatError(f"{row.clip.label}: clip {head.name!r}, the index says {name!r}")
         if head.source is not None:
-            self.shared(b"SRCE", head.source.template)
+            self.shared(ChunkType.SRCE, head.source.template)
         self.skeleton(row.skeleton)
         if change != SAME:
             payload = _changed(payload, row.clip.label, change)

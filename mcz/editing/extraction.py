@@ -14,9 +14,7 @@ from typing import BinaryIO
 
 from mcz.brief import brief
 from mcz.container import payloads
-from mcz.container.chunks import (
-    read_chunk,
-)
+from mcz.container.chunks import ChunkType, read_chunk
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
@@ -180,7 +178,7 @@ class Copier:
     def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> Extraction:
         self.total = sum(len(part.rows) for cut in cuts for part in cut.signals)
         for (kind, _), chunk in self.container.directory.shared.items():
-            if kind == b"MODL":  # which one a clip needs, its codec alone knows
+            if kind == ChunkType.MODL:  # which one a clip needs, its codec alone knows
                 self.writer.shared(kind, self.container.payload(chunk))
         if not alone:
             self.skeletons()
@@ -199,13 +197,13 @@ class Copier:
     def skeletons(self) -> None:
         """Copy every skeleton, also those that no clip has."""
         for kind, id_ in self.container.directory.shared:
-            if kind == b"SKEL":
+            if kind == ChunkType.SKEL:
                 self.skeleton(id_)
 
     def skeleton(self, id_: bytes) -> bytes:
         """Copy a SKEL after its bases and their templates; return its payload."""
         self.carrier.skeleton(id_)
-        return self.carrier.stored(b"SKEL", id_)
+        return self.carrier.stored(ChunkType.SKEL, id_)
 
     def before_clips(self) -> None:
         """Copy the ancillary chunks that belong to no clip."""
@@ -233,7 +231,7 @@ class Copier:
         skeleton = payload_id(payload)
         if cut.joints is not None:
             payload = cut_skeleton(payload, skeleton, cut.joints, self.container.profile)
-            skeleton = self.writer.shared(b"SKEL", payload)
+            skeleton = self.writer.shared(ChunkType.SKEL, payload)
         whole = replace(record, skeleton=skeleton)
         new = whole if cut.is_whole else clip_record(cut, skeleton, record)
         source, hashes = self.finish_record(cut, new)
@@ -276,7 +274,7 @@ class Copier:
         record = write_anew(self.writer, motion, clip, settings, amend, self.progress)
         self.inside(row)
         for chunk in row.ancillary:
-            if chunk.type != b"QUAL":
+            if chunk.type != ChunkType.QUAL:
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
         return record
 
@@ -298,7 +296,7 @@ class Copier:
             if new.source is None:
                 self._without_units(cut, new)
         if new.source is not None:
-            self.carrier.shared(b"SRCE", new.source.template)
+            self.carrier.shared(ChunkType.SRCE, new.source.template)
         return source, hashes
 
     def _without_units(self, cut: ClipCut, new: payloads.Clip) -> None:
@@ -357,7 +355,7 @@ class Copier:
 
     def _quality(self, cut: ClipCut, row: ClipRow) -> None:
         """The quality record, changed where something was cut, and the other ancillary chunks."""
-        records = [chunk for chunk in row.ancillary if chunk.type == b"QUAL"]
+        records = [chunk for chunk in row.ancillary if chunk.type == ChunkType.QUAL]
         if not cut.is_whole:
             record = payloads.Qual(entries=[])
             if records:
@@ -366,9 +364,9 @@ class Copier:
             record.entries = payloads.metadata_records(
                 cut_quality(cut, {entry.key: entry.value for entry in record.entries})
             )
-            self.writer.ancillary(b"QUAL", build(record, "quality record"))
+            self.writer.ancillary(ChunkType.QUAL, build(record, "quality record"))
         for chunk in row.ancillary:
-            if cut.is_whole or chunk.type != b"QUAL":
+            if cut.is_whole or chunk.type != ChunkType.QUAL:
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
 
     def inside(self, row: ClipRow) -> None:
@@ -409,7 +407,7 @@ class Copier:
                     self.found.left_out.append(text)
                     continue
             elif of == payloads.OF_SKELETON:
-                if (b"SKEL", bytes(target)) not in self.writer.directory.shared:
+                if (ChunkType.SKEL, bytes(target)) not in self.writer.directory.shared:
                     continue
             elif alone:
                 continue

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, cast
 
 from mcz.brief import brief
-from mcz.container.chunks import ANCILLARY, CRC, FOOT, RECOVERY, Chunk, build_foot, build_header
+from mcz.container.chunks import CRC, FOOT, Chunk, ChunkFlag, ChunkType, build_foot, build_header
 from mcz.container.directory import Directory
 from mcz.container.index import build_index
 from mcz.container.reader import Container
@@ -134,7 +134,7 @@ def _piece(source: ByteSource, tail: bytes, shape: Shape, offset: int, size: int
 
 def chunk_bytes(shape: Shape, packets: Iterator[bytes]) -> Iterator[bytes]:
     """The RECV chunk, piece by piece."""
-    header = build_header(RECOVERY, ANCILLARY, shape.payload_size)
+    header = build_header(ChunkType.RECV, ChunkFlag.ANCILLARY, shape.payload_size)
     crc = zlib.crc32(header)
     yield header
     for packet in packets:
@@ -149,7 +149,7 @@ def _settled(directory: Directory, start: int, end: int, redundancy: float) -> t
     t_size = FOOT.size
     for _ in range(TRIES):
         shape = shape_for(start, end - start, t_size, redundancy)
-        chunk = Chunk(RECOVERY, ANCILLARY, end, shape.payload_size)
+        chunk = Chunk(ChunkType.RECV, ChunkFlag.ANCILLARY, end, shape.payload_size)
         if last is not None:
             last.ancillary.append(chunk)
         index = build_index(directory)

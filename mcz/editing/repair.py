@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from mcz.container.chunks import CRC, Chunk
+from mcz.container.chunks import CRC, Chunk, ChunkType
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
@@ -123,7 +123,7 @@ def _content(source: ByteSource) -> Content:
     def mark(chunk: Chunk) -> bytes:
         return container.source.read(chunk.offset + chunk.size - CRC.size, CRC.size)
 
-    found: Content = {("skeleton", id_) for kind, id_ in directory.shared if kind == b"SKEL"}
+    found: Content = {("skeleton", id_) for kind, id_ in directory.shared if kind == ChunkType.SKEL}
     found |= {("alias", name, *alias) for name, alias in directory.aliases.items()}
     for name, row in directory.clips.items():
         found.add(("clip", name, mark(row.clip)))

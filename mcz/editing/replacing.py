@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from mcz.brief import brief
 from mcz.container import payloads
-from mcz.container.chunks import read_chunk
+from mcz.container.chunks import ChunkType, read_chunk
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.locks import lock
 from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
@@ -197,7 +197,7 @@ class _Editor(Copier):
         self.skeleton(cut.clip.skeleton_id)
         source = self._source(record)
         if record.source is not None:
-            self.carrier.shared(b"SRCE", record.source.template)
+            self.carrier.shared(ChunkType.SRCE, record.source.template)
         self.writer.begin_clip(record, [part.info.layout.n_channels for part in cut.signals])
         self.inside(row)
         self._edited_segments(cut, noted=bool(record.source))

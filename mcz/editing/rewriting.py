@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.limits import BASE, Profile
 from mcz.container.locks import lock
 from mcz.container.reader import Container
@@ -82,16 +83,16 @@ def whole(file: File) -> Plan:
 def used_by(file: File, names: Iterable[str]) -> set[Shared]:
     """The skeletons with their bases, the templates and the models that these clips need."""
     container, used = file.container, set[Shared]()
-    has_models = any(kind == b"MODL" for kind, _ in container.directory.shared)
+    has_models = any(kind == ChunkType.MODL for kind, _ in container.directory.shared)
     for name in names:
         row = container.directory.clips[name]
         source = container.clip_head(row).source
         if source is not None:
-            used.add((b"SRCE", source.template))
-        if (b"SKEL", row.skeleton) not in used:
+            used.add((ChunkType.SRCE, source.template))
+        if (ChunkType.SKEL, row.skeleton) not in used:
             used |= used_by_skeleton(container, row.skeleton)
         for signal in file.clips[name].signals if has_models else ():
-            used |= {(b"MODL", id_) for id_ in models_used(signal)}
+            used |= {(ChunkType.MODL, id_) for id_ in models_used(signal)}
     return used
 
 
@@ -99,10 +100,10 @@ def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
     """A skeleton, its bases, and the templates of their own files."""
     found: set[Shared] = set()
     wanted: bytes | None = id_
-    while wanted and (b"SKEL", wanted) not in found:
+    while wanted and (ChunkType.SKEL, wanted) not in found:
         fields = container.skeleton_fields(wanted)
-        found.add((b"SKEL", wanted))
-        found |= {(b"SRCE", bytes(source.template)) for source in [fields.source] if source}
+        found.add((ChunkType.SKEL, wanted))
+        found |= {(ChunkType.SRCE, bytes(source.template)) for source in [fields.source] if source}
         wanted = fields.base
     return found
 
@@ -112,7 +113,7 @@ def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
     carrier = Carrier(file.container, writer)
     carrier.before_clips()
     for kind, id_ in plan.shared:
-        if kind == b"SKEL":
+        if kind == ChunkType.SKEL:
             carrier.skeleton(id_)
         else:
             carrier.shared(kind, id_)

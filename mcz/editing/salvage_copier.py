@@ -14,6 +14,7 @@ from pathlib import PurePosixPath
 from typing import BinaryIO
 
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.packed import parse_skel
 from mcz.container.writer import payload_id
@@ -168,7 +169,7 @@ class Repairer(Copier):
 
     def skeletons(self) -> None:
         for kind, id_ in self.container.directory.shared:
-            if kind == b"SKEL":
+            if kind == ChunkType.SKEL:
                 with suppress(FormatError):  # what is wrong with it clips say, and is told
                     self.skeleton(id_)
                     self.repair.skeletons.append(self.container.skeleton(id_).name or id_.hex())
@@ -218,12 +219,12 @@ class Repairer(Copier):
             return super().skeleton(id_)
         except FormatError as error:
             self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
-        stored, where = self.carrier.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
+        stored, where = self.carrier.stored(ChunkType.SKEL, id_), f"SKEL {id_.hex()}"
         bases = [payload_id(payload) for payload in kept.values() if payload is not None]
         record = parse_skel(stored, where, self.container.profile)
         record.base, record.source = (bases[0] if bases else None), None
         payload = build(record, "skeleton")
-        self.writer.shared(b"SKEL", payload)
+        self.writer.shared(ChunkType.SKEL, payload)
         return payload
 
     def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
@@ -236,7 +237,7 @@ class Repairer(Copier):
     def _restores(self, of: int, target: bytes) -> bool:
         """Return whether the file that is written gives what an alias stands for."""
         if of == payloads.OF_SKELETON:
-            return (b"SKEL", target) in self.writer.directory.shared
+            return (ChunkType.SKEL, target) in self.writer.directory.shared
         here = self.repair.clips if of == payloads.OF_CLIP else self.repair.attachments
         return target.decode("utf-8", "replace") in here
 

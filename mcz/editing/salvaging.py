@@ -14,7 +14,7 @@ from itertools import pairwise
 from operator import eq
 from typing import BinaryIO
 
-from mcz.container.chunks import COPY, END_MAGIC, FOOT, RECOVERY, SIGNATURE, parse_foot
+from mcz.container.chunks import END_MAGIC, FOOT, SIGNATURE, ChunkType, parse_foot
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource
 from mcz.editing.carrying import UNPROTECTED
@@ -38,7 +38,14 @@ from mcz.reading.signal_reader import SignalReader
 from mcz.types import Progress
 
 # Chunks without content of their own, or of a clip that is named.
-TOLD = (b"HEAD", b"INDX", b"DATA", b"CEND", COPY, RECOVERY)
+TOLD = (
+    ChunkType.HEAD,
+    ChunkType.INDX,
+    ChunkType.DATA,
+    ChunkType.CEND,
+    ChunkType.COPY,
+    ChunkType.RECV,
+)
 
 
 def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress | None) -> None:

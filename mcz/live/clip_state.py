@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mcz.codecs import by_id
 from mcz.codecs.contract import LiveDecoder
 from mcz.container import payloads
-from mcz.container.chunks import SIGNATURE, Chunk, build_foot
+from mcz.container.chunks import SIGNATURE, Chunk, ChunkType, build_foot
 from mcz.container.directory import ClipRow, signal_rows
 from mcz.container.masks import parse_mask
 from mcz.container.packets import SHORT
@@ -45,14 +45,14 @@ class LiveClip:
 
 def needs(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
     """Kind and id of the chunks that a clip with these ``fields`` cannot be read without."""
-    yield b"SKEL", bytes(fields.skeleton)
+    yield ChunkType.SKEL, bytes(fields.skeleton)
     if fields.source is not None:
-        yield b"SRCE", fields.source.template
+        yield ChunkType.SRCE, fields.source.template
     for signal in fields.signals:
         with suppress(FormatError):  # it is said when the signal is read
             uses = by_id(signal.codec, signal.codec_version).uses
             for id_ in () if uses is None else uses(bytes(signal.header)):
-                yield b"MODL", id_
+                yield ChunkType.MODL, id_
 
 
 def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:

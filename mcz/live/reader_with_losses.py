@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mcz.brief import brief
 from mcz.container import payloads
-from mcz.container.chunks import REPEAT, Chunk
+from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.directory import parse_head
 from mcz.container.limits import check
 from mcz.container.packets import END, SEGMENT, SHORT, Packet
@@ -138,20 +138,20 @@ class FramesWithLosses:
 
     def _piece(self, piece: Piece) -> Iterator[LiveFrame]:
         kind, payload = piece.type, piece.payload
-        if kind == b"HEAD":
+        if kind == ChunkType.HEAD:
             self._walker.profile = parse_head(payload or b"")
             self._head = piece.data
-        elif kind in (b"SKEL", b"MODL"):
+        elif kind in (ChunkType.SKEL, ChunkType.MODL):
             self._keep(piece)
-        elif kind == b"CLIP":
+        elif kind == ChunkType.CLIP:
             yield from self._begin(piece)
-        elif kind == REPEAT:  # REPT-04
+        elif kind == ChunkType.REPT:  # REPT-04
             yield from self._repeat(piece)
-        elif kind == b"DATA" and payload is None:
+        elif kind == ChunkType.DATA and payload is None:
             self._open = _Open(None if self._course is None else self._course.frames.due)
-        elif kind == b"DATA" and self._course is not None:
+        elif kind == ChunkType.DATA and self._course is not None:
             yield from self._segment(payload or b"", 0, None)
-        elif kind == b"CEND":
+        elif kind == ChunkType.CEND:
             yield from self._close(piece)
         elif kind == b"FOOT":
             yield from self._leave("the file ended")
@@ -176,7 +176,7 @@ class FramesWithLosses:
             return
         yield from self._leave("another clip began")
         try:
-            chunk = Chunk(b"CLIP", 0, 0, len(piece.payload or b""))
+            chunk = Chunk(ChunkType.CLIP, 0, 0, len(piece.payload or b""))
             fields = parse(payloads.Clip, piece.payload or b"", "CLIP")
             followed = begin(self._head, self._shared, row_of(fields, chunk), fields)
         except (UnsupportedError, LimitError):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.container import payloads
-from mcz.container.chunks import build_foot
+from mcz.container.chunks import ChunkType, build_foot
 from mcz.container.directory import SegmentRow
 from mcz.container.events import ChunkEvent, PacketEvent
 from mcz.container.feeding import Stream
@@ -30,7 +30,7 @@ from mcz.schema import parse
 from mcz.types import Values
 
 Frame = tuple[int, Values, NDArray[np.bool_]]
-SHARED = (b"SKEL", b"MODL", b"SRCE")  # what clips refer to
+SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)  # what clips refer to
 
 
 def live_frames(stream: BinaryIO) -> Iterator[Frame]:
@@ -76,18 +76,18 @@ class StrictFrames:
             if not isinstance(event, (ChunkEvent, PacketEvent)):
                 continue
             kind = event.chunk.type
-            if kind == b"HEAD":
+            if kind == ChunkType.HEAD:
                 head = event.data
             elif kind in SHARED:
                 shared.setdefault((kind, payload_id(event.payload)), event.data)
-            elif kind == b"CLIP":
+            elif kind == ChunkType.CLIP:
                 row = self.scanner.clip
                 assert row is not None
                 fields = parse(payloads.Clip, event.payload, row.clip.label)
                 before = opening(head, shared, fields)
                 clip = begin(head, shared, row, fields) or _Held(before + event.data, row.name)
             elif isinstance(clip, ClipState):
-                if kind == b"CEND":
+                if kind == ChunkType.CEND:
                     clip.check_hash(parse(payloads.Cend, event.payload, "CEND"))  # PACK-19
                     self.is_checked = True
                 for segment in self.scanner.clip.segments if self.scanner.clip else ():
@@ -95,7 +95,7 @@ class StrictFrames:
             elif clip is not None:
                 yield from clip.take(self, kind, event)
             self.scanner.forget()
-            clip = None if kind == b"CEND" else clip
+            clip = None if kind == ChunkType.CEND else clip
 
     def _frame(self, clip: ClipState, row: SegmentRow, payload: bytes) -> Iterator[Frame]:
         if row.header.signal:
@@ -129,7 +129,7 @@ class _Held:
         self, reader: StrictFrames, kind: bytes, event: ChunkEvent | PacketEvent
     ) -> Iterator[Frame]:
         self._parts.append(event.data)
-        if kind != b"CEND":
+        if kind != ChunkType.CEND:
             return
         container = Container(ByteSource(io.BytesIO(b"".join(self._parts) + build_foot(0, 0))))
         clip = Clip(container, container.directory.clips[self._name])

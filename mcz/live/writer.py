@@ -17,7 +17,7 @@ from mcz.brief import brief
 from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container import payloads
-from mcz.container.chunks import ANCILLARY, REPEAT, REPEATED
+from mcz.container.chunks import REPEATED, ChunkFlag, ChunkType
 from mcz.container.masks import build_mask
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.container.time_base import ComingGaps
@@ -266,7 +266,7 @@ class LiveWriter:
             self.entry = self._outlet.size
             self._n_fresh += 1
             if self._repeat and self._n_fresh > 1 and (self._n_fresh - 1) % self._repeat == 0:
-                self._writer.chunk(REPEAT, self._opening, ANCILLARY)  # REPT-02
+                self._writer.chunk(ChunkType.REPT, self._opening, ChunkFlag.ANCILLARY)  # REPT-02
         self._writer.open_data()
         self._has_data = True
 

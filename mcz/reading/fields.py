@@ -11,7 +11,7 @@ from functools import partial
 
 from mcz.brief import among
 from mcz.codecs import by_id
-from mcz.container.chunks import FRAMING
+from mcz.container.chunks import FRAMING, ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.metadata import Record
 from mcz.container.metadata_keys import SAID, SPELLINGS
@@ -132,7 +132,7 @@ def _lossless(clip: Clip) -> Value:
 def _bytes(clip: Clip) -> Value:
     """The clip's own chunks, CLIP, DATA, CEND and QUAL; not its skeleton nor its template."""
     row = _row(clip)
-    chunks = [row.clip, *(chunk for chunk in row.ancillary if chunk.type == b"QUAL")]
+    chunks = [row.clip, *(chunk for chunk in row.ancillary if chunk.type == ChunkType.QUAL)]
     chunks += [row.cend] if row.cend else []
     closed = FRAMING * sum(not segment.packet for segment in row.segments)
     coded = sum(segment.size for segment in row.segments) + packet_framing(row.segments)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from mcz.brief import counted, shown
 from mcz.container import payloads
-from mcz.container.chunks import SIGNATURE
+from mcz.container.chunks import SIGNATURE, ChunkType
 from mcz.container.directory import AttachmentRow
 from mcz.container.metadata import applied
 from mcz.container.reader import Container
@@ -195,7 +195,7 @@ class File:
     @cached_property
     def skeletons(self) -> list[StoredSkeleton]:
         """The skeletons with their ids, in file order."""
-        ids = [id_ for kind, id_ in self.container.directory.shared if kind == b"SKEL"]
+        ids = [id_ for kind, id_ in self.container.directory.shared if kind == ChunkType.SKEL]
         return [StoredSkeleton(id_, self.skeleton(id_)) for id_ in ids]
 
     def skeleton(self, id_: bytes, *, with_source: bool = False) -> Skeleton:

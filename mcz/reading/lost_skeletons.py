@@ -16,6 +16,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.packed import pack_skeleton
 from mcz.container.reader import Container
@@ -40,12 +41,12 @@ def restore_skeletons(container: Container) -> None:
     """Give a salvaged file the skeletons that clips name, that it lost, and whose ASF it has."""
     lost = _lost(container)
     for template in list(container.directory.shared) if lost else ():
-        if template[0] == b"SRCE":
+        if template[0] == ChunkType.SRCE:
             with suppress(MczError):  # of another format, damaged as well, or no ASF
                 origin = f"its ASF, {container.directory.shared[template].label}"
                 _restore(container, lost, _of_asf(container, template[1], lost), origin)
     for base in list(container.directory.shared) if lost else ():
-        if base[0] == b"SKEL":
+        if base[0] == ChunkType.SKEL:
             with suppress(MczError):
                 _restore(container, lost, _of_base(container, base[1]), f"SKEL {base[1].hex()}")
     for row in list(container.directory.clips.values()) if lost else ():
@@ -69,7 +70,7 @@ def _without_joints(container: Container, row: ClipRow) -> None:
         names = iter(motion.skeleton.joints[0].channels)
         joints = [Joint("", channels=tuple(islice(names, size))) for size in sizes]
         payload = build_skeleton(Skeleton(tuple(joints), unit_cm=None), None)
-        container.add_shared(b"SKEL", payload)
+        container.add_shared(ChunkType.SKEL, payload)
         other = replace(row, skeleton=payload_id(payload), damage=[LOST])
         if _has_its_hashes(Clip(container, other), container.strictly()):
             row.skeleton = other.skeleton
@@ -109,7 +110,7 @@ def _restore(
     for payload in candidates:
         id_ = payload_id(payload)
         if id_ in lost:  # SALV-09
-            container.add_shared(b"SKEL", payload)
+            container.add_shared(ChunkType.SKEL, payload)
             container.damage.append(f"SKEL {id_.hex()} is lost; it is made again from {origin}")
             lost.remove(id_)
 
@@ -120,11 +121,11 @@ def _lost(container: Container) -> set[bytes]:
     named = {row.skeleton for row in directory.clips.values()}
     named |= {target for of, target in directory.aliases.values() if of == payloads.OF_SKELETON}
     for kind, id_ in directory.shared:
-        if kind == b"SKEL":
+        if kind == ChunkType.SKEL:
             with suppress(MczError):
                 base = container.skeleton_fields(id_).base
                 named |= {base} if base else set()
-    return {id_ for id_ in named if (b"SKEL", id_) not in directory.shared}
+    return {id_ for id_ in named if (ChunkType.SKEL, id_) not in directory.shared}
 
 
 def _of_asf(container: Container, template: bytes, lost: set[bytes]) -> Iterator[bytes]:
@@ -187,7 +188,7 @@ def _bases(container: Container) -> Iterator[Skeleton | None]:
     """None, and every skeleton of the file."""
     yield None
     for kind, id_ in list(container.directory.shared):
-        if kind == b"SKEL":
+        if kind == ChunkType.SKEL:
             with suppress(MczError):
                 yield replace(container.skeleton(id_), base=id_)
 

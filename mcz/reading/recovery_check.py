@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mcz.container.chunks import RECOVERY, Chunk
+from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
@@ -18,8 +18,8 @@ from mcz.recovery.shape import Shape
 def recovery_chunks(container: Container) -> list[Chunk]:
     """The RECV chunks of a file; without a clip no index lists them, and the file is walked."""
     if container.directory.clips:
-        return container.directory.clips.ancillary(RECOVERY)
-    return [chunk for chunk in scan(container.source).chunks if chunk.type == RECOVERY]
+        return container.directory.clips.ancillary(ChunkType.RECV)
+    return [chunk for chunk in scan(container.source).chunks if chunk.type == ChunkType.RECV]
 
 
 def recovery_problems(container: Container) -> Iterator[tuple[str, list[Problem]]]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from mcz.clock import time_facts
 from mcz.codecs.basis_models import name_of
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.scan import scan
@@ -56,7 +57,9 @@ def info(file: File, names: Sequence[str] | None = None, where: Where | None = N
     shared = container.directory.shared
     ids = {id_ for _, id_ in shared} if whole else file.skeleton_ids(chosen)
     used = {model["id"] for clip in clips for model in clip["models"]}
-    models = [id_ for kind, id_ in shared if kind == b"MODL" and (whole or id_.hex() in used)]
+    models = [
+        id_ for kind, id_ in shared if kind == ChunkType.MODL and (whole or id_.hex() in used)
+    ]
     attachments = [{"name": a.name, "bytes": a.size} for a in file.attachments.values()]
     return {
         "format_version": file.header["format_version"],
@@ -77,7 +80,7 @@ def info(file: File, names: Sequence[str] | None = None, where: Where | None = N
 
 
 def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> JsonObject:
-    chunk = container.directory.shared[b"SKEL", id_]
+    chunk = container.directory.shared[ChunkType.SKEL, id_]
     return {
         "id": id_.hex(),
         "name": skeleton.name,
@@ -109,7 +112,7 @@ def joint_facts(skeleton: Skeleton) -> JsonObject:
 
 def _model_info(container: Container, id_: bytes) -> JsonObject:
     fields = container.model(id_)
-    size = container.directory.shared[b"MODL", id_].size
+    size = container.directory.shared[ChunkType.MODL, id_].size
     return {"id": id_.hex(), "kind": fields.kind, "chunk_bytes": size}
 
 
@@ -368,7 +371,7 @@ def _check(problems: list[Problem], file: File, id_: bytes) -> None:
         if file.skeleton(id_, with_source=True).source is not None:
             file.skeleton_bytes(id_)
     except MczError as error:
-        offset = file.container.directory.shared[b"SKEL", id_].offset
+        offset = file.container.directory.shared[ChunkType.SKEL, id_].offset
         problems.append(Problem(offset, "SKEL", remark_of(error)))
 
 

@@ -13,6 +13,7 @@ from mcz.clock import TIMES, times_form_fault
 from mcz.codecs import CODECS, by_id
 from mcz.codecs.contract import Codec, Layout, Model, Span
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.limits import check
 from mcz.container.packets import SHORT
@@ -175,7 +176,7 @@ def read_segments(container: Container, info: SignalInfo) -> None:
 
 def _model(container: Container, before: int, id_: bytes) -> Model | None:
     """The model with this id, None where the file has none before this offset, that of the clip."""
-    chunk = container.directory.shared.get((b"MODL", id_))
+    chunk = container.directory.shared.get((ChunkType.MODL, id_))
     if chunk is None or chunk.offset > before:  # GRAM-10
         return None
     fields = container.model(id_)

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from mcz.container import payloads
-from mcz.container.chunks import FOOT, FRAMING, HEADER
+from mcz.container.chunks import FOOT, FRAMING, HEADER, ChunkType
 from mcz.container.directory import SegmentRow
 from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.container.reader import Container
@@ -54,7 +54,7 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
     source = _source_fields_size(fields)
     template = 0
     if fields.source:
-        chunk = container.directory.shared.get((b"SRCE", bytes(fields.source.template)))
+        chunk = container.directory.shared.get((ChunkType.SRCE, bytes(fields.source.template)))
         template = chunk.size if chunk else 0
     cend = row.cend.length or 0 if row.cend else 0
     n_hashes = len(clip.signals) + bool(fields.source) if row.cend else 0
@@ -63,7 +63,7 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
     own = clip_length - source - 16 - len(fields.extension) + cend - (hashes - 16)
     packets = packet_framing(row.segments)
     overhead = n_chunks * FRAMING + packets + tables + own
-    quality = sum(chunk.size for chunk in row.ancillary if chunk.type == b"QUAL")
+    quality = sum(chunk.size for chunk in row.ancillary if chunk.type == ChunkType.QUAL)
     models = sum(_model_sizes(container, clip).values())
     between = 0
     if row.cend is not None and not container.salvage:
@@ -81,7 +81,7 @@ def file_parts(container: Container, sizes: Iterable[Sizes]) -> dict[str, int]:
     aliases, recovery data, and what a later end of the file has replaced.
     """
     directory, sizes = container.directory, list(sizes)
-    shared = {b"SKEL": 0, b"SRCE": 0, b"MODL": 0}
+    shared: dict[bytes, int] = {ChunkType.SKEL: 0, ChunkType.SRCE: 0, ChunkType.MODL: 0}
     for (kind, _), chunk in directory.shared.items():
         shared[kind] += (
             chunk.size if chunk.offset < container.source.size else 0
@@ -90,9 +90,9 @@ def file_parts(container: Container, sizes: Iterable[Sizes]) -> dict[str, int]:
     parts = {
         "payload": sum(one.payload for one in sizes),
         "overhead": sum(one.overhead for one in sizes),
-        "skeletons": shared[b"SKEL"],
-        "models": shared[b"MODL"],
-        "source": shared[b"SRCE"] + sum(one.source - one.template for one in sizes),
+        "skeletons": shared[ChunkType.SKEL],
+        "models": shared[ChunkType.MODL],
+        "source": shared[ChunkType.SRCE] + sum(one.source - one.template for one in sizes),
         "hashes": sum(one.hashes for one in sizes),
         "quality": sum(one.quality for one in sizes),
         "attachments": sum(part.size for part in attachments),
@@ -115,7 +115,7 @@ def _model_sizes(container: Container, clip: Clip) -> dict[bytes, int]:
     sizes = {}
     for signal in clip.signals:
         for id_ in models_used(signal):
-            chunk = container.directory.shared.get((b"MODL", id_))
+            chunk = container.directory.shared.get((ChunkType.MODL, id_))
             if chunk is not None:
                 sizes[id_] = chunk.size
     return sizes

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs import by_id
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
@@ -174,7 +175,7 @@ class StoredClip:
     def quality(self) -> dict[str, str] | None:
         """The quality record, None where the clip has none."""
         for chunk in self._row.ancillary:
-            if chunk.type == b"QUAL":
+            if chunk.type == ChunkType.QUAL:
                 fields = parse(payloads.Qual, self.container.payload(chunk), chunk.label)
                 return {entry.key: entry.value for entry in fields.entries}
         return None

@@ -13,6 +13,7 @@ from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded, Request, Segment, Span, model_finder
 from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.container.limits import ARCHIVE, check
 from mcz.container.packed import pack_skeleton
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
@@ -40,11 +41,11 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     given = skeleton
     if writer.last_skeleton is not None and writer.last_skeleton[0] is given:
         id_ = writer.last_skeleton[1]
-        if (b"SKEL", id_) in writer.directory.shared:  # not taken back with what failed
+        if (ChunkType.SKEL, id_) in writer.directory.shared:  # not taken back with what failed
             return id_
     check("joints", skeleton.n_joints, writer.profile.joints)
     check("channels", skeleton.n_channels, writer.profile.channels)
-    if skeleton.base and (b"SKEL", skeleton.base) not in writer.directory.shared:
+    if skeleton.base and (ChunkType.SKEL, skeleton.base) not in writer.directory.shared:
         skeleton = replace(skeleton, base=None)  # it is in another file
     source = None
     if skeleton.source is not None:
@@ -56,7 +57,7 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
             sha256=skeleton.source.sha256,
         )
     payload = build_skeleton(skeleton, source)
-    id_ = writer.shared(b"SKEL", pack_skeleton(payload) if writer.short else payload)
+    id_ = writer.shared(ChunkType.SKEL, pack_skeleton(payload) if writer.short else payload)
     writer.last_skeleton = given, id_
     return id_
 
@@ -144,7 +145,7 @@ def _write_models(writer: Writer, encoded: Encoded) -> None:
     known = encoded.known if writer.profile is ARCHIVE else ()
     for model in (*encoded.models, *known):
         record = payloads.Modl(kind=model.kind, data=model.data)
-        writer.shared(b"MODL", build(record, "MODL"))
+        writer.shared(ChunkType.MODL, build(record, "MODL"))
 
 
 def asked(options: Params) -> JsonObject:

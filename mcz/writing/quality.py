@@ -11,13 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.container import payloads
+from mcz.container.chunks import ChunkType
 from mcz.metrics import compare
 from mcz.metrics.sums import channel_errors
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.schema import build
 from mcz.types import JsonObject, Params, Values
 
-CHUNK = b"QUAL"
+CHUNK = ChunkType.QUAL
 # What a record does without, for its bytes: the radius is 3 cm where it is not stated.
 NOT_STORED = ("max_channel_error", "max_channel_error_frame", "max_channel_error_channel")
 LEFT_OUT = ("shell_radius_cm", "shell_max_frame", "shell_max_joint")

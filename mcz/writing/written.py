@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mcz.brief import brief
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, Directory
 
 
@@ -57,7 +58,7 @@ def written(
             WrittenClip(row.name, row.n_frames, row.signals[0].n_channels, quality)
             for row in directory.clips.values()
         ),
-        n_skeletons=sum(kind == b"SKEL" for kind, _ in directory.shared),
+        n_skeletons=sum(kind == ChunkType.SKEL for kind, _ in directory.shared),
         n_attachments=len(directory.attachments),
         decoded_bytes=max(map(_decoded_bytes, directory.clips.values()), default=0),
         notes=notes,

@@ -17,12 +17,12 @@ from unittest import mock
 import mcz
 from mcz.container import index_records, payloads
 from mcz.container.chunks import (
-    ANCILLARY,
     CRC,
     FOOT,
     OPEN_LENGTH,
     SIGNATURE,
     Chunk,
+    ChunkFlag,
     build_chunk,
     build_foot,
     build_header,
@@ -173,7 +173,7 @@ def changed_index(index: bytes, change: Callable[[bytes], bytes]) -> bytes:
     outer = parse(index_records.Indx, index[16 : -CRC.size], "INDX")
     content = change(inflate(outer.data, outer.size, "INDX"))
     outer.size, outer.data = len(content), deflate(content)
-    return build_chunk(b"INDX", build(outer, "INDX"), ANCILLARY)
+    return build_chunk(b"INDX", build(outer, "INDX"), ChunkFlag.ANCILLARY)
 
 
 def with_payload(pieces: Sequence[Piece], which: int, payload: bytes) -> Pieces:

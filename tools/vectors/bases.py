@@ -15,7 +15,7 @@ import numpy as np
 
 from mcz.codecs import CODECS
 from mcz.container import payloads
-from mcz.container.chunks import ANCILLARY, COPY
+from mcz.container.chunks import ChunkFlag, ChunkType
 from mcz.container.limits import ARCHIVE
 from mcz.container.segments import SegmentHeader
 from mcz.motion import Channel, Motion, Signal
@@ -198,7 +198,7 @@ def copies(stored: bool = False, few: int | None = None) -> bytes:
     for motion in (take(PLAIN, "plain"), motions.dance()):
         crafter.clip(motion)
     content = content_of(copies_of(crafter)[:few], crafter.offset)
-    crafter.plain_chunk(COPY, payload_of(content, stored=stored), ANCILLARY)
+    crafter.plain_chunk(ChunkType.COPY, payload_of(content, stored=stored), ChunkFlag.ANCILLARY)
     return finished(crafter, index=False)
 
 

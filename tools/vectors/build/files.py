@@ -18,13 +18,13 @@ from mcz.codecs import raw
 from mcz.codecs.contract import Codec
 from mcz.container import index_records, payloads
 from mcz.container.chunks import (
-    ANCILLARY,
     FRAMING,
     HEADER,
-    REPEAT,
     REPEATED,
     SIGNATURE,
     Chunk,
+    ChunkFlag,
+    ChunkType,
     build_chunk,
     build_foot,
     parse_header,
@@ -197,7 +197,7 @@ class Crafter(Writer):
 
     def _begin_data(self, opening: bytes) -> None:
         if self._n_data in self.repeat:
-            self.chunk(REPEAT, opening, ANCILLARY)
+            self.chunk(ChunkType.REPT, opening, ChunkFlag.ANCILLARY)
         self._n_data += 1
         self.open_data()
 
@@ -246,7 +246,7 @@ class Crafter(Writer):
             chunk = self.edited("INDX_frame", self._index_chunk())
             start, length = self.offset, len(chunk)
             if self.continued:
-                place = Chunk(b"INDX", ANCILLARY, start, length - FRAMING)
+                place = Chunk(b"INDX", ChunkFlag.ANCILLARY, start, length - FRAMING)
                 crc = int.from_bytes(chunk[-4:], "little")
                 self.directory.indexes += (place_of(place, crc, 0, self.directory),)
             self._write(chunk)
@@ -261,7 +261,7 @@ class Crafter(Writer):
         if since is not None:
             packed |= {"flags": index_records.CONTINUES, "previous": previous_of(since)}
         payload = self.edited("INDX", built(index_records.Indx, packed, "INDX"))
-        return build_chunk(b"INDX", payload, ANCILLARY)
+        return build_chunk(b"INDX", payload, ChunkFlag.ANCILLARY)
 
 
 def file_of(

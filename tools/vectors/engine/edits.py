@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from mcz.container.chunks import ANCILLARY, Chunk
+from mcz.container.chunks import Chunk, ChunkFlag
 from mcz.container.index_records import Index
 from mcz.container.packets import body_check
 from mcz.schema import build, read_varint, varint
@@ -197,7 +197,7 @@ class Editor:
         self.layout.parts.insert(place, part)
         before = [p for p in self.layout.parts[:place] if p.type in (b"CLIP", b"CEND", b"FOOT")]
         clips = [p for p in before if p.type == b"CLIP"]
-        if part.flags & ANCILLARY and clips and before[-1].type != b"CLIP":
+        if part.flags & ChunkFlag.ANCILLARY and clips and before[-1].type != b"CLIP":
             self.indexed.append((part, clips[-1]))
 
     def _swap(self, rest: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from mcz.container.chunks import ANCILLARY, RECOVERY, SAFE_TO_COPY
+from mcz.container.chunks import KNOWN_FLAGS, ChunkType
 from tools.vectors.build.files import Broken, Crafter, Vector, finished
 from tools.vectors.build.motions import dance
 from tools.vectors.valid import recovery as sound
@@ -14,10 +14,13 @@ HOLE = 20  # bytes
 
 def vectors() -> Iterable[Vector]:
     shelf = Broken("invalid/recovery")
-    for name, flags in (("critical", 0), ("safe-to-copy", ANCILLARY | SAFE_TO_COPY)):
+    for name, flags in (
+        ("critical", 0),
+        ("safe-to-copy", KNOWN_FLAGS),
+    ):
         crafter = Crafter()
         crafter.clip(dance())
-        crafter.plain_chunk(RECOVERY, b"", flags)
+        crafter.plain_chunk(ChunkType.RECV, b"", flags)
         data = finished(crafter, index=False)
         shelf.add(name, "Chunks; RECV", f"A RECV with flags {flags}.", data)
     _damaged(shelf)

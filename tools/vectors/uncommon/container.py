@@ -14,7 +14,7 @@ from mcz.codecs import raw
 from mcz.codecs.basis_models import model_of
 from mcz.codecs.contract import id_of
 from mcz.container import payloads
-from mcz.container.chunks import ANCILLARY, build_foot
+from mcz.container.chunks import ChunkFlag, build_foot
 from mcz.container.packets import END, Packet, build_packet
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
@@ -216,7 +216,7 @@ def _unknown(shelf: Whole) -> None:
     shelf.hold("unknown-ancillary", "Chunks; Grammar", purpose, data, *motions)
 
     def within(made: Made) -> Made:
-        crafter.plain_chunk(b"note", b"between CLIP and DATA", ANCILLARY)
+        crafter.plain_chunk(b"note", b"between CLIP and DATA", ChunkFlag.ANCILLARY)
         return made
 
     crafter = Crafter(segments=within)

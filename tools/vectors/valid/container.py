@@ -12,7 +12,7 @@ import numpy as np
 
 from mcz.clock import MAX_NUMBER
 from mcz.container import payloads
-from mcz.container.chunks import COPY, META, SIGNATURE
+from mcz.container.chunks import SIGNATURE, ChunkType
 from mcz.container.limits import ARCHIVE
 from mcz.container.metadata import Record
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
@@ -105,23 +105,27 @@ def _copies(shelf: Whole) -> None:
         crafter.clip(dance())
         content = content_of(copies_of(crafter), crafter.offset)
         payload = payload_of(content, stored=stored)
-        crafter.ancillary(COPY, payload, safe_to_copy=False)
+        crafter.ancillary(ChunkType.COPY, payload, safe_to_copy=False)
         shelf.hold(name, spec, purpose, finished(crafter), plain, dance(), **given)
     crafter = Crafter()
     for motion in (plain, dance()):
         before = crafter.offset if crafter.directory.clips else len(SIGNATURE)
         crafter.clip(motion)
         content = content_of(copies_of(crafter, before), crafter.offset)
-        crafter.ancillary(COPY, payload_of(content), safe_to_copy=False)
+        crafter.ancillary(ChunkType.COPY, payload_of(content), safe_to_copy=False)
         data = finished(crafter)
     purpose = "Two bodies, each with copies of its own chunks, none of HEAD in the second."
     shelf.hold("copies-appended", spec, purpose, data, plain, dance(), **given)
     crafter = Crafter()
-    crafter.ancillary(COPY, payload_of(b""), safe_to_copy=False)
+    crafter.ancillary(ChunkType.COPY, payload_of(b""), safe_to_copy=False)
     crafter.clip(dance())
     first = copies_of(crafter)[:1]
-    crafter.ancillary(COPY, payload_of(content_of(first, crafter.offset)), safe_to_copy=False)
-    crafter.ancillary(COPY, payload_of(content_of(first, crafter.offset)), safe_to_copy=False)
+    crafter.ancillary(
+        ChunkType.COPY, payload_of(content_of(first, crafter.offset)), safe_to_copy=False
+    )
+    crafter.ancillary(
+        ChunkType.COPY, payload_of(content_of(first, crafter.offset)), safe_to_copy=False
+    )
     purpose = "A COPY of nothing before any clip, and two of the same chunk behind it."
     shelf.hold("copies-few", spec, purpose, finished(crafter), dance())
 
@@ -139,22 +143,22 @@ def _metadata(shelf: Whole) -> None:
         crafter = Crafter()
         for motion in two:
             crafter.clip(motion)
-        crafter.ancillary(META, meta_of(many, stored=stored))
+        crafter.ancillary(ChunkType.META, meta_of(many, stored=stored))
         purpose = "A META that says something of two clips, of the file and of a clip not there"
         purpose += ", stored." if stored else "."
         shelf.hold(name, spec, purpose, finished(crafter), *two)
     crafter = Crafter()
     crafter.clip(two[0])
-    crafter.ancillary(META, meta_of(many))
+    crafter.ancillary(ChunkType.META, meta_of(many))
     crafter.clip(two[1])
-    crafter.ancillary(META, meta_of(many[1:2]))
-    crafter.ancillary(META, meta_of([]))
+    crafter.ancillary(ChunkType.META, meta_of(many[1:2]))
+    crafter.ancillary(ChunkType.META, meta_of([]))
     purpose = "A META before a clip that it names, one that repeats it behind, and an empty one."
     shelf.hold("metadata-between", spec, purpose, finished(crafter), *two)
     crafter = Crafter()
     crafter.clip(two[0])
     words = meta_of([Record("dance", {"description": "Xrotation Yrotation " * 3})], after=True)
-    crafter.ancillary(META, words)
+    crafter.ancillary(ChunkType.META, words)
     purpose = "A META deflated after words."
     shelf.hold("metadata-words", "META; Conventions", purpose, finished(crafter), two[0])
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mcz.container import payloads
-from mcz.container.chunks import ANCILLARY, REPEAT
+from mcz.container.chunks import ChunkFlag, ChunkType
 from mcz.container.limits import ARCHIVE, BASE
 from mcz.container.packets import END, SEGMENT, Packet, build_packet
 from mcz.container.segments import FRESH, SegmentHeader
@@ -345,10 +345,12 @@ class _Odd(Crafter):
         """Chunks that say nothing to a reader that has the beginning."""
         maker = self.maker
         if maker.says("unknown chunks in a clip", 0.1):
-            self.plain_chunk(maker.chance.choice(TYPES), maker.bytes(), ANCILLARY)
+            self.plain_chunk(maker.chance.choice(TYPES), maker.bytes(), ChunkFlag.ANCILLARY)
         if maker.says("REPT", 0.1):
             right = maker.chance.random() < 0.5 and self._closed
-            self.plain_chunk(REPEAT, self._opening() if right else maker.bytes(), ANCILLARY)
+            self.plain_chunk(
+                ChunkType.REPT, self._opening() if right else maker.bytes(), ChunkFlag.ANCILLARY
+            )
 
     def _begin(self) -> None:
         self.open_data()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from mcz.container.chunks import RECOVERY
+from mcz.container.chunks import ChunkType
 from tools.vectors.build.files import Crafter, Vector, Whole, file_of, finished
 from tools.vectors.build.motions import dance
 from tools.vectors.build.recovery import protected
@@ -24,7 +24,7 @@ def vectors() -> Iterable[Vector]:
     shelf.hold("appended", "RECV", purpose, two, dance(), TWO)
     crafter = Crafter()
     crafter.clip(dance())
-    crafter.ancillary(RECOVERY, b"no packets at all", safe_to_copy=False)
+    crafter.ancillary(ChunkType.RECV, b"no packets at all", safe_to_copy=False)
     purpose = "A RECV without a packet in it: nobody refuses a file for what a RECV says."
     shelf.hold("no-packets", "RECV; Chunks", purpose, finished(crafter), dance())
     return shelf.vectors

@@ -15,7 +15,7 @@ import numpy as np
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Codec, Encoded, Segment
 from mcz.container import payloads
-from mcz.container.chunks import ANCILLARY
+from mcz.container.chunks import ChunkFlag
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tools.vectors.build import (
     best_clips,
@@ -211,7 +211,7 @@ def _ancillary(shelf: Whole, spec: str, name: str) -> None:
     made = sample(name, (4, 3))
 
     def within(segments: Made) -> Made:
-        crafter.plain_chunk(b"note", b"between CLIP and DATA", ANCILLARY)
+        crafter.plain_chunk(b"note", b"between CLIP and DATA", ChunkFlag.ANCILLARY)
         return segments
 
     crafter = Crafter(segments=within, CEND_frame=_behind_note)
@@ -226,7 +226,7 @@ def _ancillary(shelf: Whole, spec: str, name: str) -> None:
 def _behind_note(chunk: bytes) -> bytes:
     crafter = Crafter()
     start = len(crafter.data)
-    crafter.plain_chunk(b"note", b"between DATA and CEND", ANCILLARY)
+    crafter.plain_chunk(b"note", b"between DATA and CEND", ChunkFlag.ANCILLARY)
     return crafter.data[start:] + chunk
 
 
