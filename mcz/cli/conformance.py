@@ -103,7 +103,7 @@ def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
 
     # HEAD-01, STRICT-03
     scan(open_source(data), whole=True)  # INDX may be of no use where something is unsupported
-    with mcz.open(data) as file:
+    with mcz.open(data, verify=True) as file:
         listing = "sources" if given.source else "arrays"
         parts = list(_sources(file) if given.source else _arrays(file, given))
     line = json.dumps({listing: [row for row, _ in parts]}, ensure_ascii=False).encode("utf-8")

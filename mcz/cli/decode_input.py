@@ -47,7 +47,7 @@ class Input:
     def opened(self) -> Iterator[tuple[File, tuple[str, ...]]]:
         """The open .mcz, of a source file one in memory; and the files that were read for it."""
         if not self.is_source:
-            options = {"salvage": self.salvage, "unverified": self.unverified}
+            options = {"salvage": self.salvage, "unverified": self.unverified, "verify": True}
             with opened(self.file, max_decoded=self.max_decoded, **options) as file:
                 yield file, (self.file,)
             return

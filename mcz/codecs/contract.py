@@ -292,6 +292,7 @@ class Codec:
     ``recode`` codes some groups anew (None: the codec cannot do that), of a codec with ``regroup``
     in any of the segments, of others in all. ``preview`` says what can be read without decoding
     the rest (None: nothing exactly). ``earlier`` has the ``decode`` of each earlier version.
+    ``hash_optional``: readers may omit to compare the value hash.
     """
 
     id: int
@@ -317,6 +318,7 @@ class Codec:
     follow: Follow | None = None
     live_options: Params = field(default_factory=dict)
     earlier: Mapping[int, Decode] = field(default_factory=dict)
+    hash_optional: bool = False
 
     def has(self, name: str) -> bool:
         """Whether it has a parameter of that name."""

@@ -109,6 +109,7 @@ CODEC = Codec(
     version=0,
     domain="ordinals",
     lossless=True,
+    hash_optional=True,
     encode=encode,
     decode=decode,
     recode=recode,

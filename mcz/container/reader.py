@@ -86,9 +86,9 @@ class Container:
         max_decoded: int | None = None,
         reads_parts: bool = False,
         threads: int | None = None,
+        verify: bool = False,
     ) -> None:
-        self.source = source
-        self.salvage = salvage
+        self.source, self.salvage, self.verify = source, salvage, verify
         self.reads_parts = reads_parts and not salvage
         self.max_decoded = output_limit(source.size) if max_decoded is None else max_decoded
         self.threads = threads  # that may decode; None: as many as are in force
@@ -104,13 +104,13 @@ class Container:
         self.profile: Profile = parse_head(self.directory.head)
 
     def __reduce__(self) -> tuple[object, ...]:
-        names = "salvage", "max_decoded", "reads_parts", "threads"
+        names = "salvage", "max_decoded", "reads_parts", "threads", "verify"
         return _reopened, (self.source, {n: getattr(self, n) for n in names})
 
     def strictly(self) -> Container:
-        """The same file, of which what is read is checked as in a sound one."""
+        """The same file, of which all that is read is checked as in a sound one."""
         other = Container.__new__(Container)
-        other.__dict__.update(self.__dict__ | {"salvage": False})
+        other.__dict__.update(self.__dict__ | {"salvage": False, "verify": True})
         return other
 
     def _salvage(self) -> Directory:

@@ -21,7 +21,7 @@ from mcz.reading.file import File, open
 from mcz.reading.sharing import shared_out
 from mcz.reading.source_options import SourceOptions
 from mcz.tables.files import EXPORTS, table_of
-from mcz.types import Target
+from mcz.types import JsonObject, Target
 from mcz.writing.atomic import replacing
 
 Progress = Callable[[int, int, str], None]
@@ -59,7 +59,8 @@ def export(
         raise OptionError(f"to {to!r}: one of {', '.join(FORMS)}")
     folder, report, written = Folder(Path(directory)), Report(), set[str]()
     portable = PortableNames()
-    with limited(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
+    options: JsonObject = {"max_decoded": max_decoded, "threads": threads, "verify": True}
+    with limited(jobs), open(target, **options) as file:
         chosen = file.chosen(clips, where)
         called = [clip.name for clip in chosen]
         with shared_out(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:

@@ -53,6 +53,7 @@ from mcz.schema import build, parse
 from mcz.skeleton import Joints
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing_file
+from mcz.writing.clip_check import check_values
 from mcz.writing.clip_writer import Amend
 
 
@@ -138,7 +139,9 @@ def extract(
         with replacing_file(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
             copier.found.damage += opened.damage
-            return copier.run(cuts, alone=alone)
+            found = copier.run(cuts, alone=alone)
+            check_values(stream, [cut.clip.name for cut in cuts if not copier.is_same(cut)])
+            return found
 
 
 def with_stated_rate(

@@ -107,6 +107,8 @@ def edit(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Edit
     index = _editable(clip, joint)
     columns = list(clip.skeleton.columns(index))
     before = clip.motion()
+    for info, signal in zip(clip.signals, before.signals, strict=True):
+        clip.check_hash(info, signal.stored, signal.mask)
     given = _checked(clip, columns, values)
     signal = _edited(clip, before, columns, given, on_grid)
     return Edited(index, replace(before, signals=(signal, *before.signals[1:])), given)

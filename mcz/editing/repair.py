@@ -22,6 +22,7 @@ from mcz.editing.salvage_copier import Repair as Repair
 from mcz.editing.salvaging import write_whole
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.reading.file import File, file_of, reached
+from mcz.reading.report import validate
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing, rereadable
 
@@ -80,7 +81,7 @@ def _repaired(
         size = _size_of_whole(out, stop, wanted, found)
         if size:
             out.truncate(size)
-            return _as_it_was(out, found)
+            return _as_it_was(out, found, max_decoded)
     with tempfile.TemporaryFile() as spool:
         better = _moved(out, spool, source.name) if stop else source
         if not wanted <= _content(better):  # it was made of another file
@@ -144,8 +145,9 @@ def _moved(out: BinaryIO, spool: BinaryIO, name: str) -> ByteSource:
     return ByteSource(spool, name=name)
 
 
-def _as_it_was(out: BinaryIO, found: Repair) -> Repair:
-    file = File(Container(ByteSource(out)))
+def _as_it_was(out: BinaryIO, found: Repair, max_decoded: int | None) -> Repair:
+    file = File(Container(ByteSource(out), max_decoded=max_decoded))
+    found.damage += [f"{problem.heading}: {problem.message}" for problem in validate(file)]
     found.clips, found.attachments = list(file.clips), list(file.attachments)
     found.size, found.restored = file.size, True
     out.seek(0, os.SEEK_END)

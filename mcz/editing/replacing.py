@@ -41,6 +41,7 @@ from mcz.reading.file import File, open
 from mcz.schema import build, parse
 from mcz.types import Progress, Target, Values
 from mcz.writing.atomic import replacing_file
+from mcz.writing.clip_check import check_values
 from mcz.writing.quality import CHUNK, figures, texts_of
 
 RECODED = "edit-recoded"
@@ -116,7 +117,9 @@ def replace(
             return _write_anew(chosen, _AnewEditor(file, stream, chosen, edited, progress, copies))
         recoded = recode_joint(chosen, joint, values, on_grid)
         writer = _Editor(file, stream, chosen.name, recoded, progress, copies)
-        return _write(file, chosen, recoded, writer)
+        found = _write(file, chosen, recoded, writer)
+        check_values(stream, [chosen.name])
+        return found
 
 
 def _locked(source: Target, stack: ExitStack) -> Path:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs import by_id
 from mcz.codecs.contract import LiveDecoder
+from mcz.codecs.known_answers import check_known_answer
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, Chunk, ChunkType, build_foot
 from mcz.container.directory import ClipRow, signal_rows
@@ -105,6 +106,7 @@ class ClipState:
         assert info.codec.follow is not None
         self.clip, self.info, self.shown, self.n_signals = clip, info, shown, n_signals
         self._where = f"clip {clip.name!r}"
+        check_known_answer(info.codec)
         self.decoder: LiveDecoder = info.codec.follow(info.header, info.layout)
         self._digest = ValueDigest()
 

@@ -131,7 +131,8 @@ class _Held:
         self._parts.append(event.data)
         if kind != ChunkType.CEND:
             return
-        container = Container(ByteSource(io.BytesIO(b"".join(self._parts) + build_foot(0, 0))))
+        data = b"".join(self._parts) + build_foot(0, 0)
+        container = Container(ByteSource(io.BytesIO(data)), verify=True)
         clip = Clip(container, container.directory.clips[self._name])
         values, mask = clip.read_masked()
         reader.clip = LiveClip(clip.name, clip.skeleton, clip.frame_rate, clip.codec)

@@ -283,6 +283,7 @@ def open(
     max_decoded: int | None = None,
     unverified: bool = False,
     threads: int | None = None,
+    verify: bool = False,
 ) -> File:
     """Open an MCZ file lazily: a path, an fsspec target, bytes or a binary stream.
 
@@ -292,6 +293,8 @@ def open(
     its checksum cannot be checked and a damaged file may give wrong numbers; ``File.unverified``
     counts such segments. It saves bytes where segments are large, and does nothing in salvage.
     ``threads`` may decode at once, by default one a processor; the numbers are the same.
+    ``verify`` compares the SHA-256 of every signal that is decoded whole. By default that of the
+    codecs raw, fast and lossless is not compared: checksums guard their bytes.
     Raises FormatError, in particular TruncatedError where there is no FOOT at the end,
     AccessError where the file cannot be read, and OptionError.
     """
@@ -300,6 +303,7 @@ def open(
         "max_decoded": max_decoded,
         "reads_parts": unverified,
         "threads": checked(threads),
+        "verify": verify,
     }
     source = reached(target)
     try:

@@ -27,6 +27,7 @@ def read(
     clip: str | None = None,
     max_decoded: int | None = None,
     threads: int | None = None,
+    verify: bool = False,
 ) -> Motion:
     """The motion in a file of any source format, or in an MCZ file.
 
@@ -37,11 +38,12 @@ def read(
     NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". ``model``
     is a model file of SMPL and its kin, which says how long the bones of such a body in an NPZ are
     ("{gender}" and "{body}" in it: those of the take). Of an MCZ file ``clip`` is read, with
-    ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
+    ``max_decoded``, ``threads`` and ``verify`` as in ``open``. Raises SourceError, FormatError or
+    OptionError.
     """
     path = Path(path)
     if is_mcz(path):
-        with open(path, max_decoded=max_decoded, threads=threads) as file:
+        with open(path, max_decoded=max_decoded, threads=threads, verify=verify) as file:
             motion = file.only_clip(clip).motion()
     else:
         source_format, data = load(path)

@@ -392,7 +392,7 @@ def _clip_errors(clip: Clip) -> Iterator[MczError]:
     sound = not found
     for signal in clip.signals if sound else ():
         try:
-            clip.read_masked(signal=signal.index)
+            clip.check_values(signal.index)
         except MczError as error:
             sound = False
             yield error

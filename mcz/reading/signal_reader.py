@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Request, Span
+from mcz.codecs.known_answers import check_known_answer
 from mcz.container.limits import check_decoded
 from mcz.container.masks import parse_mask
 from mcz.container.packets import SHORT
@@ -53,8 +54,7 @@ class SignalReader:
     ) -> None:
         self.container = container
         self.info = info
-        self.groups = groups
-        self.resolution = resolution
+        self.groups, self.resolution = groups, resolution
         self.name = name
         self._cache: dict[int, tuple[StreamTable, dict[int, bytes]]] = {}
         self._read_ones: set[int] = set()  # segments
@@ -224,6 +224,7 @@ class SignalReader:
     def _decode_groups(
         self, groups: tuple[int, ...], spans: Sequence[Span], start: int, stop: int
     ) -> Values:
+        check_known_answer(self.info.codec)
         return self.info.codec.decode(
             self.info.header,
             self.info.layout,

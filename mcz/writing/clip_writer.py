@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs import by_name
-from mcz.codecs.contract import Codec, Encoded, Request, Segment, Span, model_finder
+from mcz.codecs.contract import Codec, Encoded, Segment
 from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
@@ -20,13 +19,13 @@ from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, Segme
 from mcz.container.skeletons import build_skeleton, channel_records
 from mcz.container.strict import is_plain_path
 from mcz.container.time_base import put_time_base, time_base_of
-from mcz.container.value_hash import value_hash
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import ROLES, Motion, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
 from mcz.types import JsonObject, Params, Progress, Values
+from mcz.writing.clip_check import ClipCopy, Coded
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, as_stored
 from mcz.writing.sources import with_source_hash
@@ -60,15 +59,6 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     id_ = writer.shared(ChunkType.SKEL, pack_skeleton(payload) if writer.short else payload)
     writer.last_skeleton = given, id_
     return id_
-
-
-@dataclass(frozen=True, slots=True)
-class _Coded:
-    """A signal on its way into a file."""
-
-    source: MemorySource
-    codec: Codec
-    encoded: Encoded
 
 
 def write_clip(
@@ -105,20 +95,20 @@ def write_clip(
     for part in coded:
         _write_models(writer, part.encoded)
     record = _clip_record(writer, motion, coded)
-    writer.begin_clip(record, [signal.n_channels for signal in motion.signals])
-    decoded = [
-        _write_signal(writer, motion, index, part, progress) for index, part in enumerate(coded)
-    ]
-    hashes = [
-        value_hash(values, signal.mask)
-        for values, signal in zip(decoded, motion.signals, strict=True)
-    ]
+    copy, n_channels = ClipCopy(writer.profile), [signal.n_channels for signal in motion.signals]
+    for part in coded:
+        _write_models(copy.writer, part.encoded)
+    for each in (writer, copy.writer):
+        each.begin_clip(record, n_channels)
+    for index, part in enumerate(coded):
+        _write_signal((writer, copy), motion, index, part, progress)
+    decoded = copy.decoded(motion, coded)
     sha256 = motion.source.sha256 if motion.source else b""
-    writer.end_clip(motion.n_frames, sha256, hashes)
+    writer.end_clip(motion.n_frames, sha256, [signal.sha256 for signal in decoded])
     if quality and not codec.lossless:
-        settings = codec.settings(options)
-        quality_entries = quality_record(motion, decoded, codec.name, settings, remarks)
-        quality_entries = amend(quality_entries, decoded) if amend else quality_entries
+        settings, values = codec.settings(options), [signal.values for signal in decoded]
+        quality_entries = quality_record(motion, values, codec.name, settings, remarks)
+        quality_entries = amend(quality_entries, values) if amend else quality_entries
         writer.ancillary(CHUNK, quality_payload(quality_entries))
         return quality_entries
     return None
@@ -134,7 +124,7 @@ def open_clip(
     check("channels", motion.signals[0].n_channels, writer.profile.channels)
     _write_models(writer, encoded)
     source = MemorySource(motion, 0, codec, writer.profile.segment_bytes)
-    record = _clip_record(writer, motion, [_Coded(source, codec, encoded)])
+    record = _clip_record(writer, motion, [Coded(source, codec, encoded)])
     record.flags |= payloads.OPEN_CLIP
     put_time_base(record, time_base_of(np.array([first_number], np.int64), None))
     writer.begin_clip(record, [motion.signals[0].n_channels])
@@ -153,7 +143,7 @@ def asked(options: Params) -> JsonObject:
     return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
 
 
-def _coded(motion: Motion, index: int, codec: Codec, options: Params, segment_bytes: int) -> _Coded:
+def _coded(motion: Motion, index: int, codec: Codec, options: Params, segment_bytes: int) -> Coded:
     if index and not codec.lossless:
         codec = by_name(BESIDE)
         options = codec.options({})
@@ -165,24 +155,26 @@ def _coded(motion: Motion, index: int, codec: Codec, options: Params, segment_by
     source = MemorySource(motion, index, codec, segment_bytes, options)
     if codec.domain == "values" and source.signal.values.dtype == np.int64:
         raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
-    return _Coded(source, codec, codec.encode(source, options))
+    return Coded(source, codec, codec.encode(source, options))
 
 
 def _write_signal(
-    writer: Writer, motion: Motion, index: int, coded: _Coded, progress: Progress | None
-) -> Values:
-    """Write the segments of a signal; return its values as a reader will have them."""
-    kept = []
+    outs: tuple[Writer, ClipCopy],
+    motion: Motion,
+    index: int,
+    coded: Coded,
+    progress: Progress | None,
+) -> None:
+    """Write the segments of a signal, to the file and to the copy that is decoded."""
     for segment in coded.encoded.segments:
-        _write_segment(writer, motion, index, coded.source, segment)
-        if not coded.codec.lossless:
-            kept.append(segment)
+        header, streams = _segment(outs[0], motion, index, coded.source, segment)
+        for out in outs:
+            out.segment(header, streams)
         if progress is not None:
             progress(segment.first + segment.n_frames, motion.n_frames, motion.name)
-    return coded.source.signal.values if coded.codec.lossless else _decoded(coded, kept)
 
 
-def _clip_record(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> payloads.Clip:
+def _clip_record(writer: Writer, motion: Motion, coded: Sequence[Coded]) -> payloads.Clip:
     rate = motion.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
         raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
@@ -239,9 +231,10 @@ def _signal_record(source: MemorySource, codec: Codec, part: Encoded) -> payload
     )
 
 
-def _write_segment(
+def _segment(
     writer: Writer, motion: Motion, index: int, source: MemorySource, segment: Segment
-) -> None:
+) -> tuple[SegmentHeader, list[bytes]]:
+    """Header and streams of a segment: its notes, its masks, and what the codec made."""
     start, stop = segment.first, segment.first + segment.n_frames
     per_frame = 8 * source.layout.samples_per_frame * max(1, source.layout.n_channels)
     size = segment.n_frames * per_frame
@@ -264,27 +257,4 @@ def _write_segment(
         streams += masks
     streams += segment.streams
     header = SegmentHeader(index, start, segment.n_frames, segment.lead, segment.tail, flags)
-    writer.segment(header, streams)
-
-
-def _decoded(coded: _Coded, segments: Sequence[Segment]) -> NDArray[np.float64]:
-    """What a reader will have: of exact channels what was given, of others what is decoded."""
-    encoded = coded.encoded
-    layout = replace(
-        coded.source.layout,
-        n_resolutions=encoded.n_resolutions,
-        find_model=model_finder((*encoded.models, *encoded.known)),
-    )
-    spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
-    n_groups = len(layout.groups)
-    exact = coded.codec.exact(encoded.header, layout) if coded.codec.exact else ()
-    lossy = tuple(group for group in range(n_groups) if group not in exact)
-    values = np.array(coded.source.signal.values, np.float64)
-    values[:, [c for group in lossy for c in layout.groups[group]]] = coded.codec.decode(
-        coded.encoded.header,
-        layout,
-        spans,
-        Request(0, layout.n_frames, lossy),
-        lambda segment, resolution, group: segments[segment].streams[resolution * n_groups + group],
-    )
-    return values
+    return header, streams

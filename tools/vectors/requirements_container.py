@@ -139,6 +139,9 @@ ARGUED: dict[str, str] = {
     "PATH-06": "of readers that write files, which a decoder under test does not: shown by tests/"
     "test_archive.py::test_no_file_overwrites_another",
     "CLIP-13": "every codec has one resolution or more, so that CLIP-15 refuses 0 as well",
+    "CEND-06": "of programs that write files: shown by tests/test_value_hashes.py::"
+    "test_no_command_writes_values_that_are_not_those_hashed",
+    "CEND-07": "of writers: shown by tests/test_value_hashes.py::test_a_faulty_encoder_is_found",
     "PACK-19": "of readers that follow a file while it is written; of whole files it is CEND-05: "
     "shown by tests/test_live.py::test_the_hash_is_compared_at_the_end",
     "REPT-01": "of writers, and a reader must not look: shown by tests/test_stream.py::"

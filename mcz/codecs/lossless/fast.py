@@ -118,6 +118,7 @@ CODEC = Codec(
     version=0,
     domain="ordinals",
     lossless=True,
+    hash_optional=True,
     encode=partial(encode_groups, build_streams, SIZING),
     decode=decode,
     regroup=regroup,

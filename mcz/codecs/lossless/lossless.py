@@ -100,6 +100,7 @@ CODEC = Codec(
     earlier={0: partial(decode, version=0)},
     domain="ordinals",
     lossless=True,
+    hash_optional=True,
     encode=encode,
     decode=decode,
     regroup=regroup,

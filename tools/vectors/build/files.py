@@ -11,11 +11,12 @@ import io
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
 from mcz.codecs import raw
-from mcz.codecs.contract import Codec
+from mcz.codecs.contract import Codec, Request, Span, model_finder
 from mcz.container import index_records, payloads
 from mcz.container.chunks import (
     FRAMING,
@@ -42,12 +43,14 @@ from mcz.container.packets import (
     build_packet,
     numbered_frame,
 )
-from mcz.container.segments import SegmentHeader, build_segment
-from mcz.container.value_hash import canonical
+from mcz.container.segments import FRESH, SegmentHeader, build_segment
+from mcz.container.value_hash import canonical, value_hash
 from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer, payload_id
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import deflate, parse, varint
+from mcz.writing import clip_writer
+from mcz.writing.clip_check import ClipCopy, Coded, Decoded
 from mcz.writing.clip_writer import write_clip, write_skeleton
 from tools.records import built, update
 from tools.vectors.build.edits import Edit, Made, put
@@ -77,6 +80,50 @@ class Vector:
     parts: tuple[tuple[tuple[str, ...], tuple[tuple[dict[str, Any], bytes], ...]], ...] = ()
     seed: int | None = None
     since: str = FORMAT_NAME
+
+
+class _Unchecked(ClipCopy):
+    """What a codec decodes of streams that a reader may refuse; of a lossless one what it had."""
+
+    def __init__(self, profile: Profile) -> None:
+        super().__init__(profile)
+        self._segments: dict[int, list[tuple[SegmentHeader, Sequence[bytes]]]] = {}
+
+    def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+        self._segments.setdefault(header.signal, []).append((header, streams))
+
+    def decoded(self, motion: Motion, coded: Sequence[Coded]) -> list[Decoded]:
+        found = []
+        for index, (part, signal) in enumerate(zip(coded, motion.signals, strict=True)):
+            free, segments = part.lossy_channels(), self._segments.get(index, [])
+            values = signal.values
+            if free.any():
+                values = np.array(values, np.float64)
+                groups = [g for g in part.source.layout.groups if free[list(g)].any()]
+                values[:, [c for g in groups for c in g]] = _lossy(part, segments, free)
+            found.append(Decoded(values, value_hash(values, signal.mask)))
+        return found
+
+
+def _lossy(
+    part: Coded, segments: Sequence[tuple[SegmentHeader, Sequence[bytes]]], free: Any
+) -> Any:
+    encoded, layout = part.encoded, part.source.layout
+    models = model_finder((*encoded.models, *encoded.known))
+    layout = replace(layout, n_resolutions=encoded.n_resolutions, find_model=models)
+    spans = [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h, _ in segments]
+    n_groups = len(layout.groups)
+    groups = tuple(g for g, group in enumerate(layout.groups) if free[list(group)].any())
+    own = n_groups * encoded.n_resolutions  # behind notes and masks
+    return part.codec.decode(
+        encoded.header,
+        layout,
+        spans,
+        Request(0, layout.n_frames, groups),
+        lambda segment, resolution, group: segments[segment][1][-own:][
+            resolution * n_groups + group
+        ],
+    )
 
 
 class Crafter(Writer):
@@ -148,7 +195,8 @@ class Crafter(Writer):
         self, motion: Motion, *, grouping: str = "joint", codec: Codec = raw.CODEC, **params: Any
     ) -> None:
         """Write ``motion`` with the raw codec, or another, without a quality record."""
-        write_clip(self, motion, replace(codec, grouping=grouping), params, quality=False)
+        with mock.patch.object(clip_writer, "ClipCopy", _Unchecked):
+            write_clip(self, motion, replace(codec, grouping=grouping), params, quality=False)
 
     def parts(self, name: str, *pieces: bytes) -> None:
         """Write an attachment in these parts, each stored or deflated, whichever is shorter."""

@@ -1,0 +1,330 @@
+"""The known answers, as ``tools/known_answers.py`` writes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class KnownAnswer:
+    """16 frames as a version of a codec stores them, in hex, and the SHA-256 of their values."""
+
+    version: int
+    grouping: str
+    header: str
+    streams: tuple[str, ...]
+    sha256: str
+    models: tuple[tuple[int, str], ...] = ()  # kind and data
+
+
+# fmt: off
+ANSWERS = {
+    "raw": KnownAnswer(
+        0, "joint",
+        "",
+        (
+            (
+                "000000000000000003000000b80b00e02e0078690080bb00f82401e0a501383e0200ee0238b5"
+                "03e09304f8890580970678bc07e0f808b84c0a6c0200000000000003bc0700000000ca0800ae"
+                "2900185b00d2a000a6fe00006d01aaef016e8a02b8350352f50306cd0440b50594b5066ec607"
+                "1c02000000000000034420008a0700000000a60900b22000b84c00ee890054d800203401e6a4"
+                "01dc260238b6028e5a03141004cad604e6aa05da02000000000000036e3c00c01c0058070000"
+                "0000b80600801b00583e00406f0038ae0040fb0058560180bf01b83602cabf022253038af403"
+                "dc0000000000000003a456007832007215002607000000009407004e1600c233005c5800e687"
+                "002ac600940b01b85f0102bb01062502309602b60300000000000003f25d00883b00ee200024"
+                "0e002a0300000000dc0000520d00982100ae3d0094610080890006bd005cf800823b01788601"
+            ),
+            (
+                "0a00000000000000025654b83d0028f816a00af80200008205ea0b0217ca26423b6a540c7694"
+                "98ccbf3601000000000000021225b61cea15e40c38095203c60200009402ee02a2081c0cf014"
+                "8a1b7e27383100ceffffffffffff020000260cbc16c21f38271e2d74313a3470354c31622fe8"
+                "2bde2644201a18600e"
+            ),
+            (
+                "2842ffffffffffff020000b22aea4c726a4a833c9bb4aa7cb594bbc6c07ebd86b5dea8509b48"
+                "85906a6079feffffffffff03000000b44b00988f00e2c70026fc009a28017449014866018277"
+                "01b684011a8a01e48301a87901d26301f649014a2801486afdffffffffff03000000f67200fc"
+                "da00123801388a016ed101b40d020a3f02706502e680026c9102029702a891025e8102246602"
+                "fa3f02"
+            ),
+            (
+                "800bfcffffffffff0300000042a400aa360102bb011435024c9d0274f7025647035e850356b5"
+                "0308db03e0ee03a8f4032af003d2d9036ab503a853faffffffffff0300000004d800d89e017c"
+                "540226f5026a88037e0a049877044cd704d025055a5f057e8b0572a6056cac0500a505648c05"
+                "6039f8ffffffffff03000000d01501861302ecfc0202d203c892043e3f0564d7053a5b06c0ca"
+                "06f62507dc6c07729f07b8bd07aec70754bd07"
+            ),
+        ),
+        "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
+    ),
+    "lossless": KnownAnswer(
+        0, "joint",
+        "",
+        (
+            (
+                "140080013f142e80013f142a80013f140080013f0c3240142a80013fcb580f7f14a1fd17474e"
+                "a08d99b7e8bd5f68e300b199063cd7beaa5a5daada64ab1cd53cc05a354d48cac2aacf2cc929"
+                "ad14d79b5413e0aaec915e579fba675b4b194bcea0ff9d895fd676b3b99487c27ed3b7d4e0d6"
+                "f29817f7677eeee06c79a250835cacc7c3be1f1cee7fb5d133692bbea2434a7cda2185ef24b9"
+                "d95c0e60caf4"
+            ),
+            (
+                "142a80013f042d140080013f0b901ee641ee62bd2a6505901e76be9e9c144c70a9343e0ddc04"
+                "50e022f13ee7aa01c7c33695a14ac999440a951c3c4083bc9b76b0d5cbd77aeda48533d796bd"
+                "3d05c30ab7"
+            ),
+            (
+                "0c2b400c2e40140080013f0c0fb3aa6f8e4869d9fba7b567a750139a08b1b51021042b5ec1b3"
+                "85df2c05a4316cd2c4086f3de5cd313825e30369e6a343579324f91c9ea6054b104da3d2b495"
+                "8c95e767f139cc8cd08c"
+            ),
+            (
+                "142a80013f142a80013f140080013f0afad47d37423b3018e4f39381ebf0a400722ae6c335e4"
+                "bb23d57655dd2a0d3d2c06479afdbf5b0cb42d2b6d87a72346f86197c89feb3f84a66797e5c2"
+                "76bbf270c83d6ef9f8a392f1219089d8864da9885b"
+            ),
+        ),
+        "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
+    ),
+    "mrdwt": KnownAnswer(
+        0, "channel",
+        "0a0010ff000000000000d03f01",
+        (
+            "857b00971513c3b19c0b569f",
+            "857b04c0bf7b61d62b414b",
+            "857b1061622c6e3ee86dec82",
+            "837d143f329109a06e7f",
+            "837d1c326e7889a433fb",
+            "80820e18ca636392",
+            "807f141b85135bac",
+            "808008605ebe05",
+            "008205b52faf",
+            "008a05b56105",
+            "008a0d3ecb5f37",
+            "0090077fb1ed",
+            "8380cf01052e0b42cb7b35",
+            "8480a902056319079f6800d1",
+            "84809703021dc248b10790d7",
+        ),
+        "d3f8addc242a5633957b199faef3c49af0f2bd64fa7dfa0a43efb51a906ce612",
+    ),
+    "qbc": KnownAnswer(
+        0, "joint",
+        "2810ff000000000000e83fd2b6514ca8b7e83f",
+        (
+            "0bffffbefebea6ea0bbd9d3b",
+            "02f5fbec6a18",
+            "07f1769d43286a",
+            "0ce78e5ae3b554a020",
+            "000a15c7d8a28e37",
+            "00050aba6f",
+            "0008292738",
+            "000b27ac09",
+        ),
+        "6cde9cb995ddb2f74677c732a833f20af0b2208fc86c74e6a4243052ad30c602",
+    ),
+    "pca": KnownAnswer(
+        0, "all",
+        "ff",
+        (
+            (
+                "551f0e121109080808080807070707060395970e0d0d0c0c0c0a0a0a0a0803275231cf63e760"
+                "85e53c437e215b40f7d2cc780d54a9a4adf9223126a2f2039ba8f77dc4470b6ac04a85850b79"
+                "85be2fdcafa719a6ad46601ae661a94798eeb90e0af84180afe30218e93b84fc8d309bfed839"
+                "ec5c48767601a8769c82196dc5d991c9ac13a7a265f9609a796fb07dac8454ca2793096a630a"
+                "10f4e314db7ce0c5cf5ce6854baee8ee0231530c423e082bba3762a57bbd51b35224c1c9835f"
+                "6dc4e8d8a7ec277dfe8e226aa4e24949f11093bee0df4d705a23ea8fd788606a6b5843671d5e"
+                "5a51b75503c9d00582835ebc979092a1ea5e6faa0a35b900afa494d6936d63bc3b036b336ce1"
+                "bd529c7f64e49de941ffe0117eac6b20af4d4a912ec8b97d95157a9fefffb16d4fa6cbb2e174"
+                "10826e2b36a8d5ac9a268ff0e9e2c8cdbdd9e77c837e59a9606bc13f6cc3c4469fde16718aff"
+                "188634a7a5c68a07c4779bb55a754ce0483843ecb2995a0735a4f8d353112a9c2c14d186925c"
+                "e2208decf3b9ca50a16cb69c770dce17f4f855ea388ca3b0b2a771cbed21888b1bc5b18c56a4"
+                "a393abad8ed1a3d1be9ac816a7fea777f4d7af06dc3c44e9ce21f1d5fdff89edb18f7ab512ab"
+                "a06653d1713894db1ad47d3310078d2d70751d94cf4268bcaa82f49f978fdb876a385241f9e7"
+                "6351c3910b50fe27e307c0b5f588f881807c43df2f78546f4389a052000d06d926d5bc62e22e"
+                "f321128df79904"
+            ),
+        ),
+        "c93a43f076c371d9f2ca16cf76af35367bffeccf980a27da9235ca5d0db479fb",
+    ),
+    "dwt": KnownAnswer(
+        0, "channel",
+        "0a0010ff000000000000d03f01",
+        (
+            "838000ba575e7ba7c5a4",
+            "8280028b2ca51538f1",
+            "8280084780687a1ead18",
+            "82800c4a6a99bf9e29",
+            "828012361298792845",
+            "80801410589ef63f48",
+            "8080121b6b54f7d0",
+            "808008605ebe05",
+            "80800985c8fc",
+            "80802513fec4d589",
+            "82804f125c0dc83f1d",
+            "8280870106d3bf4b1da3",
+            "8380cf01052e0b42cb7b35",
+            "8480a902056319079f6800d1",
+            "84809703021dc248b10790d7",
+        ),
+        "20f705949f813e29f1809f29df9bc3dc2319c3037aee350b85415e25d05c8d86",
+    ),
+    "awt": KnownAnswer(
+        0, "channel",
+        "0a0010ff0b81fb17d394404001",
+        (
+            "007b00edc6bd",
+            "007c00f636",
+            "007b00f89f02",
+            "007d00fc97",
+            "007d00fdd4",
+            "",
+            "",
+            "",
+            "",
+            "",
+            "",
+            "",
+            "008001d45f",
+            "008001ee3f",
+            "008101f304",
+        ),
+        "2030a2f27596de0fc9d8e7a3da6577570011cafa5c63bfcb0ca64123ddd32387",
+    ),
+    "lsdt-frame": KnownAnswer(
+        0, "all",
+        "02009a9999999999c93f0f7b7b7b7d7d827f80828a8a9080808000",
+        (
+            (
+                "287455a56cc616080cc5803855a75e8fcb619c291ca42747cbae246427d30306d952a974a1cd"
+                "67f213abd00e003bde1ce80b01e1d393ed443a1ac768bc63fb70f50e6aae87f8f57c84c686d3"
+                "3dc1d0b9b8261dfa8997c60333ba170dfb49e870ed496d040e12e472f63fec87ece00ea4f2c5"
+                "1cc3bd590b4493cc629804a89f"
+            ),
+        ),
+        "0d9c44ecb03edc5ff8945045c98637452fd2c76869baddc7b882a5ff5c3e43f6",
+    ),
+    "lsdt-clip": KnownAnswer(
+        0, "all",
+        "f001f00102009a9999999999c93f0f7b7b7b7d7d827f80828a8a9080808000",
+        (
+            (
+                "707a2e671bb04d853303669179a23c7e57d41fbf56e179a33a9d3a41a9d3e3e78c341ed57621"
+                "1d87cbcfb536ca84938e92b5f9b3019087750de96eb269ad584249f096c01d80ba2841fe167f"
+                "cd35ca53ebcbbdcf2b6a5936bfe3193af1e29415a82bbedc0067c7bb50c889acd022d4aede"
+            ),
+        ),
+        "0a69e4e23706a6e38c7b173bddfbb530cc286da99afbdcf43858e383c86d7485",
+    ),
+    "mdtt": KnownAnswer(
+        0, "all",
+        (
+            "10100201eab54b72f16695d82919012bd2f33e989a9999999999c93f0f7b7b7b7d7d827f80828a8a"
+            "9080808000"
+        ),
+        (
+            "2679040d9f644530bd70c74f720cab717fd979b5d32b7e687657c050ed0859b4674847a36cb2c5",
+        ),
+        "85769f1efc31bbb040a147754ba4a820b89f292d9179b35eed7e9d7e4970bb7a",
+        (
+            (1, (
+                "010f030a09061ed2490f4d8f30f94fb1819cd8109cfcb375dd70fe364721ddbc4b05d8ebdd69"
+                "adbdf9628020e604caf6"
+            )),
+        ),
+    ),
+    "pca-rdo": KnownAnswer(
+        0, "all",
+        (
+            "10020e01dc9236d8e6d6b135cf4d3df28788c6a69a9999999999c93f0f7b7b7b7d7d827f80828a8a"
+            "9080808000"
+        ),
+        (
+            "06a0f44b67dafb",
+        ),
+        "108de800d0ba0811535817b641004d5dff8e9ecb1ef9c0bdce38ff70cb4b4b64",
+        (
+            (1, (
+                "030f020a0810020a080f010620f981a529468f14363c4b2ce4b10bb22c2f41a1b8f83a16a8ea"
+                "12c2d4e86533562effc3909f2f3c5d871c73075d293b147859c56edf01e6e39659ae1489b07e"
+                "2dd18c08a37850b2325128670a36b5d99c404a59"
+            )),
+        ),
+    ),
+    "online": KnownAnswer(
+        0, "all",
+        "02009a9999999999c93f0f7b7b7b7d7d827f80828a8a908080800000",
+        (
+            (
+                "4283484bf4174e6b89ba8e32fe6fc1cefbf109cd77c72e8d8e1a6a3f51ceacadb3a8c291b577"
+                "5875345b07412fb8b6b36ba67b28656828433bbe2f4c2830056ed45d2fcc222391e8e7db0e4c"
+                "8b6f22b81160ab8d28a0ead82a0c47d07a4437765f839fc2f0beb52a1ab7ec28b83322a62408"
+                "343198e5f9ad7a4dcc2807c3ea16728348aa1d42"
+            ),
+        ),
+        "5f63a826fdbb5e06ba634896efbedc2911c51630fcca8a26907ba737c52a160d",
+    ),
+    "best": KnownAnswer(
+        0, "all",
+        "",
+        (
+            (
+                "00140080013f142e80013f142a80013f140080013f0c3240142a80013f142a80013f042d1400"
+                "80013f0c2b400c2e40140080013f142a80013f142a80013f140080013fcb580f7f14a1fd1747"
+                "4ea08dc8014e12a9561783cb623bcf4b8e5f10f2ee422baec8c4b5c2469766ea58f8b7bc4613"
+                "a7466c4b967f920a3120f11bf17e34175b5d8757a89194156ba8b642abc513a2cdcae3e267fd"
+                "b7323d566496cc7ad05d62e6220fef2a77a8bdcd33fc2f0b4e398e6c40fb077f6246a4e6e299"
+                "d6195aa1a9a18a731d915f5d31c376c87ff1f248719a28eea9a6903b32596c84495ec53ef2ef"
+                "3af30f643e240b4a4d85e64ed62bf2f78f4d7f409ac035b4b2b4bc2ef334a1827a56537db0a6"
+                "518c9cd98e722d1fa92710be462331ec686a0f8a6498d70ba101069c883219a9ce4bef273af6"
+                "d425db0fe4bccf2d1ba2901ffaaf3c5f9c25c52791c953beb02f194661f89a004769d21d3dc7"
+                "3ee20a96bc3954cf66e4929175d72a19f1a5079e52a74e46b278dfbcb1a4f8a09e00cebd9007"
+                "f7d8193cc7bb2bbccd73d0d9cda41e701b68ba7f7323cebc"
+            ),
+        ),
+        "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
+    ),
+    "posewave": KnownAnswer(
+        0, "all",
+        "03010000cdcc4c3d000040400888910209000004000306020000",
+        (
+            (
+                "00ff7775f1dcd878f9da143a75ccf7a0f33b144f6fe3f550cbb74f5463e9c0bbb165f88117c3"
+                "cf75f887"
+            ),
+            "08014ffe61fdc0471a001e6e27231391998b25e93f35ddb5c8f11e669b",
+            "904876623047fce0fa9ac7e8c4dd24cbeebd7601000aca012b636057a8",
+            "16b37577d2972f69e96cb352559aba97b3c75b",
+        ),
+        "7aa0e2a7e1752e17771eeaba367dc71bf7c1ff4c4cce8e2b09f76adb2bb20ddc",
+    ),
+    "fast": KnownAnswer(
+        0, "joint",
+        "",
+        (
+            (
+                "142580013f142c80013f142d80013f142c80013f0c2f40142d80013f4f9f0d00648e7ab033f0"
+                "8210e97551848b4b6c3b1c0eb912365545fb4dc801426ef034813f8a9ff708ea1c1b3c175a8e"
+                "57105cc0a5a700012b282a00012b28ca800000011d13561a81e4cba132e84cba7809974265d2"
+                "4c5d24c8595e0079494ca000000000000000000e50fa3aefd2074a804a944aca944a8032b28c"
+                "a8007a85d44c038a4a0a65250a65250a7299494ca0425e5140c000000000000000000370dc00"
+            ),
+            (
+                "0c2a4004290c264014af7e005af65ca771f95b91f12a8431f66c81dd32b3ce15fd8d121710a1"
+                "42850f45aa142850a121211324013b74fa0d1a8e96868511a339ab306cc9726481cc1987a303"
+                "03030661e8c0c0c0c1cca7aa300f"
+            ),
+            (
+                "0c2d400c3040143280013f611f28001c65d9c81c6ce1dcca62d25761d495fa79bf6fb02e3075"
+                "100000000000000000000000000000000de697b12b714a841b3506cd7420d9a8366bd081b9af"
+                "4376886a0a2c27ae6b0b09eb9ac3617af36c3613d5591eec50"
+            ),
+            (
+                "0c34400c3540143780013f951f1400820363a59216e155de0268e3e266e6a7727f3450aa30a1"
+                "200000000000000000000000000000000f296f555d078d414e61b35f5986cd7d661b34faa615"
+                "9a7d49849870086b1629885da91a10f6a46843da91a10bb591b084ed4884fa4052"
+            ),
+        ),
+        "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
+    ),
+}
