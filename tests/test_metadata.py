@@ -6,9 +6,12 @@ import io
 import json
 import os
 import tempfile
+import zlib
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -21,6 +24,7 @@ from mcz.container.writer import Writer
 from mcz.editing.mtimes import nanoseconds, stamp
 from mcz.editing.tables_of_clips import from_table
 from mcz.sample import write_samples
+from tests.commands import Call
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
 RECORDS = st.lists(
@@ -289,3 +293,63 @@ def test_any_time_is_written_and_read(ns: int) -> None:
         os.utime(file.name, ns=(0, ns))
         path = Path(file.name)
         assert nanoseconds(stamp(path)) == path.stat().st_mtime_ns
+
+
+def readable(data: bytes) -> bytes:
+    """The bytes, and all that can be inflated from any of them on."""
+    found = [data]
+    for at in range(len(data)):
+        with suppress(zlib.error):
+            found.append(zlib.decompressobj(-15).decompress(data[at : at + 2000], 2000))
+    return b"\n".join(found)
+
+
+def purged(path: Path, words: list[str]) -> bytes:
+    """The file without the consent of anything; ``words`` are what was said of it."""
+    assert [word for word in words if word.encode() not in readable(path.read_bytes())] == []
+    with mcz.open(path) as file:
+        values = {clip.name: clip.read() for clip in file}
+    report = mcz.set_metadata(path, {n: {"consent": None} for n in ("", *values)}, purge=True)
+    after = path.read_bytes()
+    assert report.size == len(after) and not list(path.parent.glob(".*"))
+    left = readable(after)
+    assert [word for word in ("consent", "META", "REPT", *words) if word.encode() in left] == []
+    assert mcz.verify(path) == []
+    with mcz.open(path) as file:
+        assert all(np.array_equal(file[name].read(), old) for name, old in values.items())
+    return after
+
+
+def test_nothing_of_what_was_withdrawn_is_left(tmp_path: Path, samples: Path) -> None:
+    """Consent in CLIP, META, COPY, recovery data and in what a live clip repeats."""
+    in_clip, in_meta, of_file, of_live, last = (f"9e2b-consent-{n}" for n in range(5))
+    path, live = tmp_path / "a.mcz", tmp_path / "live.mcz"
+    motion = mcz.read(samples / "walk.bvh")
+    pairs = {**motion.metadata, "consent": in_clip, "subject": "S-01"}
+    mcz.write(replace(motion, metadata=pairs), path, copies=True)
+    mcz.set_metadata(path, {"walk": {"consent": in_meta}, "": {"consent": of_file}})
+    mcz.protect(path, 0.2)
+    mcz.set_metadata(path, {"walk": {"consent": last, "place": "hall 4"}})
+    after = purged(path, [in_clip, in_meta, of_file, last])
+    with mcz.open(path) as file:
+        clip = file.only_clip()
+        found = [clip.metadata[key] for key in ("subject", "place")]
+        assert found == ["S-01", "hall 4"]
+        assert clip.source_bytes() == (samples / "walk.bvh").read_bytes()
+    (tmp_path / "bad.mcz").write_bytes(after[:200] + bytes(60) + after[260:])
+    assert mcz.repair(tmp_path / "bad.mcz", tmp_path / "good.mcz").restored
+    assert (tmp_path / "good.mcz").read_bytes() == after
+
+    options = {"params": {"gof": 4, "step": 0.5}, "metadata": {"consent": of_live}}
+    live.write_bytes(b"".join(mcz.stream_encode(motion.values[:40, :6], ["a", "b"], **options)))
+    assert live.read_bytes().count(of_live.encode()) > 1
+    purged(live, [of_live])
+
+
+def test_what_is_purged_may_be_said_of_the_file(archive: Path, call: Call) -> None:
+    mcz.set_metadata(archive, {"": {"licence": "none", "x-id": "7"}})
+    assert call("meta", archive, "--file", "--set", "licence=CC0", "--purge").code == 0
+    assert metadata(archive)[""] == {"licence": "CC0", "x-id": "7"}
+    size = archive.stat().st_size
+    assert "purged" in call("meta", archive, "--purge").out
+    assert archive.stat().st_size == size and mcz.verify(archive) == []

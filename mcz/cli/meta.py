@@ -84,6 +84,10 @@ def _to_pairs(
     "of all whose rate is unknown.",
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Change a rate that is known.")
+@click.option(
+    "--purge", is_flag=True,
+    help="Rewrite the file so that nothing of what was set or removed before is left in it.",
+)  # fmt: skip
 @json_option
 def command(
     file: str,
@@ -98,19 +102,20 @@ def command(
     skip_unknown: bool,
     rate: Fraction | float | None,
     force: bool,
+    purge: bool,
     as_json: bool,
 ) -> Exit:
     """Show what is said of the clips of FILE.mcz, or set it, and leave their bytes untouched.
 
-    It is appended, and the last one said wins. What was said before stays in the bytes until the
-    file is rewritten, as mcz delete and mcz reorder do.
+    It is appended, and the last one said wins. What was said before stays in the bytes until
+    --purge rewrites the file.
     """
     existing(file)
     if of_file and (clips or where or table or rate):
         raise Failure("--file is about no clip", Exit.USAGE)
     if set(pairs) & set(removed):
         raise Failure(f"{sorted(set(pairs) & set(removed))[0]} is set and removed", Exit.USAGE)
-    if not (pairs or removed or table or rate):
+    if not (pairs or removed or table or rate or purge):
         with opened(file) as held:
             return _show(held, _chosen(held, clips, where, of_file), as_json)
     rows = None
@@ -125,7 +130,7 @@ def command(
         from mcz.reading.names import listed
 
         say(f"{table}: no clip for {plural(len(unknown), 'row')}: {listed(unknown)}")
-    return _set(file, changes, rate, clips, where, force, as_json)
+    return _set(file, changes, rate, (clips, where, force), purge, as_json)
 
 
 def _chosen(
@@ -183,22 +188,26 @@ def _set(
     file: str,
     changes: Mapping[str, Said],
     rate: Fraction | float | None,
-    clips: tuple[str, ...],
-    where: str | None,
-    force: bool,
+    rated: tuple[tuple[str, ...], str | None, bool],
+    purge: bool,
     as_json: bool,
 ) -> Exit:
+    """Set what is said; ``rated``: of which clips the rate, and whether by force."""
     import mcz
 
     outcomes = []
+    clips, where, force = rated
     with about(file), Progress() as progress:
         if rate is not None:
             report = mcz.set_rate(
                 file, rate, clips or None, where=where, force=force, progress=progress
             )
             outcomes += report.outcomes
-        if changes:
-            outcomes += mcz.set_metadata(file, changes).outcomes
+        if changes or purge:
+            report = mcz.set_metadata(file, changes, purge=purge, progress=progress)
+            outcomes += report.outcomes
+            for text in report.left_out:
+                say(f"{file}: left out: {text}")
     if as_json:
         rows = [{"name": o.path, "result": o.result, "message": o.message} for o in outcomes]
         print_json({"target": file, "changed": rows})
@@ -208,5 +217,6 @@ def _set(
     of_clips = plural(len(names - {""}), "clip")
     rates = f", the rate of {plural(of_rate, 'clip')}" if rate is not None else ""
     whole = " and of the file" if "" in names else ""
-    echo(f"{file}: changed what is said of {of_clips}{whole}{rates}")
+    purged = ", and purged what was said before" if purge else ""
+    echo(f"{file}: changed what is said of {of_clips}{whole}{rates}{purged}")
     return Exit.FINE

@@ -6,7 +6,7 @@ What is shared is named by its hash, so that it needs no new number and is writt
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -40,12 +40,13 @@ BLOCK = 1 << 20  # bytes of an open DATA that are copied at once
 class Change:
     """What is said otherwise of a clip that is carried over; None: as it was.
 
-    ``name`` of the clip, ``path`` of its source, ``rate`` in frames a second.
+    ``name`` of the clip, ``path`` of its source, ``rate`` in frames a second, ``metadata`` of CLIP.
     """
 
     name: str | None = None
     path: str | None = None
     rate: Fraction | None = None
+    metadata: Mapping[str, str] | None = None
 
 
 SAME = Change()
@@ -223,6 +224,8 @@ def _changed(payload: bytes, where: str, change: Change) -> bytes:
         record.name = change.name
     if change.path is not None and record.source:
         record.source.path = change.path
+    if change.metadata is not None:
+        record.metadata = payloads.metadata_records(dict(sorted(change.metadata.items())))
     if change.rate is not None:
         base, rate = record.time_base, record.rate_numerator
         if base is not None and base.first_time is not None and rate:

@@ -29,15 +29,21 @@ Said = Mapping[str, str | None]  # a key and its value; None: it is not there an
 
 
 def set_metadata(
-    target: str | os.PathLike[str], changes: Mapping[str, Said], *, force: bool = False
+    target: str | os.PathLike[str],
+    changes: Mapping[str, Said],
+    *,
+    force: bool = False,
+    purge: bool = False,
+    progress: Progress | None = None,
 ) -> Report:
     """Say something of clips of an MCZ file, or of the file as a whole.
 
     ``changes``: of each clip by its name, "" for the file, keys of the registry (or ``x-...``) and
     their values; None removes a key. It is appended (SPEC.md, "META"), so that no byte of a clip is
-    touched, and what was said before is still in the bytes until the file is rewritten. Nothing is
-    written where nothing changes. Raises OptionError for a name, a key or a value that cannot be,
-    and AccessError while another process is appending; ``force`` is that of ``mcz.append``.
+    touched, and what was said before is still in the bytes until the file is rewritten: ``purge``
+    rewrites it so that nothing of that is left. Otherwise nothing is written where nothing changes.
+    Raises OptionError for a name, a key or a value that cannot be, and AccessError while another
+    process is appending; ``force`` is that of ``mcz.append``.
     """
     changes = {name: _respelled(said) for name, said in changes.items()}
     for said in changes.values():
@@ -63,8 +69,19 @@ def set_metadata(
             writer.finish()
         redundancy = redundancy_of(growth.container) if records else None
     still_protect(target, redundancy)
+    if purge:
+        report.left_out += _purge(target, progress)
     report.size = Path(target).stat().st_size
     return report
+
+
+def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[str]:
+    """Rewrite a file so that its metadata stand in CLIP; return what was left out."""
+    with source_of(target, None) as file:
+        plan = whole(file)
+        plan.purges = True  # META-08
+        plan.clips = {clip.name: Change(metadata=clip.metadata) for clip in file}
+        return rewrite(target, None, True, file, plan, steps(progress, len(plan.clips))).left_out
 
 
 def registered_key(key: str) -> str:

@@ -19,6 +19,7 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.limits import BASE, Profile
 from mcz.container.locks import lock
+from mcz.container.metadata import Record
 from mcz.container.reader import Container
 from mcz.container.source import path_of
 from mcz.container.writer import Writer
@@ -61,13 +62,15 @@ def steps(progress: Progress | None, total: int) -> Step:
 class Plan:
     """What of a file goes into a new one: names, and what they are from now on.
 
-    ``clips`` are in their new order. ``shared`` goes along, needed by a clip or not.
+    ``clips`` are in their new order. ``shared`` goes along, needed by a clip or not. ``purges``: no
+    META is carried over, for the clips have their metadata in CLIP.
     """
 
     clips: dict[str, Change] = field(default_factory=dict)
     attachments: dict[str, str] = field(default_factory=dict)
     aliases: dict[str, str] = field(default_factory=dict)
     shared: list[Shared] = field(default_factory=list)
+    purges: bool = False
 
 
 def whole(file: File) -> Plan:
@@ -125,7 +128,9 @@ def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
     for alias, as_name in plan.aliases.items():
         writer.alias(as_name, *_target(file, plan, alias))
     names = ((name, change.name or name) for name, change in plan.clips.items())
-    if plan.clips:
+    if plan.purges and file.metadata:
+        writer.metadata([Record("", file.metadata)])
+    elif plan.clips and not plan.purges:
         writer.metadata(said_of(file.container, names))
     return carrier.left_out
 
