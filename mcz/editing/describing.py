@@ -79,7 +79,7 @@ def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[st
     """Rewrite a file so that its metadata stand in CLIP; return what was left out."""
     with source_of(target, None) as file:
         plan = whole(file)
-        plan.purges = True  # META-08
+        plan.purges = True  # META-09
         plan.clips = {clip.name: Change(metadata=clip.metadata) for clip in file}
         return rewrite(target, None, True, file, plan, steps(progress, len(plan.clips))).left_out
 

@@ -130,7 +130,7 @@ ARGUED: dict[str, str] = {
     "states more is refused by LIMIT-14, COPY-02 or COPY-03",
     "META-05": _REWRITER + "test_metadata.py::test_it_goes_along",
     "META-06": _REWRITER + "test_metadata.py::test_what_is_said_of_a_deleted_clip_is_gone",
-    "META-08": _REWRITER + "test_metadata.py::test_nothing_of_what_was_withdrawn_is_left",
+    "META-09": _REWRITER + "test_metadata.py::test_nothing_of_what_was_withdrawn_is_left",
     "RECV-01": _REPAIR + "test_recovery.py::test_the_vectors_are_repaired",
     "RECV-02": _REPAIR + "test_recovery.py::test_any_damage_is_repaired_or_salvaged_or_refused",
     "RECV-03": _REWRITER + "test_recovery.py::test_what_follows_a_protected_file_is_protected",
