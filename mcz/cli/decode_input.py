@@ -48,7 +48,7 @@ class Input:
         """The open .mcz, of a source file one in memory; and the files that were read for it."""
         if not self.is_source:
             options = {"salvage": self.salvage, "unverified": self.unverified, "verify": True}
-            with opened(self.file, max_decoded=self.max_decoded, **options) as file:
+            with opened(self.file, max_decoded=self.max_decoded, **options) as file:  # CEND-06
                 yield file, (self.file,)
             return
         import mcz

@@ -120,7 +120,7 @@ def _decoded(
         kept = ~free if free.any() else slice(None)
         is_same = _is_same(signal.values[rows, kept], block.values[:, kept])
         mask = None if signal.mask is None else signal.mask[rows]
-        if not is_same or not _is_same_mask(mask, block.mask):  # CEND-06
+        if not is_same or not _is_same_mask(mask, block.mask):  # CEND-07
             raise ChecksumError(
                 f"frames {block.start}:{block.stop}: codec {info.codec.name} decodes other values "
                 "than it was given",
