@@ -1,8 +1,7 @@
 """The time of every frame, in seconds. SPEC.md, "Time", is normative.
 
-A ``Timeline`` is made of what a motion or a clip says: a column of times, a clock of its source,
-the time of its first frame, frame numbers and a rate. ``Motion.times``, ``Clip.times`` and
-``mcz.times`` give it.
+A ``Timeline`` is made of what a motion or a clip says: a signal of times, the time of its first
+frame, frame numbers and a rate. ``Motion.times``, ``Clip.times`` and ``mcz.times`` give it.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.numbers import Grid, GridKind
 from mcz.skeleton import Channel
-from mcz.source import SourceClock
 from mcz.types import Values
 
 Floats = NDArray[np.float64]
@@ -208,21 +206,15 @@ class Counting(NamedTuple):
 def timeline_of(
     counting: Counting,
     first_time: float | None = None,
-    clock: SourceClock | None = None,
     column: Column | None = None,
 ) -> Timeline | None:
     """The times of frames; None where nothing tells them.
 
-    ``first_time`` is that of the first frame, ``clock`` that of the source, ``column`` the times
-    that stand among the values.
+    ``first_time`` is that of the first frame, ``column`` the times of a signal.
     """
     numbers, rate, step = counting
     if column is not None and not times_fault(column.times):  # what salvage found may have one
         return Timeline(column.times, rate, column.rounding)
-    if clock is not None:
-        told = clock.times(numbers, rate and rate * step)
-        if told is not None and not times_fault(told):
-            return Timeline(told, rate, clock.rounding(rate and rate * step))
     if rate is None:
         return None
     if first_time is None:
@@ -255,10 +247,11 @@ class Numbered(NamedTuple):
     first_time: float | None
 
 
-def numbering_of(timeline: Timeline, numbers: Ints) -> Numbered | None:
-    """Frame numbers for the times of ``timeline`` at its rate, without a source or column.
+def numbering_of(timeline: Timeline, numbers: Ints, *, kept: bool = False) -> Numbered | None:
+    """Frame numbers for the times of ``timeline`` at its rate, without a column.
 
-    ``numbers`` are kept where they can be. None where frame numbers cannot give such times.
+    ``numbers`` are kept where they can be; ``kept``: they must be. None where frame numbers cannot
+    give such times.
     """
     rate, times = timeline.rate, timeline.even
     if rate is None or not len(times):
@@ -266,10 +259,11 @@ def numbering_of(timeline: Timeline, numbers: Ints) -> Numbered | None:
     tolerance = timeline.rounding + EXACT
     first = float(times[0]) * float(rate) + 1
     candidates = [numbers]
-    if timeline.places is not None and abs(first) < 2**52:
-        candidates.append(round(first) + timeline.places)
+    counts = timeline.places
+    if counts is not None and not kept and abs(first) + counts[-1] < MAX_NUMBER and _ascend(counts):
+        candidates.append(round(first) + counts)
     for known in candidates:
-        for start in (None, float(times[0])):
+        for start in (None, int(known[0]) / float(rate), float(times[0])):
             found = timeline_of(Counting(known, rate), start)
             if found is not None and np.abs(found.times - times).max() <= tolerance:
                 return Numbered(known, start)
@@ -290,9 +284,13 @@ def part_begins(
     return float(timeline.times[start]) if timeline is not None and start < stop else None
 
 
+def _ascend(numbers: Ints) -> bool:
+    return bool((numbers[1:] > numbers[:-1]).all())
+
+
 def check_numbers(numbers: Ints, name: str) -> None:
     """Raise MotionError for frame numbers of ``name`` that a clip cannot have."""
-    if (numbers[1:] <= numbers[:-1]).any():
+    if not _ascend(numbers):
         raise MotionError("its frame numbers do not ascend", clip=name)
     if len(numbers) and not (numbers[0] >= -MAX_NUMBER and numbers[-1] <= MAX_NUMBER):
         raise MotionError("a frame number is beyond 2^52 - 1", clip=name)

@@ -247,14 +247,20 @@ class Motion:
         for signal in self.signals_of(TIMES):
             column = column_of(signal.masked()[:, 0], signal.grids[0], unit_of_times(signal))
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
-        clock = self.source.clock if self.source is not None else None
         counting = Counting(numbers, self.frame_rate, self.number_step)
-        return timeline_of(counting, self.first_time, clock, column)
+        return timeline_of(counting, self.first_time, column)
 
     @property
     def times(self) -> NDArray[np.float64]:
         """The time of every frame in seconds, (n_frames,): see ``mcz.times``; OptionError."""
         return known_timeline(self.name, self.timeline).times
+
+    def at_rate(self, rate: Fraction) -> Motion:
+        """The same frames and numbers at another frame rate, which times follow."""
+        first_time = self.first_time
+        if first_time is not None and self.frame_rate is not None:
+            first_time *= float(self.frame_rate / rate)
+        return replace(self, frame_rate=rate, frame_rate_exact=True, first_time=first_time)
 
     def without_source(self) -> Motion:
         """The same motion without its source, at the same times."""
@@ -263,27 +269,25 @@ class Motion:
     def counted_by_ones(self) -> Motion:
         """The same motion at the same times with a ``number_step`` of 1, as files have it.
 
-        Where its source prints the frame numbers, they are kept, and it gets a signal ``time``.
+        With a source, which may print the frame numbers, they are kept.
         """
         motion, timeline = replace(self, number_step=1), self.timeline
         if self.number_step == 1 or self.signals_of(TIMES):
             return motion if self.number_step > 1 else self
-        if self.source is None or timeline is None:
-            return motion.at_times(timeline)
-        return motion._with_time_signal(timeline)
+        return motion.at_times(timeline)
 
     def at_times(self, timeline: Timeline | None) -> Motion:
-        """This motion at these times, which its source does not tell; None: at unknown ones.
+        """This motion at these times; None: at unknown ones.
 
-        Frame numbers are kept where they give such times; else they are others, or the motion gets
-        a signal ``time``.
+        Frame numbers are kept where they give such times, and with a source, which may print them;
+        else they are others, or the motion gets a signal ``time``.
         """
         motion = replace(self, first_time=None)
         own = motion.timeline
         if timeline is None or not self.n_frames or (own and own.is_near(timeline)):
             return motion
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
-        found = numbering_of(timeline, numbers)
+        found = numbering_of(timeline, numbers, kept=self.source is not None)
         if found is not None:
             first = found.first_time
             return replace(motion, frame_numbers=found.numbers, first_time=first, number_step=1)

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from typing import Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from mcz import brief
 from mcz.checks import DATA, HASH, INTEGER, TEXT, Rule, check_fields
@@ -24,18 +20,6 @@ class FrameNotes(Protocol):
         """The notes of frames start <= f < stop alone, numbered from 0."""
 
 
-class SourceClock(Protocol):
-    """The times that a source gives to frame numbers; a source format defines it."""
-
-    def times(
-        self, numbers: NDArray[np.int64], rate: Fraction | None
-    ) -> NDArray[np.float64] | None:
-        """The times of frames in seconds; None where ``rate``, in frames a second, is missing."""
-
-    def rounding(self, rate: Fraction | None) -> float:
-        """The most seconds by which a printed time is off."""
-
-
 SOURCE = {
     "format": TEXT,
     "template": DATA,
@@ -44,7 +28,6 @@ SOURCE = {
     "path": TEXT,
     "size": INTEGER,
     "sha256": HASH,
-    "clock": Rule("a clock or None", lambda clock: clock and clock.times and clock),
 }
 
 
@@ -53,8 +36,7 @@ class Source:
     """What is needed, beside the values, to restore a source file byte for byte.
 
     ``template`` is shared by clips that were printed alike; ``detail`` belongs to this clip;
-    ``notes`` holds what is said frame by frame. All three are defined by the source format, as is
-    ``clock``: the times that the template gives to frame numbers, None where it gives none.
+    ``notes`` holds what is said frame by frame. All three are defined by the source format.
     """
 
     format: str
@@ -64,7 +46,6 @@ class Source:
     path: str = ""
     size: int = 0
     sha256: bytes = b""
-    clock: SourceClock | None = field(default=None, repr=False)
 
     __repr__ = brief.source_text
 

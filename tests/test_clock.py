@@ -104,15 +104,73 @@ NUMBERS = [*range(124, 140), *range(170, 180)]
 
 
 @pytest.mark.parametrize("digits", [3, 4, 6])
-def test_a_table_has_the_times_that_it_prints(tmp_path: Path, digits: int) -> None:
+def test_a_table_has_the_times_that_it_rounds(tmp_path: Path, digits: int) -> None:
     motion = trc(tmp_path / "w.trc", NUMBERS, digits=digits)
-    printed = [round((n - 1) / 120, digits) for n in NUMBERS]
-    assert motion.frame_rate == 120
-    near(motion.times, printed)
-    near(stored(motion).times, printed)
+    meant = (np.array(NUMBERS) - 1) / 120
+    assert motion.frame_rate == 120 and motion.first_time is None
+    near(motion.times, meant)
+    near(stored(motion).times, meant)
     line = motion.timeline
     assert line is not None and line.runs == [(0, 16), (16, 26)] and np.isnan(line.steps).any()
     near(np.diff(line.even)[:15], np.full(15, 1 / 120))
+
+
+def test_a_table_that_begins_late_has_a_first_time(tmp_path: Path) -> None:
+    path = tmp_path / "w.trc"
+    rows = "".join(f"{n}\t{5 + (n - 1) / 120:.3f}\t1.0\t2.0\t{n}.0\n" for n in (1, 2, 3, 7, 8, 9))
+    path.write_text(TRC.format(rate=120, n=6, rows=rows))
+    meant = 5 + np.array([0, 1, 2, 6, 7, 8]) / 120
+    motion = mcz.read(path)
+    assert motion.first_time == 5
+    near(motion[3:].first_time, 5.05)
+    for name, rate, factor in (("a", None, 1), ("b", 60, 2)):
+        mcz.encode(path, tmp_path / f"{name}.mcz", rate=rate)
+        mcz.extract(tmp_path / f"{name}.mcz", tmp_path / f"part-{name}.mcz", frames=(3, 5))
+        with (
+            mcz.open(tmp_path / f"{name}.mcz") as file,
+            mcz.open(tmp_path / f"part-{name}.mcz") as part,
+        ):
+            clip = file.only_clip()
+            assert clip.frame_numbers.tolist() == [1, 2, 3, 7, 8, 9]
+            near(clip.times, factor * meant)
+            near(clip.motion((3, 5)).times, factor * meant[3:5])
+            near(part.only_clip().times, factor * meant[3:5])
+            assert clip.source_bytes() == path.read_bytes()
+
+
+def test_a_rate_that_is_set_moves_the_first_time() -> None:
+    made = mcz.Motion(Skeleton(MARKER), markers(3).signals, Fraction(100), first_time=6.0)
+    out, corrected = io.BytesIO(), io.BytesIO()
+    mcz.write(made, out)
+    mcz.set_rate(out.getvalue(), 300, output=corrected, names=["motion"], force=True)
+    with mcz.open(corrected.getvalue()) as file:
+        near(file.only_clip().times, [2, 2 + 1 / 300, 2 + 2 / 300])
+
+
+def test_numbers_that_skip_while_times_do_not_have_a_signal(tmp_path: Path) -> None:
+    rows = "".join(f"{2 * n + 1}\t{n / 50:.2f}\t1.0\t2.0\t{n}.0\n" for n in range(9))
+    (tmp_path / "w.trc").write_text(TRC.format(rate=50, n=9, rows=rows))
+    motion = mcz.read(tmp_path / "w.trc")
+    assert motion.frame_rate == 50 and motion.frame_numbers is not None
+    assert [signal.role for signal in motion.signals[1:]] == ["times"]
+    near(stored(motion).times, np.arange(9) / 50)
+
+
+@pytest.mark.parametrize("numbers", [[1, 1, 2, 3], [7] * 4, [9, 8, 7, 6], [5, 6, 1, 2]])
+def test_numbers_that_do_not_ascend_come_back_with_their_source(
+    tmp_path: Path, numbers: list[int]
+) -> None:
+    rows = "".join(f"{n}\t{k / 50:.2f}\t1.0\t2.0\t{k}.0\n" for k, n in enumerate(numbers))
+    path = tmp_path / "w.trc"
+    path.write_text(TRC.format(rate=50, n=4, rows=rows))
+    mcz.encode(path, tmp_path / "w.mcz")
+    with mcz.open(tmp_path / "w.mcz") as file:
+        clip = file.only_clip()
+        assert clip.source_bytes() == path.read_bytes()
+        assert clip.frame_numbers.tolist() == list(range(numbers[0], numbers[0] + 4))
+        near(clip.times, np.arange(4) / 50)
+        part = clip.source_bytes((1, 3)).decode()
+        assert [row.split("\t")[0] for row in part.splitlines()[6:]] == list(map(str, numbers[1:3]))
 
 
 def test_the_clock_outlives_the_source(tmp_path: Path) -> None:
@@ -495,7 +553,7 @@ def test_info_says_first_last_and_gaps(tmp_path: Path, capsys: pytest.CaptureFix
         assert "time       1.23 s to 1.63 s, 1 gap" in shown
         assert run("info", "--json", tmp_path / name) == 0
         (clip,) = json.loads(capsys.readouterr().out)["clips"]
-        assert clip["times"] == {"first": 1.23, "last": 1.63, "gaps": 1, "note": None}
+        assert clip["times"] == {"first": 1.23, "last": 1.63, "gaps": 1}
 
 
 def test_a_signal_of_times_is_the_axis_of_xarray() -> None:

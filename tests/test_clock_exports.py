@@ -80,7 +80,9 @@ def test_times_of_a_calendar_are_printed(to: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("to", ["trc", "sto", "mot"])
 @pytest.mark.parametrize(("rate", "places"), [("120", 3), ("59.94", 3), ("59.94", 6), ("250", 2)])
-def test_printed_times_are_printed_again(rate: str, places: int, to: str, tmp_path: Path) -> None:
+def test_times_that_were_rounded_are_printed_as_meant(
+    rate: str, places: int, to: str, tmp_path: Path
+) -> None:
     times = np.round((GAP - 1) / float(rate), places)
     rows = zip(GAP, times, strict=True)
     text = (
@@ -91,8 +93,9 @@ def test_printed_times_are_printed_again(rate: str, places: int, to: str, tmp_pa
     )
     (tmp_path / "a.trc").write_text(text)
     motion = mcz.read(tmp_path / "a.trc")
-    assert motion.times.tolist() == times.tolist()
-    assert np.abs(again(motion, to, tmp_path).times - times).max() < 1e-9
+    meant = (GAP - 1) / float(rate)
+    assert np.abs(motion.times - meant).max() < 1e-9
+    assert np.abs(again(motion, to, tmp_path).times - meant).max() < 1e-9
 
 
 def test_numbers_of_a_trc_are_the_source_s(tmp_path: Path) -> None:

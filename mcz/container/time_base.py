@@ -44,6 +44,9 @@ def whole_time_base(fields: payloads.Clip, cend: payloads.Cend | None) -> payloa
     late = cend.missing if cend is not None else []
     if is_open and base is not None and base.missing:  # TIME-04
         raise FormatError("it is open, but states missing frames", clip=fields.name)
+    timed = any(signal.role == payloads.TIMES for signal in fields.signals)
+    if timed and base is not None and base.first_time is not None:  # TIME-07
+        raise FormatError("the time of its first frame beside a signal of times", clip=fields.name)
     if late and not is_open:  # TIME-05
         raise FormatError("its CEND states missing frames, but it is not open", clip=fields.name)
     if not late:

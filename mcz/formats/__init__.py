@@ -18,7 +18,6 @@ from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
 from mcz.formats.table_notes import join_table_notes
 from mcz.motion import FrameNotes, Source
-from mcz.source import SourceClock
 from mcz.types import JsonObject
 
 __all__ = [
@@ -54,8 +53,6 @@ class Format:
     ``arrays(source, signals)`` lists what became of the arrays of a file that has some.
     ``is_motion(data)`` says of a suffix that others use, too, whether a file that begins so seems
     to be of this format.
-    ``clock(template)`` gives the times that the template states, None where frame numbers and the
-    rate alone do.
     """
 
     name: str
@@ -75,7 +72,6 @@ class Format:
     arrays: Callable[..., list[JsonObject]] | None = None
     restate: Callable[[bytes, Fraction], Any] | None = None
     is_motion: Callable[[bytes], bool] | None = None
-    clock: Callable[[bytes], SourceClock | None] | None = None
 
     @property
     def suffix(self) -> str:
@@ -129,7 +125,6 @@ FORMATS: dict[str, Format] = {
                 states_rate=True,
                 restate=_of("stated_rates", restate),
                 recording=_of("c3d_recording", "recording"),
-                clock=_of("c3d_layout", "clock_of"),
             )
             for format_id, name, restate in (
                 (4, "c3d", "restate_c3d"),
@@ -148,7 +143,6 @@ FORMATS: dict[str, Format] = {
                 is_table=True,
                 restate=_of("stated_rates", "restate_table"),
                 is_motion=None if kind else _of("csv_files", "is_motion"),
-                clock=_of("table_layout", "clock_of"),
             )
             for format_id, name, module, kind in (
                 (6, "trc", "trc", "_trc"),

@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.formats.c3d_layout import FORMAT, OUTPUTS_FORMAT, FrameClock, Kind, Layout, ordered_fields
+from mcz.formats.c3d_layout import FORMAT, OUTPUTS_FORMAT, Kind, Layout, ordered_fields
 from mcz.formats.c3d_outputs import NAME as OUTPUTS
 from mcz.formats.c3d_outputs import Split, find_outputs, output_channels
 from mcz.formats.c3d_parameters import (
@@ -273,9 +273,7 @@ def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> 
 def _source(data: bytes, layout: Layout) -> Source:
     template, detail = layout.build()
     digest = hashlib.sha256(data).digest()
-    return Source(
-        layout.format, template, detail, size=len(data), sha256=digest, clock=FrameClock()
-    )
+    return Source(layout.format, template, detail, size=len(data), sha256=digest)
 
 
 def write(motion: Motion) -> bytes:

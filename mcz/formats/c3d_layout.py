@@ -9,11 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from fractions import Fraction
 
-import numpy as np
 from construct import Int8ul
-from numpy.typing import NDArray
 
 from mcz.errors import FormatError, LimitError
 from mcz.formats.c3d_outputs import Split, split_of
@@ -104,28 +101,6 @@ class C3dDetail(Record):
     values: bytes = field(SIZED, "bytes of all fields, one after the other")
     tail: bytes = field(SIZED, "more bytes behind the data")
     zeros: int = field(UVARINT, "zero bytes behind all that")
-
-
-class FrameClock:
-    """The times of a C3D: frame 1 of the recording is at 0 s, as its events have it."""
-
-    def times(
-        self, numbers: NDArray[np.int64], rate: Fraction | None
-    ) -> NDArray[np.float64] | None:
-        """The times of frames in seconds; None where the rate is unknown."""
-        if rate is None:
-            return None
-        found: NDArray[np.float64] = (numbers - 1) / float(rate)
-        return found
-
-    def rounding(self, rate: Fraction | None) -> float:
-        """None: nothing is printed."""
-        return 0.0
-
-
-def clock_of(template: bytes) -> FrameClock:
-    """The clock of any C3D, whose ``template`` need not be looked at."""
-    return FrameClock()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from mcz.errors import MotionError
-from mcz.formats.c3d_layout import FrameClock, Kind, Layout
+from mcz.formats.c3d_layout import Kind, Layout
 from mcz.formats.c3d_outputs import NAME as OUTPUTS
 from mcz.formats.c3d_outputs import described
 from mcz.formats.c3d_parameters import BLOCK, INTEL, Order
@@ -83,7 +83,7 @@ def plain(motion: Motion) -> Motion:
     )
     layout = _layout(motion, scale, said, (n_channels, subframes))
     template, detail = layout.build()
-    source = Source(layout.format, template, detail, clock=FrameClock())
+    source = Source(layout.format, template, detail)
     return replace(motion, signals=tuple(signals), source=source)
 
 

@@ -98,7 +98,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     marked = data[:start] + names_in(data[start:stop], names) + data[stop : head.rows]
     said = table.missing, times.clock
     section = section_of((marked, data[: head.rows]), said, rows, names, range(1 + len(more)))
-    return Motion(
+    found = Motion(
         skeleton,
         (read_columns(data, rows, range(len(values))), *more),
         times.rate,
@@ -108,6 +108,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         table_source("csv", data, [(section, rows, 1)]),
         rows.numbers,
     )
+    return found if times.printed is None else found.at_times(times.printed)
 
 
 def counts_rows(name: str) -> bool:

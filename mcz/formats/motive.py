@@ -109,7 +109,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     text = _marked(data, head, names, rows.n_rows), data[: head.rows]
     signals = range(1 + len(more))
     section = section_of(text, (table.missing, times.clock), rows, names, signals)
-    return Motion(
+    found = Motion(
         _skeleton(head, objects),
         (read_columns(data, rows, range(n_values)), *more),
         times.rate,
@@ -122,6 +122,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
         table_source("motive", data, [(section, rows, 1)]),
         rows.numbers,
     )
+    return found if times.printed is None else found.at_times(times.printed)
 
 
 def _marked(data: bytes, head: _Head, names: Sequence[str], n_rows: int) -> bytes:

@@ -11,10 +11,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import log10
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.clock import SAME_RATE
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import (
     BIT,
@@ -149,25 +145,6 @@ class Clock:
             raise FormatError("source template: a time is no number of its grid")
         return found
 
-    def times(self, numbers: NDArray[np.int64], rate: Fraction | None) -> NDArray[np.float64]:
-        """The times as they are printed, in seconds; at ``rate`` where that corrects the clock's.
-
-        It does where neither it nor as many times it as the usual step of ``numbers`` is.
-        """
-        ordinals = np.array(self.ordinals(numbers.tolist()), np.int64)
-        times = self.grid.values(ordinals) / self._per_second(rate)
-        own = self.frames_a_second(rate)
-        if own is None or rate is None or len(numbers) < 2:
-            return times
-        steps = (1, int(np.median(np.diff(numbers))))
-        if any(abs(own / rate - step) <= SAME_RATE * step for step in steps):
-            return times
-        return times * float(own / rate)
-
-    def rounding(self, rate: Fraction | None) -> float:
-        """Half a unit of the last digit, in seconds."""
-        return 0.5 * 10.0**-self.grid.digits / self._per_second(rate)
-
     def frames_a_second(self, rate: Fraction | None) -> Fraction | None:
         """The frame numbers in a second of this clock; None of times that stand still."""
         if not self.numerator:
@@ -242,13 +219,6 @@ def _section(shared: SectionFields, own: Detail, sizes: Sequence[int]) -> Sectio
     rows = parsed_patterns((shared.header,), shared, own, n_columns)
     signals = tuple(shared.signals)
     return Section(signals, shared.header, bool(shared.marks), shared.missing, clock, rows)
-
-
-def clock_of(template: bytes) -> Clock | None:
-    """The clock of the section that the motion is in; FormatError on bad bytes."""
-    shared = parse(TableTemplate, template, "source template", {"runs": MAX_RUNS}).sections
-    section = next((fields for fields in shared if 0 in fields.signals), None)
-    return parsed_clock(section) if section is not None else None
 
 
 def parsed_clock(shared: SectionFields) -> Clock | None:

@@ -84,7 +84,7 @@ def _with_source(
     rows = Layout((), (Pattern(runs_of(items), b"\n"),))
     numbers = tuple(range(len(signals)))
     template, detail = build_table([Section(numbers, header.encode(), True, missing, clock, rows)])
-    source = Source(format_name, template, detail, clock=clock)
+    source = Source(format_name, template, detail)
     return replace(motion, signals=signals, source=source)
 
 

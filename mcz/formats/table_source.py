@@ -85,8 +85,7 @@ def table_source(
     template, detail = build_table([section for section, _, _ in sections])
     digest = hashlib.sha256(data).digest()
     notes = table_notes([(n_each, rows.notes) for _, rows, n_each in sections])
-    clock = next((section.clock for section, _, _ in sections if 0 in section.signals), None)
-    return Source(format_name, template, detail, notes, size=len(data), sha256=digest, clock=clock)
+    return Source(format_name, template, detail, notes, size=len(data), sha256=digest)
 
 
 def _fills(header: bytes, names: Sequence[str], count: bytes, whole: bytes) -> bool:

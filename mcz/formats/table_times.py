@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from mcz.clock import TIMES, times_fault
+from mcz.clock import TIMES, Timeline, times_fault
 from mcz.formats.rows import Rows
 from mcz.formats.table_layout import Clock
 from mcz.formats.table_signals import read_columns
@@ -24,7 +24,7 @@ class Times:
     """``signals``: one of times where there are some that no clock gives, named ``time``.
 
     ``rate`` is None where times are not whole frames apart. ``exact``: it is round or stated.
-    ``note`` says why the signal has not the role of times.
+    ``note`` says why the signal has not the role of times. ``printed`` are the times of a clock.
     """
 
     clock: Clock | None
@@ -32,6 +32,7 @@ class Times:
     rate: Fraction | None
     exact: bool
     note: str = ""
+    printed: Timeline | None = None
 
 
 def as_times(signal: Signal, channel: Channel) -> tuple[Signal, str]:
@@ -75,7 +76,11 @@ def read_times(
         rate, exact = rate_of_times(seconds, in_seconds, stated, rows.numbers)
     if rate is None and stated and (rows.n_rows < 2 or not len(tokens)):
         rate = stated[0]
-    return Times(clock, signals, rate, exact, note)
+    printed = None
+    if clock is not None:
+        half = 0.5 * 10.0**-clock.grid.digits
+        printed = Timeline(tokens.values() * float(unit), rate, half * float(unit))
+    return Times(clock, signals, rate, exact, note, printed)
 
 
 def _symbol(unit: Fraction) -> str:

@@ -65,7 +65,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     text = _marked(data, header, rows.n_rows, names[: len(labels)])
     signals = range(1 + len(times.signals))
     section = section_of(text, (table.missing, times.clock), rows, names, signals)
-    return Motion(
+    found = Motion(
         skeleton,
         (motion, *times.signals),
         times.rate,
@@ -75,6 +75,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
         table_source("trc", data, [(section, rows, 1)]),
         rows.numbers,
     )
+    return found if times.printed is None else found.at_times(times.printed)
 
 
 def _header(data: bytes) -> _Header:

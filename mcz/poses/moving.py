@@ -103,12 +103,10 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
 def times(moving: Moving, frames: Frames = None, *, signal: int | str = 0) -> NDArray[np.float64]:
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 
-    In this order: the times that the file has as numbers (a column ``time``, an array of times);
-    those that it gives to frame numbers (TRC, Motive, C3D, ...); ``first_time``, that of the
-    first frame; else (number - 1) / rate, so that frame 1 is at 0 s. Events are on
-    the same clock. ``signal``, by index or name: the times of its samples, which lie evenly from
-    each frame on. ``frames`` (a, b) or a slice. Raises OptionError where neither times nor a rate
-    are known.
+    Those of a signal of times; else, by frame numbers and rate, from ``first_time`` on or, without
+    one, (number - 1) / rate, so that frame 1 is at 0 s. Events are on the same clock. ``signal``,
+    by index or name: the times of its samples, which lie evenly from each frame on. ``frames``
+    (a, b) or a slice. Raises OptionError where neither times nor a rate are known.
     """
     start, stop = frame_range(moving, frames)
     timeline = known_timeline(moving.name, moving.timeline)

@@ -35,7 +35,7 @@ from mcz.reading.posing import Posed
 from mcz.reading.preview import Preview, preview
 from mcz.reading.signal_info import SignalInfo, groups_of
 from mcz.reading.signal_reader import SignalReader
-from mcz.reading.source_info import SourceInfo, read_clock, read_source, sourced_skeleton
+from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton
 from mcz.reading.source_rates import stating_rate
 from mcz.reading.stored_clip import StoredClip
 from mcz.reading.views import ClipValues, FrameValues, Masked
@@ -258,15 +258,8 @@ class Clip(StoredClip, Posed):
     @cached_property
     def timeline(self) -> Timeline | None:
         """The times of all frames, None where neither times nor a rate are known."""
-        column = self.times_column()
-        clock = None
-        try:
-            clock = read_clock(self.container, self._fields, self.signals[0])
-        except FormatError as error:
-            lost = "its times are those of its rate, its source's are lost"
-            self._complain(f"{lost}: {error}", error)
         counting = Counting(self.frame_numbers, self.frame_rate)
-        return timeline_of(counting, self.first_time, clock, column)
+        return timeline_of(counting, self.first_time, self.times_column())
 
     @property
     def times(self) -> NDArray[np.float64]:

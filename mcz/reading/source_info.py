@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
 from mcz.container import payloads
 from mcz.container.reader import Container
-from mcz.errors import FormatError, UnsupportedError
+from mcz.errors import UnsupportedError
 from mcz.formats import FORMATS, Format, format_by_id
 from mcz.motion import FrameNotes, Skeleton, Source
 from mcz.reading.decimation import picked_notes
 from mcz.reading.signal_info import SignalInfo
-from mcz.source import SourceClock
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,31 +71,7 @@ def read_source(
         path=info.path,
         size=info.size,
         sha256=info.sha256,
-        clock=clock_of(source_format, template, signal),
     )
-
-
-def clock_of(source_format: Format, template: bytes, signal: SignalInfo) -> SourceClock | None:
-    """The times that a template gives to the frames of ``signal``, the motion.
-
-    None also where the template is at fault, which who restores the source is told.
-    """
-    if source_format.clock is None or signal.layout.samples_per_frame > 1:
-        return None
-    found: SourceClock | None = None
-    with suppress(FormatError):
-        found = source_format.clock(template)
-    return found
-
-
-def read_clock(
-    container: Container, fields: payloads.Clip, signal: SignalInfo
-) -> SourceClock | None:
-    """The clock of the source of a clip whose CLIP is ``fields``, None where it has none."""
-    source_format, source = known_format(fields), fields.source
-    if source_format is None or source_format.clock is None or source is None:
-        return None
-    return clock_of(source_format, container.template(source.template, source.format), signal)
 
 
 def _notes(

@@ -54,7 +54,7 @@ class SourceOptions:
             motion = with_model(motion, self.model)
         if self.rate is not None and (self.force_rate or motion.frame_rate is None):
             rate = checked_rate(self.rate)
-            motion = replace(motion, frame_rate=rate, frame_rate_exact=True)
+            motion = motion.at_rate(rate)
         if self.unit is not None:
             motion = replace(motion, skeleton=in_unit(motion.skeleton, self.unit))
         if self.up is not None:

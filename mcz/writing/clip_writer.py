@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from mcz.clock import TIMES
 from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded, Segment
 from mcz.codecs.parameters import TARGETS
@@ -189,7 +190,8 @@ def _clip_record(writer: Writer, motion: Motion, coded: Sequence[Coded]) -> payl
         source=_source_record(writer, motion.source) if motion.source else None,
         signals=[_signal_record(part.source, part.codec, part.encoded) for part in coded],
     )
-    put_time_base(record, time_base_of(motion.frame_numbers, motion.first_time))
+    first_time = None if motion.signals_of(TIMES) else motion.first_time
+    put_time_base(record, time_base_of(motion.frame_numbers, first_time))
     return record
 
 

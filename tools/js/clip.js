@@ -88,7 +88,7 @@ export function readClip(payload, offset, file) {
   const source = reader.optional(() => readClipSource(reader, file));
   const signals = reader.counted((_, index) => readSignal(reader, index, skeleton, file.limits));
   if (signals.length === 0) reader.refuse("a clip without a signal");
-  checkRoles(reader, signals);
+  checkRoles(reader, signals, timeBase);
   reader.rest();
   for (const signal of signals) checkStoredFrames(signal, nFrames, open);
   return {
@@ -136,12 +136,15 @@ function readClipSource(reader, file) {
   return { template, format, detail, path, size };
 }
 
-function checkRoles(reader, signals) {
+function checkRoles(reader, signals, timeBase) {
   if (signals.slice(1).some(({ role }) => role === MOTION)) {
     reader.refuse("a motion that is not the first signal");
   }
   const times = signals.filter(({ role }) => role === TIMES);
   if (times.length > 1) reader.refuse("two signals of times");
+  if (times.length > 0 && (timeBase?.firstTime ?? null) !== null) {
+    reader.refuse("the time of the first frame beside a signal of times");
+  }
   for (const { channels, ownChannels, samplesPerFrame } of times) {
     const isPlain = ownChannels && samplesPerFrame === 1 && channels.length === 1;
     if (!isPlain || channels[0].kind !== 0 || !TIMES_PER_SECOND.has(channels[0].unit)) {

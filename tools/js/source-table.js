@@ -199,7 +199,7 @@ class Cells {
 }
 
 /** The ordinal of the time of a frame; throws Refused where that is none. */
-export function timeOf({ grid, numerator, denominator, offset }, number) {
+function timeOf({ grid, numerator, denominator, offset }, number) {
   const product = number * numerator + offset;
   const rest = ((product % denominator) + denominator) % denominator;
   const ordinal = (product - rest) / denominator;
@@ -235,12 +235,6 @@ function writeHeader(out, header, names, count) {
   });
   out.write(header.subarray(from));
   out.limit = limit;
-}
-
-/** The clock of the section that has the motion, null where it has none; throws Refused. */
-export function clockOf(template, nSignals) {
-  const sections = readTableTemplate(template, nSignals);
-  return sections.find(({ signals }) => signals.includes(0))?.clock ?? null;
 }
 
 /** The sections of a template. */

@@ -99,18 +99,24 @@ def analog() -> Motion:
 
 @base
 def timed(
-    times: str = "0 10 20 20", unit: str = "ms", role: str = "times", *, twice: bool = False
+    times: str = "0 10 20 20",
+    unit: str = "ms",
+    role: str = "times",
+    *,
+    twice: bool = False,
+    first: int = 1,
 ) -> Motion:
     """The dance beside a signal of a channel; of a frame with "?" the value is invalid.
 
-    ``twice``: and beside another, equal but for its role, which it has not.
+    ``twice``: and beside another, equal but for its role, which it has not. ``first``: the number
+    of the first frame.
     """
     words = times.split()
     values = np.array([[float(word) if word != "?" else 15.0] for word in words])
     mask = np.array([[word != "?"] for word in words])
     signal = Signal(values, name="clock", channels=(Channel("", "t", unit),), role=role)
     signal = replace(signal, mask=None if mask.all() else mask)
-    dance = motions.dance(len(words))
+    dance = motions.dance(len(words), frame_numbers=first + np.arange(len(words)))
     more = (signal, replace(signal, role="")) if twice else (signal,)
     return replace(dance, signals=(*dance.signals, *more))
 
