@@ -15,7 +15,8 @@ from mcz.codecs import by_name
 from mcz.container.writer import Writer
 from mcz.editing.recoding import recorded_options
 from mcz.errors import OptionError
-from mcz.writing.tuning import write_tuned
+from mcz.writing.prepare import prepare
+from mcz.writing.tuning import write_motion
 from tests.commands import run
 from tests.motions import smooth
 
@@ -33,7 +34,8 @@ def written(motions: list[mcz.Motion], codec: str) -> bytes:
     out = io.BytesIO()
     writer = Writer(out)
     for one in motions:
-        write_tuned(writer, one, by_name(codec), CODECS[codec])
+        found, params = by_name(codec), CODECS[codec]
+        write_motion(writer, prepare(one, found, params), found, params)
     writer.finish()
     return out.getvalue()
 

@@ -8,7 +8,6 @@ The files are coded twice, with every setting below, by coders that are never re
 
 from __future__ import annotations
 
-import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -39,9 +38,8 @@ from mcz.codecs.spatial import (
 from mcz.codecs.wavelet import mrdwt
 from mcz.codecs.wavelet import streams as wavelet_streams
 from mcz.coding import residuals
-from mcz.container.writer import Writer
 from mcz.motion import Motion
-from mcz.writing.positions import as_codec_wants
+from mcz.writing.prepare import prepare
 from mcz.writing.signal_source import MemorySource
 from tools.start_tables import Kept, table, untrained
 
@@ -182,7 +180,7 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
 
 def given(codec: Codec, options: Mapping[str, Any], motion: Motion) -> Motion:
     """What the codec is given of a clip."""
-    return as_codec_wants(Writer(io.BytesIO()), motion, codec, options)
+    return prepare(motion, codec, options).motion
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -12,9 +11,8 @@ from pathlib import Path
 import mcz
 from mcz.bench.cases import Case, Loaded, Variant, load
 from mcz.codecs import by_name
-from mcz.codecs.contract import Codec, Encoded, Request, Segment, Span, model_finder
+from mcz.codecs.contract import Encoded, Request, Segment, Span, model_finder
 from mcz.container.limits import BASE
-from mcz.container.writer import Writer
 from mcz.formats import format_of
 from mcz.kinematics import SHELL_CM
 from mcz.metrics.comparison import NO_CONTACTS
@@ -23,8 +21,8 @@ from mcz.reading.ratios import clip_ratios
 from mcz.reading.sizes import clip_sizes
 from mcz.reading.source_files import read_source
 from mcz.types import JsonObject, Params
-from mcz.writing.clip_writer import write_clip
-from mcz.writing.positions import as_codec_wants
+from mcz.writing.clip_writer import file_in_memory
+from mcz.writing.prepare import prepare
 from mcz.writing.signal_source import MemorySource
 
 Record = JsonObject
@@ -44,18 +42,8 @@ def what_is_coded(motion: Motion, codec: str) -> Motion:
 
 def write_file(motion: Motion, codec: str, params: Params) -> bytes:
     """An MCZ file of one clip, without its quality record, which is no part of the codec."""
-    out = io.BytesIO()
-    writer = Writer(out)
     chosen = by_name(codec)
-    wanted = as_codec_wants(writer, motion, chosen, chosen.options(params))
-    write_clip(writer, wanted, chosen, params, quality=False)
-    writer.finish()
-    return out.getvalue()
-
-
-def as_coded(motion: Motion, codec: Codec, options: Params) -> Motion:
-    """What a codec is given of ``motion``: itself, or the places of its points."""
-    return as_codec_wants(Writer(io.BytesIO()), motion, codec, options)
+    return file_in_memory(prepare(motion, chosen, params), chosen, params, BASE)
 
 
 def coded_bytes(case: Case, variant: Variant, params: Params) -> int:
@@ -163,7 +151,7 @@ def work_of(
     """Encoding and decoding by the codec alone, of values in the domain that it wants."""
     codec = by_name(name)
     options = codec.options(params)
-    wanted = as_coded(motion, codec, options)
+    wanted = prepare(motion, codec, options).motion
 
     def encode() -> tuple[Encoded, list[Segment]]:
         source = MemorySource(wanted, 0, codec, BASE.segment_bytes, options)

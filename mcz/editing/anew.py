@@ -20,7 +20,8 @@ from mcz.reading.clip import Clip
 from mcz.reading.source_rates import stating_rate
 from mcz.types import Params, Progress, Settings
 from mcz.writing.clip_writer import Amend
-from mcz.writing.tuning import write_tuned
+from mcz.writing.prepare import prepare
+from mcz.writing.tuning import write_motion
 
 OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may not be there
 
@@ -142,4 +143,5 @@ def write_anew(
     codec has none.
     """
     codec = clip.signals[0].codec
-    return write_tuned(writer, motion, codec, settings, progress, amend=amend) or {}
+    prepared = prepare(motion, codec, settings)
+    return write_motion(writer, prepared, codec, settings, progress, amend=amend) or {}

@@ -26,7 +26,7 @@ def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
     """``motion`` as markers at its points; with ``virtual_markers`` three more for every joint.
 
     The markers are in the length unit and up axis of the skeleton, ``skeleton.base`` is left to
-    whoever writes it (see ``as_domain``), and there is no source, for it could not be restored. A
+    whoever writes it (see ``Prepared``), and there is no source, for it could not be restored. A
     position that is not known is 0 under a mask. A motion of markers is returned as it is.
 
     Raises MotionError where the skeleton has no kinematics, OptionError for virtual markers where

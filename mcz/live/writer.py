@@ -31,9 +31,10 @@ from mcz.kinematics.single import FramePositions
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.schema import build
 from mcz.types import Params, Settings
-from mcz.writing.clip_writer import asked, open_clip, write_skeleton
-from mcz.writing.names import check_metadata, name_skeleton
-from mcz.writing.positions import wants_positions
+from mcz.writing.clip_writer import begin_open_clip
+from mcz.writing.names import check_metadata
+from mcz.writing.planning import asked, plan_open_clip
+from mcz.writing.prepare import Prepared, StoredSkeleton, read_with, wants_positions
 from mcz.writing.quality import CHUNK, texts_of
 from mcz.writing.signal_source import MemorySource
 
@@ -119,13 +120,14 @@ class LiveWriter:
         self._writer = Writer(self._outlet)
         self._is_open = self._has_data = self._is_stuck = False
         check_metadata(metadata, name)
-        if base is not None:
-            name_skeleton(self._writer, base)
-            if skeleton.base is not None or skeleton.up_axis != base.up_axis:
-                skeleton = replace(skeleton, base=write_skeleton(self._writer, base))
         self.skeleton, self._n_channels = skeleton, skeleton.n_channels
         self._positions = wants_positions(self.codec, self.options, skeleton)
-        coded = self._coded_skeleton()
+        bases, derives = read_with(skeleton, base)
+        coded = skeleton
+        if self._positions:
+            bases, derives = (*bases, StoredSkeleton(skeleton, derives)), True
+            self._placed = FramePositions(skeleton, virtual_markers=self._virtual)
+            coded = marker_skeleton(skeleton, virtual_markers=self._virtual)
         signal = Signal(np.zeros((0, coded.n_channels)))
         if self._positions:
             note = metadata.get("source-note", "")
@@ -134,19 +136,14 @@ class LiveWriter:
         self._encoder, self._decoder = _coders(self.codec, motion, self.options, self._writer)
         header, models = self._encoder.header, self._encoder.models
         encoded = Encoded(header, iter(()), models=models, version=self._encoder.version)
-        open_clip(self._writer, motion, self.codec, encoded, first_number)
+        prepared = Prepared(motion, bases, derives)
+        plan = plan_open_clip(prepared, self.codec, self.options, encoded, self._writer.profile)
+        begin_open_clip(self._writer, plan, first_number)
         self._is_open = True
         self._digest = ValueDigest()
         self._figures = _Figures(coded)
         self._opening = self._outlet.chunks(REPEATED) if repeat else b""  # REPT-01
         self._outlet.send()
-
-    def _coded_skeleton(self) -> Skeleton:
-        if not self._positions:
-            return self.skeleton
-        base = write_skeleton(self._writer, self.skeleton)
-        self._placed = FramePositions(self.skeleton, virtual_markers=self._virtual)
-        return marker_skeleton(self.skeleton, base, virtual_markers=self._virtual)
 
     @property
     def _virtual(self) -> bool:

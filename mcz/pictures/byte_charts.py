@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,7 +12,7 @@ import numpy as np
 from mcz.codecs import by_name
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import Dial
-from mcz.container.writer import Writer
+from mcz.container.limits import BASE
 from mcz.errors import MczError, OptionError
 from mcz.metrics import Comparison, compare
 from mcz.metrics.sums import times
@@ -26,8 +25,8 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import open
 from mcz.reading.shares import by_group, byte_shares
 from mcz.reading.sizes import clip_sizes
-from mcz.writing.clip_writer import write_clip
-from mcz.writing.positions import as_codec_wants
+from mcz.writing.clip_writer import file_in_memory
+from mcz.writing.prepare import prepare
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -216,12 +215,8 @@ def _tried(motion: Motion, codec: Codec, setting: float) -> tuple[int, Compariso
     assert codec.dial is not None
     alone = replace(motion, signals=motion.signals[:1], source=None, metadata={})
     params = {codec.dial.parameter: setting}
-    out = io.BytesIO()
-    writer = Writer(out)
-    wanted = as_codec_wants(writer, alone, codec, codec.options(params))
-    write_clip(writer, wanted, codec, params, quality=False)
-    writer.finish()
-    with open(out.getvalue(), max_decoded=2**53) as file:
+    data = file_in_memory(prepare(alone, codec, params), codec, params, BASE)
+    with open(data, max_decoded=2**53) as file:
         clip = file.only_clip()
         sizes = clip_sizes(file.container, clip)
         figures = compare(alone, clip.motion(), virtual_markers=False, shell_cm=None)

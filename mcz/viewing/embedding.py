@@ -167,17 +167,17 @@ def _cut(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
 def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
     """The clips that are wanted, coded anew."""
     from mcz.container.writer import Writer
-    from mcz.writing.names import name_skeleton
-    from mcz.writing.tuning import write_tuned
+    from mcz.writing.prepare import prepare, under_its_path
+    from mcz.writing.tuning import write_motion
 
-    codec = by_name(chosen(wanted.codec, wanted.effort))
+    codec, params = by_name(chosen(wanted.codec, wanted.effort)), wanted.params or {}
     out = io.BytesIO()
     with mcz_open(target, salvage=shelf.salvage, max_decoded=wanted.max_decoded) as file:
         writer = Writer(out, profile=file.container.profile)
         for clip in file.chosen(wanted.clips or None, wanted.where):
             motion = shelf.told(clip.motion())
-            name_skeleton(writer, motion.skeleton)
-            write_tuned(writer, motion, codec, wanted.params or {})
+            prepared = prepare(motion, codec, params, (under_its_path(motion.skeleton),))
+            write_motion(writer, prepared, codec, params)
         writer.finish()
     return out.getvalue()
 

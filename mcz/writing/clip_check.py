@@ -11,7 +11,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Encoded
+from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
 from mcz.container.limits import Profile
@@ -26,26 +26,9 @@ from mcz.reading.clip import Clip
 from mcz.reading.signal_info import SignalInfo, read_signal
 from mcz.reading.signal_reader import SignalReader
 from mcz.types import Values
-from mcz.writing.signal_source import MemorySource
+from mcz.writing.planning import SignalPlan
 
 NO_HASH = bytes(32)
-
-
-@dataclass(frozen=True, slots=True)
-class Coded:
-    """A signal on its way into a file."""
-
-    source: MemorySource
-    codec: Codec
-    encoded: Encoded
-
-    def lossy_channels(self) -> NDArray[np.bool_]:
-        """The channels whose values the codec may change, (n_channels,)."""
-        layout, codec = self.source.layout, self.codec
-        free = np.full(layout.n_channels, not codec.lossless)
-        for group in codec.exact(self.encoded.header, layout) if codec.exact else ():
-            free[list(layout.groups[group])] = False
-        return free
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +52,7 @@ class ClipCopy:
     def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
         self.writer.segment(header, streams)
 
-    def decoded(self, motion: Motion, coded: Sequence[Coded]) -> list[Decoded]:
+    def decoded(self, motion: Motion, coded: Sequence[SignalPlan]) -> list[Decoded]:
         """The signals; raises ChecksumError where a channel differs that may not."""
         self.writer.end_clip(motion.n_frames, NO_HASH, [NO_HASH] * len(motion.signals))
         self.writer.finish()

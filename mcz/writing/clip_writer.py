@@ -1,39 +1,46 @@
-"""Motion -> chunks: what a clip says of itself, its segments, its hashes."""
+"""A planned clip -> chunks: its skeletons and models, CLIP, segments, CEND, its quality record."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
-from mcz.clock import TIMES
-from mcz.codecs import by_name
-from mcz.codecs.contract import Codec, Encoded, Segment
-from mcz.codecs.parameters import TARGETS
+from mcz.codecs.contract import Codec, Segment
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.container.limits import ARCHIVE, check
+from mcz.container.limits import Profile, check
 from mcz.container.packed import pack_skeleton
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.container.skeletons import build_skeleton, channel_records
-from mcz.container.strict import is_plain_path
+from mcz.container.skeletons import build_skeleton
 from mcz.container.time_base import put_time_base, time_base_of
 from mcz.container.writer import Writer
-from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
-from mcz.motion import ROLES, Motion, Skeleton, Source
-from mcz.schema import MAX_COUNT, build
-from mcz.types import JsonObject, Params, Progress, Values
-from mcz.writing.clip_check import ClipCopy, Coded
+from mcz.motion import Motion, Skeleton
+from mcz.types import Params, Progress, Values
+from mcz.writing.clip_check import ClipCopy
+from mcz.writing.names import alias_once
+from mcz.writing.planning import ClipPlan, SignalPlan, clip_record, plan_clip
+from mcz.writing.prepare import Prepared, StoredSkeleton
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
-from mcz.writing.signal_source import MemorySource, as_stored
-from mcz.writing.sources import with_source_hash
+from mcz.writing.signal_source import MemorySource
 
-BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
 # (entries of a quality record, decoded values of each signal) -> its entries
 Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
+
+
+def write_skeletons(writer: Writer, skeletons: Sequence[StoredSkeleton]) -> bytes:
+    """Write skeletons that the file does not have, and their names; return the id of the last."""
+    id_ = b""
+    for stored in skeletons:
+        skeleton = replace(stored.skeleton, base=id_) if stored.derives else stored.skeleton
+        id_ = write_skeleton(writer, skeleton)
+        if stored.path:
+            alias_once(writer, stored.path, id_)
+    return id_
 
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
@@ -70,177 +77,105 @@ def write_clip(
     progress: Progress | None = None,
     *,
     quality: bool = True,
+) -> dict[str, str] | None:
+    """``write_plan`` of a motion as it is."""
+    plan = plan_clip(Prepared(motion), codec, params, writer.profile)
+    return write_plan(writer, plan, progress, quality=quality)
+
+
+def file_in_memory(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> bytes:
+    """A file of one clip without its quality record."""
+    out = io.BytesIO()
+    writer = Writer(out, profile=profile)
+    write_plan(writer, plan_clip(prepared, codec, params, profile), quality=False)
+    writer.finish()
+    return out.getvalue()
+
+
+def write_plan(
+    writer: Writer,
+    plan: ClipPlan,
+    progress: Progress | None = None,
+    *,
+    quality: bool = True,
     remarks: Mapping[str, str] = MappingProxyType({}),
     amend: Amend | None = None,
+    copy: ClipCopy | None = None,
 ) -> dict[str, str] | None:
-    """Write one clip: its skeleton and template if new, CLIP, segments, CEND, quality if lossy.
+    """Write one clip: its skeletons and template if new, CLIP, segments, CEND, quality if lossy.
 
-    Returns what the quality record says, None where there is none.
-
-    A lossy codec takes the motion alone; further signals stay lossless. ``remarks`` join the
-    quality record, ``amend`` has the last word on it. Raises OptionError for a bad parameter or a
-    target that nobody has met yet (see ``tuning.py``), MotionError for values that the codec cannot
-    hold.
+    Returns what the quality record says, None where there is none. ``remarks`` join it, ``amend``
+    has the last word on it. ``copy`` decodes the clip before it ends.
     """
-    options = codec.options(params, inner=True)
-    if codec.dial and asked(options) and options[codec.dial.parameter] is None:
-        raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
-    counted = motion.counted_by_ones()
-    motion = as_stored(with_source_hash(counted, lossless=codec.lossless))
-    for signal in motion.signals:
-        check(f"signal {signal.name!r}: channels", signal.n_channels, writer.profile.channels)
-    coded = [
-        _coded(motion, index, codec, options, writer.profile.segment_bytes)
-        for index in range(len(motion.signals))
-    ]
-    for part in coded:
-        _write_models(writer, part.encoded)
-    record = _clip_record(writer, motion, coded)
-    copy, n_channels = ClipCopy(writer.profile), [signal.n_channels for signal in motion.signals]
-    for part in coded:
-        _write_models(copy.writer, part.encoded)
+    motion, codec = plan.motion, plan.codec
+    record, n_channels = _referred(writer, plan), [s.n_channels for s in motion.signals]
+    copy = copy or ClipCopy(writer.profile)
+    for model in plan.models:
+        copy.writer.shared(ChunkType.MODL, model)
     for each in (writer, copy.writer):
         each.begin_clip(record, n_channels)
-    for index, part in enumerate(coded):
-        _write_signal((writer, copy), motion, index, part, progress)
-    decoded = copy.decoded(motion, coded)
+    for index, signal in enumerate(plan.signals):
+        _write_signal((writer, copy), motion, index, signal, progress)
+    decoded = copy.decoded(motion, plan.signals)
     sha256 = motion.source.sha256 if motion.source else b""
     writer.end_clip(motion.n_frames, sha256, [signal.sha256 for signal in decoded])
-    if quality and not codec.lossless:
-        settings, values = codec.settings(options), [signal.values for signal in decoded]
-        quality_entries = quality_record(motion, values, codec.name, settings, remarks)
-        quality_entries = amend(quality_entries, values) if amend else quality_entries
-        writer.ancillary(CHUNK, quality_payload(quality_entries))
-        return quality_entries
-    return None
+    if not quality or codec.lossless:
+        return None
+    settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
+    entries = quality_record(motion, values, codec.name, settings, remarks)
+    entries = amend(entries, values) if amend else entries
+    writer.ancillary(CHUNK, quality_payload(entries))
+    return entries
 
 
-def open_clip(
-    writer: Writer, motion: Motion, codec: Codec, encoded: Encoded, first_number: int = 1
-) -> None:
-    """Write the CLIP, and what it refers to, of a motion of which no frame is known yet.
+def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> None:
+    """Write the CLIP, and what it refers to, of a plan of which no frame is known yet.
 
     ``first_number`` is that of its first frame.
     """
-    check("channels", motion.signals[0].n_channels, writer.profile.channels)
-    _write_models(writer, encoded)
-    source = MemorySource(motion, 0, codec, writer.profile.segment_bytes)
-    record = _clip_record(writer, motion, [Coded(source, codec, encoded)])
+    record = _referred(writer, plan)
     record.flags |= payloads.OPEN_CLIP
     put_time_base(record, time_base_of(np.array([first_number], np.int64), None))
-    writer.begin_clip(record, [motion.signals[0].n_channels])
+    writer.begin_clip(record, [plan.motion.signals[0].n_channels])
 
 
-def _write_models(writer: Writer, encoded: Encoded) -> None:
-    """Write the models that a signal needs; well-known ones where all shall be in the file."""
-    known = encoded.known if writer.profile is ARCHIVE else ()
-    for model in (*encoded.models, *known):
-        record = payloads.Modl(kind=model.kind, data=model.data)
-        writer.shared(ChunkType.MODL, build(record, "MODL"))
-
-
-def asked(options: Params) -> JsonObject:
-    """The targets among the options of a codec."""
-    return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
-
-
-def _coded(motion: Motion, index: int, codec: Codec, options: Params, segment_bytes: int) -> Coded:
-    if index and not codec.lossless:
-        codec = by_name(BESIDE)
-        options = codec.options({})
-    signal = motion.signals[index]
-    if not codec.lossless and signal.channels is not None:
-        raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
-    if codec.domain == "values" and signal.values.dtype == np.int64:
-        raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
-    source = MemorySource(motion, index, codec, segment_bytes, options)
-    if codec.domain == "values" and source.signal.values.dtype == np.int64:
-        raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
-    return Coded(source, codec, codec.encode(source, options))
+def _referred(writer: Writer, plan: ClipPlan) -> payloads.Clip:
+    """Write what CLIP refers to, and return the record."""
+    prepared, source = plan.prepared, plan.motion.source
+    for model in plan.models:
+        writer.shared(ChunkType.MODL, model)
+    own = StoredSkeleton(plan.motion.skeleton, prepared.derives)
+    skeleton = write_skeletons(writer, (*prepared.bases, own))
+    template = None
+    if source is not None:
+        template = writer.template(FORMATS[source.format].id, source.template)
+    return clip_record(plan, skeleton, template)
 
 
 def _write_signal(
     outs: tuple[Writer, ClipCopy],
     motion: Motion,
     index: int,
-    coded: Coded,
+    plan: SignalPlan,
     progress: Progress | None,
 ) -> None:
     """Write the segments of a signal, to the file and to the copy that is decoded."""
-    for segment in coded.encoded.segments:
-        header, streams = _segment(outs[0], motion, index, coded.source, segment)
+    for segment in plan.encoded.segments:
+        header, streams = _segment(outs[0].profile, motion, index, plan.source, segment)
         for out in outs:
             out.segment(header, streams)
         if progress is not None:
             progress(segment.first + segment.n_frames, motion.n_frames, motion.name)
 
 
-def _clip_record(writer: Writer, motion: Motion, coded: Sequence[Coded]) -> payloads.Clip:
-    rate = motion.frame_rate
-    if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
-        raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
-    record = payloads.Clip(
-        name=motion.name,
-        flags=0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
-        skeleton=write_skeleton(writer, motion.skeleton),
-        n_frames=motion.n_frames,
-        rate_numerator=rate.numerator if rate else 0,
-        rate_denominator=rate.denominator if rate else 1,
-        metadata=payloads.metadata_records(dict(sorted(motion.metadata.items()))),
-        source=_source_record(writer, motion.source) if motion.source else None,
-        signals=[_signal_record(part.source, part.codec, part.encoded) for part in coded],
-    )
-    first_time = None if motion.signals_of(TIMES) else motion.first_time
-    put_time_base(record, time_base_of(motion.frame_numbers, first_time))
-    return record
-
-
-def _source_record(writer: Writer, source: Source) -> payloads.ClipSource:
-    format_id = FORMATS[source.format].id
-    if source.path and not is_plain_path(source.path):
-        raise MotionError(f"source path {source.path!r} is not relative and plain")
-    return payloads.ClipSource(
-        template=writer.template(format_id, source.template),
-        format=format_id,
-        detail=source.detail,
-        path=source.path,
-        size=source.size,
-    )
-
-
-def _signal_record(source: MemorySource, codec: Codec, part: Encoded) -> payloads.Signal:
-    signal = source.signal
-    kinds = {"all": payloads.GROUP_ALL, "joint": payloads.GROUP_JOINT}
-    own = signal.channels is not None
-    kind = kinds.get(codec.grouping, payloads.GROUP_CHANNEL)
-    if own and codec.grouping == "joint":
-        kind = payloads.GROUP_CHANNEL
-    kind = payloads.GROUP_LISTED if source.is_listed else kind
-    sizes = [len(group) for group in source.layout.groups] if source.is_listed else None
-    return payloads.Signal(
-        name=signal.name,
-        flags=payloads.OWN_CHANNELS if own else 0,
-        role=ROLES.index(signal.role or ""),
-        of=signal.of,
-        channels=channel_records(signal.channels) if signal.channels is not None else None,
-        samples_per_frame=signal.samples_per_frame,
-        grids=payloads.grid_runs(signal.grids),
-        codec=codec.id,
-        codec_version=codec.version if part.version is None else part.version,
-        header=part.header,
-        groups=payloads.Groups(kind=kind, sizes=sizes),
-        n_resolutions=part.n_resolutions,
-    )
-
-
 def _segment(
-    writer: Writer, motion: Motion, index: int, source: MemorySource, segment: Segment
+    profile: Profile, motion: Motion, index: int, source: MemorySource, segment: Segment
 ) -> tuple[SegmentHeader, list[bytes]]:
     """Header and streams of a segment: its notes, its masks, and what the codec made."""
     start, stop = segment.first, segment.first + segment.n_frames
     per_frame = 8 * source.layout.samples_per_frame * max(1, source.layout.n_channels)
     size = segment.n_frames * per_frame
-    check(f"frames {start}:{stop}: decoded bytes", size, writer.profile.segment_bytes)
+    check(f"frames {start}:{stop}: decoded bytes", size, profile.segment_bytes)
     flags = FRESH if segment.fresh else 0
     streams: list[bytes] = []
     notes = b""

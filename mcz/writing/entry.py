@@ -15,18 +15,19 @@ from mcz.errors import LimitError, MotionError, SourceError, remark_of
 from mcz.formats import Format, format_of, wants_skeleton
 from mcz.hints import Hint, Remark
 from mcz.kinematics.rest import height_note
-from mcz.motion import Motion, Skeleton
+from mcz.motion import Skeleton
 from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
 from mcz.reading.source_files import content_note, read_bytes, read_skeleton
 from mcz.reading.source_options import SourceOptions, checked_rate
 from mcz.reading.source_rates import stating_rate
 from mcz.types import Progress
 from mcz.units import in_unit
-from mcz.writing.clip_writer import write_skeleton
+from mcz.writing.clip_writer import write_skeletons
 from mcz.writing.draft import Draft
-from mcz.writing.names import alias_once, check_name, clip_name
+from mcz.writing.names import check_name, clip_name
 from mcz.writing.options import EncodingOptions
-from mcz.writing.tuning import write_tuned
+from mcz.writing.prepare import StoredSkeleton, derived_from, prepare
+from mcz.writing.tuning import write_motion
 
 
 class Entry:
@@ -85,8 +86,8 @@ class Entry:
         source_format = format_of(self.path, data)
         if source_format.is_skeleton:
             self.notes = tuple(filter(None, [content_note(self.path, source_format)]))
-            id_ = write_skeleton(writer, in_unit(read_skeleton(self.path), self.options.unit))
-            alias_once(writer, self.name, id_)
+            skeleton = in_unit(read_skeleton(self.path), self.options.unit)
+            write_skeletons(writer, (StoredSkeleton(skeleton, path=self.name),))
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
         taken = take(self.path, given, self.options.unit, data, flat=self.options.flat)
@@ -96,14 +97,17 @@ class Entry:
         self.notes += tuple(filter(None, [*notes, height_note(motion.skeleton)]))
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
-        if taken.skeleton is not None:
-            motion = self._based(writer, motion, taken.skeleton)
-        name = clip_name(self.name, writer.directory)
-        motion = replace(motion, name=name)
-        codec = self.encoding.found
+        motion = replace(motion, name=clip_name(self.name, writer.directory))
+        codec, params = self.encoding.found, self.encoding.params
         if not codec.lossless:  # the file does not come back: what comes states its rate
             motion = stating_rate(motion)
-        self.quality = write_tuned(writer, motion, codec, self.encoding.params, progress)
+        base = taken.skeleton
+        if base is None:
+            prepared = prepare(motion, codec, params)
+        else:
+            derives = derived_from(motion.skeleton, base)
+            prepared = prepare(motion, codec, params, (self._stored(base),), derives=derives)
+        self.quality = write_motion(writer, prepared, codec, params, progress)
         return "parsed"
 
     def _note(self, taken: Taken) -> None:
@@ -115,18 +119,12 @@ class Entry:
         if taken.chosen is not None and taken.chosen.path is not None:
             self.inputs.append(taken.chosen.path)
 
-    def _based(self, writer: Writer, motion: Motion, skeleton: Skeleton) -> Motion:
-        """``motion`` after its ASF was written; a derived skeleton names it as its base.
-
-        One that faces up otherwise than the ASF says is derived, too: the ASF stays as it is.
-        """
-        id_ = write_skeleton(writer, skeleton)
-        if self.options.keep_skeleton:
-            path = skeleton.source.path if skeleton.source is not None else ""
-            alias_once(writer, path or f"{skeleton.name}.asf", id_)
-        if motion.skeleton.base is None and motion.skeleton.up_axis == skeleton.up_axis:
-            return motion
-        return replace(motion, skeleton=replace(motion.skeleton, base=id_))
+    def _stored(self, skeleton: Skeleton) -> StoredSkeleton:
+        """The skeleton of an ASF, under its own name where that is kept."""
+        if not self.options.keep_skeleton:
+            return StoredSkeleton(skeleton)
+        path = skeleton.source.path if skeleton.source is not None else ""
+        return StoredSkeleton(skeleton, path=path or f"{skeleton.name}.asf")
 
 
 def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]:

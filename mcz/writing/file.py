@@ -1,7 +1,7 @@
 """``mcz.write`` and ``mcz.encode``: one motion, or one source file, to a new MCZ file.
 
-``entry.py`` reads source files, ``tuning.py`` finds settings, ``clip_writer.py`` turns a Motion
-into chunks.
+A motion on its way: ``prepare`` gives it the domain of its codec, ``tuning`` finds the parameters
+that meet a target, ``planning`` decides which chunks a clip is, ``clip_writer`` writes them.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from mcz.writing.atomic import replacing
 from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry
 from mcz.writing.inputs import refuse_inputs
-from mcz.writing.names import check_metadata, name_skeleton
+from mcz.writing.names import check_metadata
 from mcz.writing.options import encoding_options, profile_of
+from mcz.writing.prepare import prepare, under_its_path
 from mcz.writing.sources import with_true_sources
-from mcz.writing.tuning import write_tuned
+from mcz.writing.tuning import write_motion
 from mcz.writing.written import Written, written
 
 SHORT = 65536  # bytes of a source file whose skeleton and texts are a large part of what is written
@@ -59,12 +60,12 @@ def write(
     if not isinstance(motion, Motion):
         raise OptionError(f"a motion is written to a target, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
-    named = encoding_options(codec, effort, params).found
-    motion = with_true_sources(motion, lossless=named.lossless)
+    found = encoding_options(codec, effort, params).found
+    motion = with_true_sources(motion, lossless=found.lossless)
+    prepared = prepare(motion, found, params, (under_its_path(motion.skeleton),))
     with limited(threads), replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive), copies=copies)
-        name_skeleton(writer, motion.skeleton)
-        quality = write_tuned(writer, motion, named, params, progress)
+        quality = write_motion(writer, prepared, found, params, progress)
         writer.finish()
     return written(writer.directory, writer.offset, quality)
 

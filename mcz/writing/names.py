@@ -13,15 +13,6 @@ from mcz.container.metadata_keys import KEYS, PRIVATE
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import MotionError
-from mcz.motion import Skeleton
-from mcz.writing.clip_writer import write_skeleton
-
-
-def name_skeleton(writer: Writer, skeleton: Skeleton) -> None:
-    """Write the skeleton, and the name under which its own file is restored, if it has one."""
-    path = skeleton.source.path if skeleton.source is not None else ""
-    if path:
-        alias_once(writer, path, write_skeleton(writer, skeleton))
 
 
 def alias_once(writer: Writer, name: str, id_: bytes) -> None:

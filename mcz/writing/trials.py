@@ -5,7 +5,6 @@ Nothing is trusted that the public reader did not give.
 
 from __future__ import annotations
 
-import io
 import warnings
 from dataclasses import dataclass, replace
 
@@ -13,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec
+from mcz.container.limits import Profile
 from mcz.container.reader import Container
 from mcz.container.source import open_source
-from mcz.container.writer import Writer
 from mcz.errors import ContactWarning, OptionError
 from mcz.kinematics import positions_of
 from mcz.metrics import Comparison, compare
@@ -23,7 +22,8 @@ from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.sizes import clip_sizes
 from mcz.types import Params
-from mcz.writing.clip_writer import write_clip
+from mcz.writing.clip_writer import file_in_memory
+from mcz.writing.prepare import Prepared
 
 Floats = NDArray[np.float64]
 
@@ -45,14 +45,14 @@ class Target:
 class Trials:
     """The figures of a clip at one setting of the dial, measured on a file in memory."""
 
-    def __init__(self, motion: Motion, codec: Codec, params: Params, writer: Writer) -> None:
-        self.motion, self.codec, self.params, self.writer = motion, codec, params, writer
+    def __init__(self, motion: Motion, codec: Codec, params: Params, profile: Profile) -> None:
+        self.motion, self.codec, self.params, self.profile = motion, codec, params, profile
         self.alone = replace(motion, signals=motion.signals[:1])
         self.others = 0.0  # bytes of the further signals, which no dial changes
 
     def given(self, more: Params) -> Trials:
         """Trials with more parameters."""
-        return Trials(self.motion, self.codec, {**self.params, **more}, self.writer)
+        return Trials(self.motion, self.codec, {**self.params, **more}, self.profile)
 
     def __call__(self, target: Target, setting: float) -> float:
         """The figure of ``target`` at a setting of the dial."""
@@ -95,13 +95,11 @@ class Trials:
         return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
 
     def _written(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
-        out = io.BytesIO()
-        scratch = Writer(out, profile=self.writer.profile)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ContactWarning)  # that of the clip itself counts
-            write_clip(scratch, motion, self.codec, {**self.params, **found}, quality=False)
-        scratch.finish()
-        container = Container(open_source(out.getvalue()), max_decoded=2**53)
+            params = {**self.params, **found}
+            data = file_in_memory(Prepared(motion), self.codec, params, self.profile)
+        container = Container(open_source(data), max_decoded=2**53)
         return container, Clip(container, container.directory.clips[motion.name])
 
     def _measure(self, motion: Motion, target: Target, found: Params) -> float:

@@ -7,13 +7,15 @@ measure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from operator import itemgetter
 
 import numpy as np
 
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import Dial
+from mcz.container.limits import Profile
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
@@ -21,8 +23,9 @@ from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.types import JsonObject, Params, Progress
 from mcz.writing.bounding import REFINEMENT, bounded
-from mcz.writing.clip_writer import Amend, asked, write_clip
-from mcz.writing.positions import as_codec_wants, check_bones
+from mcz.writing.clip_writer import Amend, write_plan
+from mcz.writing.planning import asked, plan_clip
+from mcz.writing.prepare import Prepared, check_bones
 from mcz.writing.trials import Target, Trials
 from mcz.writing.weighing import QUALITY, Limits, weighted
 
@@ -39,22 +42,36 @@ NEAR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried beside the one 
 Point = tuple[float, float]  # a setting and its figure
 
 
-def write_tuned(
+@dataclass(frozen=True, slots=True)
+class Tuned:
+    """Parameters that meet what was asked for, and what the quality record says of that."""
+
+    params: Params
+    remarks: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_motion(
     writer: Writer,
-    motion: Motion,
+    prepared: Prepared,
     codec: Codec,
     params: Params,
     progress: Progress | None = None,
     *,
     amend: Amend | None = None,
 ) -> dict[str, str] | None:
-    """``write_clip``, a size or an error among ``params`` met first.
+    """Write a clip, a size or an error among ``params`` met first.
 
-    The quality record says what was reached. Raises OptionError where a target cannot be met or has
-    no meaning for this clip.
+    Returns what the quality record says, ``amend`` has the last word on it; None where there is
+    none. Raises OptionError where a target cannot be met or has no meaning for this clip.
     """
+    found = tuned(prepared.motion, codec, params, writer.profile)
+    plan = plan_clip(prepared, codec, found.params, writer.profile)
+    return write_plan(writer, plan, progress, remarks=found.remarks, amend=amend)
+
+
+def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Tuned:
+    """``params`` with a setting of the dial that meets the targets among them, on trial files."""
     options = codec.options(params)
-    motion = as_codec_wants(writer, motion, codec, options)
     targets = asked(options)
     _check_preset(codec, params, options, targets)
     if not targets and codec.promise and codec.dial and options[codec.dial.parameter] is None:
@@ -68,15 +85,14 @@ def write_tuned(
         check_bones(motion.skeleton, f"{codec.name}: a preset that promises an error in cm")
     limits = options.get(QUALITY)
     if codec.dial is None or not (targets or limits):
-        return write_clip(writer, motion, codec, params, progress, amend=amend)
+        return Tuned(params)
     target = _target(motion, codec.dial, options, targets) if targets else None
-    trial = Trials(motion, codec, params, writer)
+    trial = Trials(motion, codec, params, profile)
     if limits:
         found, remarks = _with_quality(codec, target, trial, limits)
     else:
         found, remarks = _meet(codec, target, trial)
-    params = {**params, **found}
-    return write_clip(writer, motion, codec, params, progress, remarks=remarks, amend=amend)
+    return Tuned({**params, **found}, remarks)
 
 
 def _check_preset(codec: Codec, params: Params, options: Params, targets: Params) -> None:

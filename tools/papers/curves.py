@@ -25,7 +25,6 @@ from mcz.bench.measure import (
     LEAST_SECONDS,
     MOST_RUNS,
     Record,
-    as_coded,
     cpu_seconds,
     what_is_coded,
     work_of,
@@ -37,6 +36,7 @@ from mcz.container.limits import BASE
 from mcz.errors import MczError, MotionError
 from mcz.reading.sizes import clip_sizes
 from mcz.training import Recipe, train
+from mcz.writing.prepare import prepare
 from mcz.writing.signal_source import MemorySource
 
 LOW, HIGH = 0.09, 2.3  # cm
@@ -185,7 +185,7 @@ def speeds_beside(case: Case, settings: Sequence[tuple[Variant, float]]) -> list
         codec = by_name(variant.codec)
         if codec.live is not None and params.get("preset") is None:
             options = codec.options(params)
-            seconds = live_seconds(as_coded(motion, codec, options), codec, options)
+            seconds = live_seconds(prepare(motion, codec, options).motion, codec, options)
             live = row | {"live": True}
             rows.append(live | {f"{k}_fps": motion.n_frames / v for k, v in seconds.items()})
     return rows

@@ -6,7 +6,6 @@ is made of a skeleton's virtual ones.
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -19,11 +18,9 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz.bench.cases import Case, find_cases
-from mcz.container.writer import Writer
 from mcz.errors import MczError, OptionError
 from mcz.kinematics.marker_motion import in_positions
 from mcz.motion import Motion, Signal
-from mcz.writing.positions import as_domain
 
 Floats = NDArray[np.float64]
 
@@ -167,7 +164,7 @@ def motion_in_positions(clip: Clip) -> Motion:
         return _seen(motion)
     if clip.form == MADE:
         return _made(motion)
-    return as_domain(Writer(io.BytesIO()), motion, clip.form == VIRTUAL)
+    return in_positions(motion, virtual_markers=clip.form == VIRTUAL)
 
 
 def _seen(motion: Motion) -> Motion:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import mcz
 from mcz.bench.cases import Loaded, Variant, load
 from mcz.bench.ladder import dial_of
-from mcz.bench.measure import Record, as_coded, cpu_seconds, work_of, write_file
+from mcz.bench.measure import Record, cpu_seconds, work_of, write_file
 from mcz.codecs import by_name
 from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
 from mcz.codecs.online.units import Unit, parse_units
@@ -27,6 +27,7 @@ from mcz.codecs.space_choices import live_sample
 from mcz.container.limits import BASE
 from mcz.motion import Motion
 from mcz.reading.sizes import clip_sizes
+from mcz.writing.prepare import prepare
 from mcz.writing.signal_source import MemorySource
 from tools.papers.curves import POINT_BYTES, live_seconds, point_of, walk
 from tools.papers.kwak.clips import Clip, motion_in_positions, source_of
@@ -239,7 +240,7 @@ def speeds(clip: Clip, variants: Sequence[tuple[Variant, Params]]) -> list[Recor
         rows.append(row | _per_second(motion, seconds))
         if codec.live is not None:
             options = codec.options(params)
-            seconds = live_seconds(as_coded(motion, codec, options), codec, options)
+            seconds = live_seconds(prepare(motion, codec, options).motion, codec, options)
             rows.append(row | {"live": True} | _per_second(motion, seconds))
     rows.append(_filter_speed(motion_in_positions(clip)))
     return rows

@@ -11,7 +11,6 @@ import io
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
-from unittest import mock
 
 import numpy as np
 
@@ -49,9 +48,10 @@ from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer, payload_id
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import deflate, parse, varint
-from mcz.writing import clip_writer
-from mcz.writing.clip_check import ClipCopy, Coded, Decoded
-from mcz.writing.clip_writer import write_clip, write_skeleton
+from mcz.writing.clip_check import ClipCopy, Decoded
+from mcz.writing.clip_writer import write_plan, write_skeleton
+from mcz.writing.planning import SignalPlan, plan_clip
+from mcz.writing.prepare import Prepared
 from tools.records import built, update
 from tools.vectors.build.edits import Edit, Made, put
 from tools.vectors.build.motions import dance, puppet
@@ -92,7 +92,7 @@ class _Unchecked(ClipCopy):
     def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
         self._segments.setdefault(header.signal, []).append((header, streams))
 
-    def decoded(self, motion: Motion, coded: Sequence[Coded]) -> list[Decoded]:
+    def decoded(self, motion: Motion, coded: Sequence[SignalPlan]) -> list[Decoded]:
         found = []
         for index, (part, signal) in enumerate(zip(coded, motion.signals, strict=True)):
             free, segments = part.lossy_channels(), self._segments.get(index, [])
@@ -106,7 +106,7 @@ class _Unchecked(ClipCopy):
 
 
 def _lossy(
-    part: Coded, segments: Sequence[tuple[SegmentHeader, Sequence[bytes]]], free: Any
+    part: SignalPlan, segments: Sequence[tuple[SegmentHeader, Sequence[bytes]]], free: Any
 ) -> Any:
     encoded, layout = part.encoded, part.source.layout
     models = model_finder((*encoded.models, *encoded.known))
@@ -195,8 +195,8 @@ class Crafter(Writer):
         self, motion: Motion, *, grouping: str = "joint", codec: Codec = raw.CODEC, **params: Any
     ) -> None:
         """Write ``motion`` with the raw codec, or another, without a quality record."""
-        with mock.patch.object(clip_writer, "ClipCopy", _Unchecked):
-            write_clip(self, motion, replace(codec, grouping=grouping), params, quality=False)
+        plan = plan_clip(Prepared(motion), replace(codec, grouping=grouping), params, self.profile)
+        write_plan(self, plan, quality=False, copy=_Unchecked(self.profile))
 
     def parts(self, name: str, *pieces: bytes) -> None:
         """Write an attachment in these parts, each stored or deflated, whichever is shorter."""

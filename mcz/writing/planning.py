@@ -1,0 +1,193 @@
+"""The plan of a clip: all that is decided of it before its first byte is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.clock import TIMES
+from mcz.codecs import by_name
+from mcz.codecs.contract import Codec, Encoded
+from mcz.codecs.parameters import TARGETS
+from mcz.container import payloads
+from mcz.container.limits import ARCHIVE, Profile, check
+from mcz.container.skeletons import channel_records
+from mcz.container.strict import is_plain_path
+from mcz.container.time_base import put_time_base, time_base_of
+from mcz.errors import MotionError, OptionError
+from mcz.formats import FORMATS
+from mcz.motion import ROLES, Motion, Source
+from mcz.schema import MAX_COUNT, build
+from mcz.types import JsonObject, Params
+from mcz.writing.prepare import Prepared
+from mcz.writing.signal_source import MemorySource, as_stored
+from mcz.writing.sources import with_source_hash
+
+BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
+
+
+@dataclass(frozen=True, slots=True)
+class SignalPlan:
+    """A signal, the codec that it is encoded with, and the segments that are yet to be encoded."""
+
+    source: MemorySource
+    codec: Codec
+    encoded: Encoded
+
+    def lossy_channels(self) -> NDArray[np.bool_]:
+        """The channels whose values the codec may change, (n_channels,)."""
+        layout, codec = self.source.layout, self.codec
+        free = np.full(layout.n_channels, not codec.lossless)
+        for group in codec.exact(self.encoded.header, layout) if codec.exact else ():
+            free[list(layout.groups[group])] = False
+        return free
+
+
+@dataclass(frozen=True, slots=True)
+class ClipPlan:
+    """A clip as it is stored, in the order of its chunks.
+
+    ``prepared`` has the values that a file stores; ``models`` are payloads of MODL. ``options`` are
+    those of the motion's codec.
+    """
+
+    prepared: Prepared
+    options: Params
+    models: tuple[bytes, ...]
+    signals: tuple[SignalPlan, ...]
+
+    @property
+    def motion(self) -> Motion:
+        return self.prepared.motion
+
+    @property
+    def codec(self) -> Codec:
+        """The codec of the motion."""
+        return self.signals[0].codec
+
+
+def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> ClipPlan:
+    """The plan of a motion, whose codec is ``codec``, for a file of a profile.
+
+    A lossy codec takes the motion alone; further signals stay lossless. Raises OptionError for a
+    bad parameter or a target that nobody has met yet (see ``tuning.py``), MotionError for values
+    that the codec cannot hold, LimitError for what the profile does not allow.
+    """
+    options = codec.options(params, inner=True)
+    if codec.dial and asked(options) and options[codec.dial.parameter] is None:
+        raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
+    counted = prepared.motion.counted_by_ones()
+    motion = as_stored(with_source_hash(counted, lossless=codec.lossless))
+    for signal in motion.signals:
+        check(f"signal {signal.name!r}: channels", signal.n_channels, profile.channels)
+    signals = tuple(
+        _signal_plan(motion, index, codec, options, profile.segment_bytes)
+        for index in range(len(motion.signals))
+    )
+    models = tuple(model for plan in signals for model in _models(plan.encoded, profile))
+    stored = Prepared(motion, prepared.bases, prepared.derives)
+    return ClipPlan(stored, options, models, signals)
+
+
+def plan_open_clip(
+    prepared: Prepared, codec: Codec, options: Params, encoded: Encoded, profile: Profile
+) -> ClipPlan:
+    """The plan of a clip of which no frame is known yet."""
+    check("channels", prepared.motion.signals[0].n_channels, profile.channels)
+    source = MemorySource(prepared.motion, 0, codec, profile.segment_bytes)
+    models = tuple(_models(encoded, profile))
+    return ClipPlan(prepared, options, models, (SignalPlan(source, codec, encoded),))
+
+
+def asked(options: Params) -> JsonObject:
+    """The targets among the options of a codec."""
+    return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
+
+
+def _signal_plan(
+    motion: Motion, index: int, codec: Codec, options: Params, segment_bytes: int
+) -> SignalPlan:
+    if index and not codec.lossless:
+        codec = by_name(BESIDE)
+        options = codec.options({})
+    signal = motion.signals[index]
+    if not codec.lossless and signal.channels is not None:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
+    if codec.domain == "values" and signal.values.dtype == np.int64:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
+    source = MemorySource(motion, index, codec, segment_bytes, options)
+    if codec.domain == "values" and source.signal.values.dtype == np.int64:
+        raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
+    return SignalPlan(source, codec, codec.encode(source, options))
+
+
+def _models(encoded: Encoded, profile: Profile) -> Iterator[bytes]:
+    """Models that a signal needs; well-known ones where all shall be in the file."""
+    known = encoded.known if profile is ARCHIVE else ()
+    for model in (*encoded.models, *known):
+        yield build(payloads.Modl(kind=model.kind, data=model.data), "MODL")
+
+
+def clip_record(plan: ClipPlan, skeleton: bytes, template: bytes | None) -> payloads.Clip:
+    """CLIP of a plan; ``skeleton`` and ``template`` are the ids of its SKEL and its SRCE."""
+    motion = plan.motion
+    rate = motion.frame_rate
+    if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
+        raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
+    record = payloads.Clip(
+        name=motion.name,
+        flags=0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
+        skeleton=skeleton,
+        n_frames=motion.n_frames,
+        rate_numerator=rate.numerator if rate else 0,
+        rate_denominator=rate.denominator if rate else 1,
+        metadata=payloads.metadata_records(dict(sorted(motion.metadata.items()))),
+        source=_source_record(motion.source, template),
+        signals=[_signal_record(signal) for signal in plan.signals],
+    )
+    first_time = None if motion.signals_of(TIMES) else motion.first_time
+    put_time_base(record, time_base_of(motion.frame_numbers, first_time))
+    return record
+
+
+def _source_record(source: Source | None, template: bytes | None) -> payloads.ClipSource | None:
+    if source is None or template is None:
+        return None
+    if source.path and not is_plain_path(source.path):
+        raise MotionError(f"source path {source.path!r} is not relative and plain")
+    return payloads.ClipSource(
+        template=template,
+        format=FORMATS[source.format].id,
+        detail=source.detail,
+        path=source.path,
+        size=source.size,
+    )
+
+
+def _signal_record(plan: SignalPlan) -> payloads.Signal:
+    signal, codec, encoded = plan.source.signal, plan.codec, plan.encoded
+    kinds = {"all": payloads.GROUP_ALL, "joint": payloads.GROUP_JOINT}
+    own = signal.channels is not None
+    kind = kinds.get(codec.grouping, payloads.GROUP_CHANNEL)
+    if own and codec.grouping == "joint":
+        kind = payloads.GROUP_CHANNEL
+    listed = plan.source.is_listed
+    kind = payloads.GROUP_LISTED if listed else kind
+    sizes = [len(group) for group in plan.source.layout.groups] if listed else None
+    return payloads.Signal(
+        name=signal.name,
+        flags=payloads.OWN_CHANNELS if own else 0,
+        role=ROLES.index(signal.role or ""),
+        of=signal.of,
+        channels=channel_records(signal.channels) if signal.channels is not None else None,
+        samples_per_frame=signal.samples_per_frame,
+        grids=payloads.grid_runs(signal.grids),
+        codec=codec.id,
+        codec_version=codec.version if encoded.version is None else encoded.version,
+        header=encoded.header,
+        groups=payloads.Groups(kind=kind, sizes=sizes),
+        n_resolutions=encoded.n_resolutions,
+    )
