@@ -313,7 +313,7 @@ def test_live_clips_with_packets_and_repeats_are_carried_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Chunks that may not be copied lie between DATA here, so that all behind them moves."""
-    monkeypatch.setitem(codecs.CODECS, live_codec.ID, live_codec.CODEC)
+    monkeypatch.setitem(codecs.CODECS, live_codec.CODEC.name, live_codec.CODEC)
     path = tmp_path / "live.mcz"
     values = np.random.default_rng(1).integers(-40, 40, (30, 10)).cumsum(axis=0) / 8
     with (

@@ -54,10 +54,10 @@ LENGTH = {"overlap": "length"}  # else segment_frames
 
 @pytest.fixture(autouse=True, scope="module")
 def extra_codecs() -> Any:
-    codecs.CODECS.update({codec.id: codec for codec in EXTRA})
+    codecs.CODECS.update({codec.name: codec for codec in EXTRA})
     yield
     for codec in EXTRA:
-        del codecs.CODECS[codec.id]
+        del codecs.CODECS[codec.name]
 
 
 def written(motion: mcz.Motion, codec: str = "raw", length: int = 7) -> bytes:

@@ -108,7 +108,7 @@ def test_bytes_are_those_of_info(
     archive: Path, packed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All that ``mcz info`` counts to a clip but the template, which clips may share."""
-    monkeypatch.setitem(CODECS, live_codec.ID, live_codec.CODEC)
+    monkeypatch.setitem(CODECS, live_codec.CODEC.name, live_codec.CODEC)
     mcz.write(smooth(300), tmp_path / "lossy.mcz", codec="mrdwt", mean_error_cm=0.1)
     with (
         (tmp_path / "live.mcz").open("wb") as out,

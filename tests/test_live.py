@@ -50,7 +50,7 @@ ROOT = Path(mcz.__file__).parent.parent
 
 @pytest.fixture(autouse=True)
 def stairs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(codecs.CODECS, live_codec.ID, live_codec.CODEC)
+    monkeypatch.setitem(codecs.CODECS, live_codec.CODEC.name, live_codec.CODEC)
 
 
 def frames(n: int = 23, seed: int = 1) -> np.ndarray:
@@ -139,7 +139,7 @@ def test_the_hash_is_compared_at_the_end() -> None:
 
 @given(st.integers(0, 30), st.integers(1, 12), st.integers(0, 2**32))
 def test_any_number_of_frames(n: int, every: int, seed: int) -> None:
-    codecs.CODECS[live_codec.ID] = live_codec.CODEC
+    codecs.CODECS[live_codec.CODEC.name] = live_codec.CODEC
     values = frames(n, seed)
     data = live(values, every=every)
     found = list(live_frames(io.BytesIO(data)))
@@ -446,7 +446,7 @@ from mcz.live.writer import LiveWriter
 from tests import live_codec
 from tests.motions import skeleton
 from tools.records import built
-codecs.CODECS[live_codec.ID] = live_codec.CODEC
+codecs.CODECS[live_codec.CODEC.name] = live_codec.CODEC
 with open(sys.argv[1], "wb", buffering=0) as sink:
     writer = LiveWriter(sink, skeleton(), "stairs")
     for n in range(100000):

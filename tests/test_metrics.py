@@ -321,7 +321,7 @@ def coarse(source, params):
 @pytest.fixture
 def lossy(monkeypatch: pytest.MonkeyPatch) -> None:
     codec = replace(overlap_codec.CODEC, encode=coarse)
-    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, codec)
+    monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, codec)
 
 
 def test_a_lossy_clip_has_a_quality_record(lossy: None) -> None:
@@ -356,7 +356,7 @@ def test_values_are_decoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return overlap_codec.decode(*arguments)
 
     codec = replace(overlap_codec.CODEC, encode=coarse, decode=decode)
-    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, codec)
+    monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, codec)
     mcz.write(smooth(), io.BytesIO(), codec="overlap")
     assert len(calls) == 1
 
@@ -400,7 +400,7 @@ def test_a_codec_that_gives_nan_is_seen(monkeypatch: pytest.MonkeyPatch) -> None
         return np.full((request.stop - request.start, layout.n_channels), np.nan)
 
     codec = replace(overlap_codec.CODEC, encode=encode, decode=decode)
-    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, codec)
+    monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, codec)
     out = io.BytesIO()
     mcz.write(smooth(5), out, codec="overlap")
     with mcz.open(out.getvalue()) as file:

@@ -28,7 +28,7 @@ from tests.motions import skeleton, smooth
 
 @pytest.fixture(autouse=True)
 def overlap(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, overlap_codec.CODEC)
+    monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, overlap_codec.CODEC)
 
 
 def written(motion: Motion, codec: str, **params: Any) -> bytes:

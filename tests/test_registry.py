@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from mcz import compare, sample
-from mcz.codecs import CODECS
+from mcz.codecs import CODECS, bitstream
 from mcz.codecs.basis_models import name_of
+from mcz.codecs.online.options import PRESET_IDS
 from mcz.container import limits, packets
 from mcz.container.chunks import FLAGS_OF
 from mcz.container.versions import FORMAT_NAME
@@ -83,10 +84,14 @@ def test_profiles() -> None:
 def test_codecs() -> None:
     rows = by("id", "codecs")
     assert {id_: (row["name"], row["version"], row["decodes"]) for id_, row in rows.items()} == {
-        codec.id: (codec.name, codec.version, codec.domain) for codec in CODECS.values()
+        codec.id: (bitstream(codec.id), codec.version, codec.domain) for codec in CODECS.values()
     }
-    assert FOUND["reserved_codecs"] == []
-    assert not set(FOUND["reserved_codecs"]) & set(CODECS)
+    presets = {(row["codec"], row["id"], row["preset"]) for row in FOUND["presets"]}
+    online = {(21, id_, name) for name, id_ in PRESET_IDS.items() if id_}
+    assert presets - online == {
+        (codec.id, codec.preset, name) for name, codec in CODECS.items() if codec.preset
+    }
+    assert online < presets
 
 
 def test_source_formats() -> None:

@@ -49,7 +49,7 @@ def known_codecs(monkeypatch: pytest.MonkeyPatch) -> None:
         overlap_codec.CODEC,
         replace(raw.CODEC, id=254, name="one", grouping="all"),
     ):
-        monkeypatch.setitem(codecs.CODECS, codec.id, codec)
+        monkeypatch.setitem(codecs.CODECS, codec.name, codec)
 
 
 def written(motion: Motion, codec: str = "lossless", **params: Any) -> bytes:

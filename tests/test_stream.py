@@ -58,7 +58,7 @@ CODEC = pytest.mark.parametrize("codec", CODECS)
 
 @pytest.fixture(autouse=True)
 def stairs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(codecs.CODECS, live_codec.ID, live_codec.CODEC)
+    monkeypatch.setitem(codecs.CODECS, live_codec.CODEC.name, live_codec.CODEC)
 
 
 def rows(n: int = 60, seed: int = 1) -> np.ndarray:
@@ -71,7 +71,7 @@ def rows(n: int = 60, seed: int = 1) -> np.ndarray:
 
 def pieces(codec: str = "stairs", n: int = 60, **more: object) -> list[bytes]:
     """What precedes the frames, then the bytes of each, then what follows them."""
-    codecs.CODECS[live_codec.ID] = live_codec.CODEC
+    codecs.CODECS[live_codec.CODEC.name] = live_codec.CODEC
     rate = Fraction(120)
     given = {"params": CODECS[codec], "frame_rate": rate, "unit": "cm"} | more
     return list(mcz.stream_encode(rows(n), NAMES, codec=codec, **given))

@@ -41,7 +41,7 @@ def live() -> bytes:
     """A clip in packets, of a segment and of a frame."""
     out = BytesIO()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(codecs.CODECS, live_codec.ID, live_codec.CODEC)
+        patch.setitem(codecs.CODECS, live_codec.CODEC.name, live_codec.CODEC)
         with mcz.LiveWriter(out, skeleton(), "stairs", frame_rate=Fraction(120)) as writer:
             for row in smooth(20).signals[0].values.round(2):
                 writer.push(row)

@@ -1,4 +1,4 @@
-"""The model of codec 13, counting the bits that it codes; see ``train_posewave.py``.
+"""The model of posewave, counting the bits that it codes; see ``train_posewave.py``.
 
 Models and coders that count have an array three times as long: behind what they know there is how
 many zeros, then how many ones each context has seen, at the same places.

@@ -55,8 +55,10 @@ def registry(text: str) -> dict[str, Any]:
             rows_after(text, "## Codecs\n"),
             *("id", "name", "version", "decodes", "groups", "resolutions"),
         ),
-        "reserved_codecs": [
-            int(id_) for id_ in re.findall(r"(?:id |; )(\d+), for a", _paragraph(text, "Reserved:"))
+        "presets": [
+            {"codec": int(codec), "id": id_, "preset": name}
+            for codec, names in rows_after(text, "**Presets.**")
+            for id_, name in enumerate(names.split(", "), 1)
         ],
         "point_sets": _keyed(rows_after(text, "**Points.**"), "id", "of", "points"),
         "source_formats": _keyed(
@@ -107,10 +109,6 @@ def _number(text: str) -> int:
         return 2 ** int(text.split("^")[1])
     value, _, unit = text.partition(" ")
     return int(value) * {"": 1, "KiB": 2**10, "MiB": 2**20}[unit]
-
-
-def _paragraph(text: str, start: str) -> str:
-    return text.partition(f"\n{start}")[2].partition("\n\n")[0]
 
 
 def document() -> str:

@@ -1,4 +1,4 @@
-"""A stream of codec 1, decoded step by step: the lines of SPEC.md, "A traced stream".
+"""A stream of lossless, decoded step by step: the lines of SPEC.md, "A traced stream".
 
 ``tools/spec_tables.py`` puts them into SPEC.md. The decoder here is SPEC.md's pseudo-code for plain
 integers, word for word; it shares nothing with that of the package.

@@ -1,4 +1,4 @@
-"""Train the start table of codec 12: the state in which its coder begins every stream.
+"""Train the start table of best: the state in which its coder begins every stream.
 
     python tools/train_best.py OUT.json FILE...
 

@@ -1,4 +1,4 @@
-"""Train the distributions of codec 14: how often each symbol comes in each context.
+"""Train the distributions of fast: how often each symbol comes in each context.
 
     python tools/train_fast.py OUT.json FILE...
 

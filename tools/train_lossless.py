@@ -1,4 +1,4 @@
-"""Train the start table of codec 1: the state in which its coder begins every stream.
+"""Train the start table of lossless: the state in which its coder begins every stream.
 
     python tools/train_lossless.py OUT.json FILE...
 

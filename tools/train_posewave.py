@@ -1,4 +1,4 @@
-"""Train the start tables of codec 13: what its model knows before a clip.
+"""Train the start tables of posewave: what its model knows before a clip.
 
     python tools/train_posewave.py OUT.json ROUNDS FILE...
 

@@ -5,64 +5,76 @@ from __future__ import annotations
 from collections.abc import Iterator, MutableMapping
 from dataclasses import replace
 from importlib import import_module
+from typing import NamedTuple
 
 from mcz.brief import among
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError, UnsupportedError
 
-# Where each codec lives. A module is called as its codec is, and imported when that is asked for:
-# importing all takes longer than most commands work.
+
+class Home(NamedTuple):
+    """The ids of a codec, and the module that has it."""
+
+    id: int
+    preset: int
+    module: str
+
+
+# A module is imported when its codec is asked for: importing all takes longer than most commands
+# work.
 HOMES = {
-    0: "raw",
-    1: "lossless.lossless",
-    2: "wavelet.mrdwt",
-    3: "curves.qbc",
-    4: "pca.pca",
-    5: "wavelet.dwt",
-    6: "wavelet.awt",
-    7: "spatial.lsdt_frame",
-    8: "spatial.lsdt_clip",
-    9: "spatial.mdtt",
-    10: "spatial.pca_rdo",
-    11: "online.online",
-    12: "lossless.best",
-    13: "posewave.posewave",
-    14: "lossless.fast",
+    "raw": Home(0, 0, "raw"),
+    "fast": Home(1, 0, "lossless.fast"),
+    "best": Home(2, 0, "lossless.best"),
+    "posewave": Home(3, 0, "posewave.posewave"),
+    "mrdwt": Home(16, 1, "wavelet.mrdwt"),
+    "dwt": Home(16, 2, "wavelet.dwt"),
+    "awt": Home(16, 3, "wavelet.awt"),
+    "qbc": Home(17, 0, "curves.qbc"),
+    "pca": Home(18, 0, "pca.pca"),
+    "lsdt-frame": Home(19, 0, "spatial.lsdt_frame"),
+    "lsdt-clip": Home(20, 1, "spatial.lsdt_clip"),
+    "mdtt": Home(20, 2, "spatial.mdtt"),
+    "pca-rdo": Home(20, 3, "spatial.pca_rdo"),
+    "online": Home(21, 0, "online.online"),
+    "lossless": Home(128, 0, "lossless.lossless"),
 }
+SHARED = {16: "wavelet"}  # ids of which no codec has the name of the bitstream
+PRIVATE = range(128, 256)  # ids that SPEC.md never gives a meaning
 
 
-class Codecs(MutableMapping[int, Codec]):
-    """The codecs by their ids."""
+class Codecs(MutableMapping[str, Codec]):
+    """The codecs by their names."""
 
     def __init__(self) -> None:
         self._homes = dict(HOMES)
-        self._loaded: dict[int, Codec] = {}
+        self._loaded: dict[str, Codec] = {}
 
-    def __getitem__(self, id_: int) -> Codec:
-        if id_ not in self._loaded:
-            codec: Codec = import_module(f"{__name__}.{self._homes[id_]}").CODEC
-            self._loaded[id_] = codec
-        return self._loaded[id_]
+    def __getitem__(self, name: str) -> Codec:
+        if name not in self._loaded:
+            codec: Codec = import_module(f"{__name__}.{self._homes[name].module}").CODEC
+            self._loaded[name] = codec
+        return self._loaded[name]
 
-    def __setitem__(self, id_: int, codec: Codec) -> None:
-        self._loaded[id_] = codec
+    def __setitem__(self, name: str, codec: Codec) -> None:
+        self._homes[name] = Home(codec.id, codec.preset, codec.encode.__module__)
+        self._loaded[name] = codec
 
-    def __delitem__(self, id_: int) -> None:
-        del self._loaded[id_]
-        self._homes.pop(id_, None)
+    def __delitem__(self, name: str) -> None:
+        del self._homes[name]
+        self._loaded.pop(name, None)
 
-    def __iter__(self) -> Iterator[int]:
-        return iter({**self._homes, **self._loaded})
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._homes)
 
     def __len__(self) -> int:
-        return len({**self._homes, **self._loaded})
+        return len(self._homes)
 
-    def names(self) -> dict[str, int]:
-        """The id of each codec by its name; none of them is imported for it."""
-        named = {
-            home.rpartition(".")[2].replace("_", "-"): id_ for id_, home in self._homes.items()
-        }
-        return named | {codec.name: id_ for id_, codec in self._loaded.items()}
+    def find(self, id_: int, preset: int) -> str | None:
+        """The name of the codec of these ids, or of the first that decodes ``id_``."""
+        names = [name for name, home in self._homes.items() if home.id == id_]
+        own = (name for name in names if self._homes[name].preset == preset)
+        return next(own, names[0] if names else None)
 
 
 CODECS = Codecs()
@@ -73,12 +85,11 @@ ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 def by_name(name: str) -> Codec:
     """The codec called ``name``, or by a name of ``ALIASES``; raises OptionError for another."""
-    names = CODECS.names()
-    if ALIASES.get(name, name) not in names:
+    if ALIASES.get(name, name) not in CODECS:
         raise OptionError(
-            f"no codec is called {name!r}; there are: {among([*ALIASES, *names], name)}"
+            f"no codec is called {name!r}; there are: {among([*ALIASES, *CODECS], name)}"
         )
-    return CODECS[names[ALIASES.get(name, name)]]
+    return CODECS[ALIASES.get(name, name)]
 
 
 def chosen(codec: str | None, effort: str | None) -> str:
@@ -90,13 +101,24 @@ def chosen(codec: str | None, effort: str | None) -> str:
     return codec or EFFORTS.get(effort or "", DEFAULT)
 
 
-def by_id(id_: int, version: int) -> Codec:
-    """The codec with this id; raises UnsupportedError where it or its version is not known."""
-    codec = CODECS.get(id_)
-    if codec is None:
+def bitstream(id_: int) -> str | None:
+    """The name of the bitstream of a codec, None where it is not known."""
+    return SHARED.get(id_) or CODECS.find(id_, 0)
+
+
+def by_id(id_: int, version: int, preset: int) -> Codec:
+    """The codec with this id; raises UnsupportedError where it or its version is not known.
+
+    The codec has the preset that is asked for, where that is not known as one of the bitstream.
+    """
+    name = CODECS.find(id_, preset)
+    if name is None:
         raise UnsupportedError(f"codec {id_} is unknown")  # CODEC-03, CONV-16
+    codec = CODECS[name]
     if version > codec.version:  # CODEC-04, HEAD-05
         raise UnsupportedError(f"codec {codec.name}: version {version}, known is {codec.version}")
+    if preset != codec.preset:  # CODEC-07
+        codec = replace(codec, preset=preset, name=bitstream(id_) or codec.name)
     if version < codec.version:
         return replace(codec, version=version, decode=codec.earlier.get(version, codec.decode))
     return codec

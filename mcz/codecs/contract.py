@@ -151,7 +151,8 @@ class Encoded:
 
     ``models`` are written before the clip that refers to them, once a file. ``known`` are those of
     SPEC.md's annexes that it refers to: a file of the archive profile has them, too. ``version``
-    is the least of the codec's that reads it (None: the codec's own).
+    is the least of the codec's that reads it (None: the codec's own). ``preset`` is that of
+    CLIP (0: the codec's own).
     """
 
     header: bytes
@@ -160,6 +161,7 @@ class Encoded:
     models: tuple[Model, ...] = ()
     known: tuple[Model, ...] = ()
     version: int | None = None
+    preset: int = 0
 
 
 Encode = Callable[[SignalSource, Params], Encoded]
@@ -198,13 +200,14 @@ Recode = Callable[[Recoding], Iterator[tuple[bytes, ...]]]
 class LiveEncoder(Protocol):
     """Codes frames as they come, each into the one stream of a segment of one frame.
 
-    ``header``, ``models`` and ``version``, as those of ``Encoded``, are known before the first
-    frame. ``n_resolutions`` is 1, and there is one group.
+    ``header``, ``models``, ``version`` and ``preset``, as those of ``Encoded``, are known before
+    the first frame. ``n_resolutions`` is 1, and there is one group.
     """
 
     header: bytes
     models: tuple[Model, ...]
     version: int | None
+    preset: int = 0
 
     def push(
         self, values: NDArray[np.float64], valid: NDArray[np.bool_] | None = None
@@ -264,6 +267,9 @@ Preview = Callable[[bytes, Layout, Sequence[Span]], NDArray[np.int64]]
 class Codec:
     """One row of the codec table.
 
+    Codecs of one ``id`` have one bitstream; ``preset`` tells which of them made a clip, and 0 that
+    none of those that are registered did.
+
     ``decode`` returns int64 ordinals or binary64 values, as ``domain`` says, of shape
     (rows, channels of the requested groups in the order requested). It checks the header also where
     no frame is requested.
@@ -319,6 +325,7 @@ class Codec:
     live_options: Params = field(default_factory=dict)
     earlier: Mapping[int, Decode] = field(default_factory=dict)
     hash_optional: bool = False
+    preset: int = 0
 
     def has(self, name: str) -> bool:
         """Whether it has a parameter of that name."""

@@ -76,7 +76,7 @@ def check_known_answer(codec: Codec) -> None:
     answer = ANSWERS.get(codec.name)
     if codec.name in _proved or answer is None:
         return
-    listed = CODECS.get(codec.id)
+    listed = CODECS.get(codec.name)
     if listed is None or codec.decode not in (listed.decode, *listed.earlier.values()):
         return
     with _LOCK:

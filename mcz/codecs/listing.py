@@ -16,6 +16,7 @@ def document(codec: Codec) -> Settings:
     return {
         "name": codec.name,
         "id": codec.id,
+        "preset": codec.preset,
         "version": codec.version,
         "lossless": codec.lossless,
         "positions": codec.positions,

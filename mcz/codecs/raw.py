@@ -1,4 +1,4 @@
-"""Codec 0, ``raw``: grid ordinals in as few whole bytes as they need.
+"""Codec raw, ``raw``: grid ordinals in as few whole bytes as they need.
 
 SPEC.md, "Codec 0: raw", is normative; the names below are its field names.
 

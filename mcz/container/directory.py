@@ -51,6 +51,7 @@ class SignalRow:
     n_channels: int
     samples_per_frame: int
     codec: int
+    preset: int
     codec_version: int
     skip: int = 0  # stored frames before the first that the clip shows
     spare: int = 0  # stored frames after the last
@@ -72,7 +73,7 @@ def _signal_row(signal: Any, clip: Any, where: str) -> SignalRow:
     if sum(cut) + clip.n_frames > MAX_COUNT:  # CLIP-20
         raise FormatError(f"skip and spare {cut} of {clip.n_frames} frames", where=where)
     n_channels = sum(run.n_channels for run in signal.grids)
-    codec = signal.codec, signal.codec_version
+    codec = signal.codec, signal.preset, signal.codec_version
     return SignalRow(n_channels, signal.samples_per_frame, *codec, *cut)
 
 

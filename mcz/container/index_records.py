@@ -96,6 +96,7 @@ class IndexedSignal(Record):
     skip: int = field(UVARINT, "as in CLIP")
     spare: int = field(UVARINT, "as in CLIP")
     codec: int = field(UVARINT, "codec id")
+    preset: int = field(UVARINT, "as in CLIP")
     codec_version: int = field(UVARINT, "codec version")
 
 

@@ -244,6 +244,7 @@ class Signal(Record):
     spare: int = field(UVARINT, "stored frames after the last that is shown", default=0)
     grids: list[GridRun] = field(counted(GridRun), "number grids, in column order")
     codec: int = field(UVARINT, "codec id")
+    preset: int = field(Int8ul, "preset id, ignored in decoding", default=0)
     codec_version: int = field(UVARINT, "codec version")
     header: bytes = field(SIZED, "the codec's own header")
     groups: Groups = field(Groups, "partition of the channels")

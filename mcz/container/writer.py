@@ -187,7 +187,7 @@ class Writer:
         self._new_name(name, self.directory.clips)
         chunk = self.chunk(ChunkType.CLIP, build(record, f"clip {name!r}"))
         signals = tuple(
-            SignalRow(n, s.samples_per_frame, s.codec, s.codec_version, s.skip, s.spare)
+            SignalRow(n, s.samples_per_frame, s.codec, s.preset, s.codec_version, s.skip, s.spare)
             for n, s in zip(n_channels, record.signals, strict=True)
         )
         rate = record.rate_numerator, record.rate_denominator

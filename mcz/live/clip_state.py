@@ -51,7 +51,7 @@ def needs(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
         yield ChunkType.SRCE, fields.source.template
     for signal in fields.signals:
         with suppress(FormatError):  # it is said when the signal is read
-            uses = by_id(signal.codec, signal.codec_version).uses
+            uses = by_id(signal.codec, signal.codec_version, signal.preset).uses
             for id_ in () if uses is None else uses(bytes(signal.header)):
                 yield ChunkType.MODL, id_
 

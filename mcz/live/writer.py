@@ -134,8 +134,8 @@ class LiveWriter:
             metadata = dict(metadata) | {"source-note": SEPARATOR.join(filter(None, (NOTE, note)))}
         motion = Motion(coded, (signal,), frame_rate, frame_rate_exact, name, metadata)
         self._encoder, self._decoder = _coders(self.codec, motion, self.options, self._writer)
-        header, models = self._encoder.header, self._encoder.models
-        encoded = Encoded(header, iter(()), models=models, version=self._encoder.version)
+        live = self._encoder
+        encoded = Encoded(live.header, iter(()), 1, live.models, (), live.version, live.preset)
         prepared = Prepared(motion, bases, derives)
         plan = plan_open_clip(prepared, self.codec, self.options, encoded, self._writer.profile)
         begin_open_clip(self._writer, plan, first_number)

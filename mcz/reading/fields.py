@@ -124,7 +124,7 @@ def _duration(clip: Clip) -> Value:
 def _lossless(clip: Clip) -> Value:
     """Whether every signal's codec is; missing where one is not known."""
     try:
-        return all(by_id(s.codec, s.codec_version).lossless for s in _row(clip).signals)
+        return all(by_id(s.codec, s.codec_version, s.preset).lossless for s in _row(clip).signals)
     except UnsupportedError:
         return None
 

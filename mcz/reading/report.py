@@ -129,6 +129,7 @@ def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
                 "channels": s.layout.n_channels,
                 "samples_per_frame": s.layout.samples_per_frame,
                 "id": s.codec_id,
+                "preset": s.preset,
                 "version": s.codec_version,
                 "header": s.header.hex(),
                 "segments": len(s.rows),

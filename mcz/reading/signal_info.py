@@ -37,6 +37,7 @@ class SignalInfo:
     channels: tuple[Channel, ...] | None
     grids: tuple[Grid, ...]
     codec_id: int
+    preset: int
     codec_version: int
     header: bytes
     layout: Layout
@@ -59,7 +60,7 @@ class SignalInfo:
     @property
     def codec(self) -> Codec:
         """Raises UnsupportedError where this reader lacks the codec."""
-        return by_id(self.codec_id, self.codec_version)
+        return by_id(self.codec_id, self.codec_version, self.preset)
 
     @property
     def exact(self) -> tuple[int, ...]:
@@ -126,6 +127,7 @@ def read_signal(
         channels,
         layout.grids,
         own.codec,
+        own.preset,
         own.codec_version,
         bytes(own.header),
         layout,
@@ -162,7 +164,8 @@ def check_roles(signals: Sequence[payloads.Signal], where: str) -> None:
 def _check_times(info: SignalInfo, where: str) -> None:
     """Raise FormatError for a signal that cannot be one of times."""
     fault = times_form_fault(info)
-    if not fault and info.codec_id in CODECS and not CODECS[info.codec_id].lossless:  # ROLE-03
+    codec = CODECS.find(info.codec_id, info.preset)
+    if not fault and codec is not None and not CODECS[codec].lossless:  # ROLE-03
         fault = f"codec {info.codec_id} is lossy"
     if fault:
         raise FormatError(f"{where}: no times: {fault}")

@@ -162,7 +162,7 @@ class StoredClip:
         """Name of the codec of the motion signal, ``codec N`` where it is unknown."""
         row = self._row.signals[0]
         try:
-            return by_id(row.codec, row.codec_version).name
+            return by_id(row.codec, row.codec_version, row.preset).name
         except UnsupportedError:
             return f"codec {row.codec}"
 

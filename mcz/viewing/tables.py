@@ -37,11 +37,10 @@ def tables_for(file: File) -> set[str]:
     """The names of the annexes that decoding any clip of ``file`` may need."""
     from mcz.codecs import CODECS
 
-    names = {id_: name for name, id_ in CODECS.names().items()}
     found = set(ALWAYS)
     for row in file.container.directory.clips.values():
         for signal in row.signals:
-            found.update(TABLES.get(names.get(signal.codec, ""), ()))
+            found.update(TABLES.get(CODECS.find(signal.codec, signal.preset) or "", ()))
     for clip in file:
         try:
             models = {id_ for signal in clip.signals for id_ in models_used(signal)}

@@ -186,6 +186,7 @@ def _signal_record(plan: SignalPlan) -> payloads.Signal:
         samples_per_frame=signal.samples_per_frame,
         grids=payloads.grid_runs(signal.grids),
         codec=codec.id,
+        preset=encoded.preset or codec.preset,
         codec_version=codec.version if encoded.version is None else encoded.version,
         header=encoded.header,
         groups=payloads.Groups(kind=kind, sizes=sizes),

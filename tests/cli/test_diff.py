@@ -159,7 +159,7 @@ def test_bad_files_are_refused(folder: Path, moved: Path, call: Call) -> None:
 
 
 def test_info_shows_the_record(folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, overlap_codec.CODEC)
+    monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, overlap_codec.CODEC)
     arguments = "-o", folder / "x.mcz", "--codec", "overlap", "--param", "length=20"
     assert call("encode", folder / "walk.amc", *arguments)[0] == 0
     clip = call("info", folder / "x.mcz", "--json").document["clips"][0]

@@ -56,7 +56,7 @@ class Coder:
         return decode(b"", layout, [Span(0, n_rows)], request, lambda s, r, g: stream)
 
     def outcome(self, stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> object:
-        """Rows, or that they are refused; the same by both decoders of codec 14."""
+        """Rows, or that they are refused; the same by both decoders of fast."""
         found: list[object] = []
         for lacking in (False, True) if self.name == "fast" else (False,):
             with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""Codec 6, ``awt``: the allocation that annealing finds, and the published figures."""
+"""Preset ``awt``: the allocation that annealing finds, and the published figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Codec 12, ``best``: links, echoes, degenerate channels."""
+"""Codec mrdwt, ``best``: links, echoes, degenerate channels."""
 
 from __future__ import annotations
 

@@ -30,19 +30,19 @@ EVERY = pytest.mark.parametrize("name", CASES)
 FINITE = pytest.mark.parametrize("name", [n for n in CASES if n != "overlap"])
 LOSSY = pytest.mark.parametrize("name", [n for n in CASES if CASES[n].error > 1e-9])
 LOSSLESS = ("raw", "lossless", "fast", "best")
-CODEC = pytest.mark.parametrize("name", CODECS.names())
-LOSSY_CODEC = pytest.mark.parametrize("name", [n for n in CODECS.names() if n not in LOSSLESS])
+CODEC = pytest.mark.parametrize("name", CODECS)
+LOSSY_CODEC = pytest.mark.parametrize("name", [n for n in CODECS if n not in LOSSLESS])
 
 
 @pytest.fixture(autouse=True, scope="module")
 def overlap() -> Iterator[None]:
-    CODECS[overlap_codec.ID] = overlap_codec.CODEC
+    CODECS[overlap_codec.CODEC.name] = overlap_codec.CODEC
     yield
-    del CODECS[overlap_codec.ID]
+    del CODECS[overlap_codec.CODEC.name]
 
 
 def test_every_codec_has_a_case() -> None:
-    assert {case.name for case in CASES.values()} == set(CODECS.names())
+    assert {case.name for case in CASES.values()} == set(CODECS)
 
 
 def decoded(motion: Motion, case: Case, **params: Any) -> np.ndarray:
@@ -394,7 +394,7 @@ def test_10000_channels(
 # Parameters
 
 
-DIALED = [name for name in CODECS.names() if by_name(name).dial]
+DIALED = [name for name in CODECS if by_name(name).dial]
 
 
 @pytest.mark.parametrize("name", DIALED)

@@ -21,7 +21,7 @@ from tests.repair import flipped, flips, joined, memory_below, parts_of, replace
 NAMES = [name for name in CASES if name != "overlap"]
 EVERY = pytest.mark.parametrize("name", NAMES)
 LOSSY = pytest.mark.parametrize("name", [name for name in NAMES if CASES[name].error])
-CODEC = pytest.mark.parametrize("name", CODECS.names())
+CODEC = pytest.mark.parametrize("name", CODECS)
 REFUSED = ("FormatError", "TruncatedError", "LimitError")
 
 

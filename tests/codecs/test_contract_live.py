@@ -38,11 +38,11 @@ Pushed = list[tuple[bytes, bool]]
 
 
 def test_every_live_codec_has_a_case() -> None:
-    live = {name for name in CODECS.names() if by_name(name).live}
+    live = {name for name in CODECS if by_name(name).live}
     assert (
         {case[0] for case in CASES.values()}
         == live
-        == {name for name in CODECS.names() if by_name(name).follow}
+        == {name for name in CODECS if by_name(name).follow}
     )
 
 

@@ -1,4 +1,4 @@
-"""Codec 14, ``fast``: forms of its streams, tables, sizes."""
+"""Codec lossless, ``fast``: forms of its streams, tables, sizes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures of Khan 2014 and 2016 for codecs 2 to 6, met with fewer bytes."""
+"""The figures of Khan 2014 and 2016 for mrdwt, dwt, awt, qbc and pca, met with fewer bytes."""
 
 from __future__ import annotations
 

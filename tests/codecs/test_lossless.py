@@ -1,4 +1,4 @@
-"""Forms of the codecs of ordinals: counts and multiples behind floats, and tables of codec 1."""
+"""Forms of the codecs of ordinals: counts and multiples behind floats, and tables of lossless."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FORCE = Skeleton((Joint("plate", channels=(Channel("", "force", "V"),)),))
 
 
 def hidden() -> dict[str, tuple[Grid, np.ndarray, int, int]]:
-    """Columns that are small integers in disguise: grid, ordinals, bytes, version of codec 1."""
+    """Columns that are small integers in disguise: grid, ordinals, bytes, version of lossless."""
     random = np.random.default_rng(3)
     walk = 32768 + random.integers(-40, 41, 500).cumsum()
     few, some = random.integers(-2000, 2000, 500), random.integers(-500, 500, 500)

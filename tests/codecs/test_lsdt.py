@@ -1,4 +1,4 @@
-"""Codecs 7 and 8, ``lsdt-frame`` and ``lsdt-clip``: bounds, segments, bases, live coding."""
+"""Codecs ``lsdt-frame`` and ``lsdt-clip``: bounds, segments, bases, live coding."""
 
 from __future__ import annotations
 

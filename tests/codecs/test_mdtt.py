@@ -1,4 +1,4 @@
-"""Codec 9, ``mdtt``, and what it shares with codec 10: bounds, ranks, odd clips, hostile bytes."""
+"""Preset ``mdtt``, and what it shares with pca-rdo: bounds, ranks, odd clips, hostile bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Codecs 2 and 5, ``mrdwt`` and ``dwt``: bounds, wavelets, segments, options, headers."""
+"""Presets ``mrdwt`` and ``dwt``: bounds, wavelets, segments, options, headers."""
 
 from __future__ import annotations
 
@@ -351,7 +351,7 @@ def test_a_cut_file_refuses_what_it_no_longer_holds() -> None:
     assert coded.read(0, 4, changes=cut).tobytes() == coded.read(0, 4).tobytes()
 
 
-# Codec 5, which has its streams
+# Codec dwt, which has its streams
 
 
 def test_dwt_is_mrdwt_with_a_flat_threshold() -> None:

@@ -16,7 +16,7 @@ from tests.motions import smooth
 
 @pytest.fixture(autouse=True)
 def overlap(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, overlap_codec.CODEC)
+    monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, overlap_codec.CODEC)
 
 
 def encoded(motion: mcz.Motion, **params: object) -> bytes:
@@ -45,7 +45,7 @@ def test_unknown_codec_makes_only_that_clip_unsupported(monkeypatch: pytest.Monk
     write_clip(writer, smooth(name="other"), overlap_codec.CODEC, {})
     write_clip(writer, smooth(name="newer"), replace(codecs.by_name("raw"), version=9), {})
     writer.finish()
-    monkeypatch.delitem(codecs.CODECS, overlap_codec.ID)
+    monkeypatch.delitem(codecs.CODECS, overlap_codec.CODEC.name)
     with mcz.open(out.getvalue()) as file:
         assert list(file.clips) == ["smooth", "other", "newer"]
         assert file.clips["other"].codec == "codec 251"

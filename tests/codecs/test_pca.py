@@ -1,4 +1,4 @@
-"""Codec 4, ``pca``: components, bounds, steps, and the published figures."""
+"""Codec 18, ``pca``: components, bounds, steps, and the published figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Codec 10, ``pca-rdo``: mean, components and courses. See test_mdtt.py for what both share."""
+"""Preset ``pca-rdo``: mean, components and courses. See test_mdtt.py for what both share."""
 
 from __future__ import annotations
 

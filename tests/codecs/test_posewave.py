@@ -1,4 +1,4 @@
-"""Codec 13, ``posewave``: rows in the metric of the pose."""
+"""Codec qbc, ``posewave``: rows in the metric of the pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contacts of codec 13: feet keep their place, straight legs, points that cannot, hostile bytes."""
+"""Contacts of posewave: feet keep their place, straight legs, points that cannot, hostile bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Codec 13, ``posewave``: joints that are coded exactly beside the others."""
+"""Codec qbc, ``posewave``: joints that are coded exactly beside the others."""
 
 from __future__ import annotations
 

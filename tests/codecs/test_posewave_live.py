@@ -1,4 +1,4 @@
-"""Codec 13, ``posewave``, frame by frame: segments that go on, what is lost, what is promised."""
+"""Codec qbc, ``posewave``, frame by frame: segments that go on, what is lost, what is promised."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pose metric of codec 13: against numeric Jacobians, its factor, and its odd cases."""
+"""The pose metric of posewave: against numeric Jacobians, its factor, and its odd cases."""
 
 from __future__ import annotations
 

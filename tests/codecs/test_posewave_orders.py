@@ -1,4 +1,4 @@
-"""Axis orders of codec 13: rotations stay, and the source's angles come back."""
+"""Axis orders of posewave: rotations stay, and the source's angles come back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Codec 13 on joints that turn by rotation vectors and quaternions: version 1."""
+"""Codec posewave on joints that turn by rotation vectors and quaternions: version 1."""
 
 from __future__ import annotations
 

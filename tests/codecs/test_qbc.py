@@ -1,4 +1,4 @@
-"""Codec 3, ``qbc``: the bound, breaks, segments, streams, published figures."""
+"""Codec 17, ``qbc``: the bound, breaks, segments, streams, published figures."""
 
 from __future__ import annotations
 

@@ -218,7 +218,7 @@ def test_no_text_of_a_file_becomes_markup(name: str, tmp_path: Path, call: Call)
 
 
 def test_every_codec_has_its_tables() -> None:
-    assert TABLES.keys() == CODECS.names().keys()
+    assert TABLES.keys() == CODECS.keys()
     for names in TABLES.values():
         for name in names:
             assert annex_bytes(name)
@@ -233,7 +233,7 @@ def test_what_a_codec_needs_is_there(tmp_path: Path) -> None:
 
     motion = smooth(40)
     documents = []
-    for number, name in enumerate(CODECS.names()):
+    for number, name in enumerate(CODECS):
         mcz.write(motion, tmp_path / "a.mcz", name, force=True)
         data = (tmp_path / "a.mcz").read_bytes()
         with mcz.open(data) as file:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.codecs import CODECS
+from mcz.codecs import HOMES
 from mcz.container import payloads
 from mcz.container.packets import FRAME, NUMBERED, SEGMENT, Packet
 from mcz.container.segments import parse_header
@@ -182,7 +182,11 @@ class Mutation:
                 [(fields, n) for n in CLIP_NUMBERS] + 2 * [(signal, n) for n in SIGNAL_NUMBERS]
             )
             near = self._near(getattr(of, name))
-            setattr(of, name, self.rng.choice(list(CODECS)) if name == "codec" else near)
+            setattr(
+                of,
+                name,
+                self.rng.choice([home.id for home in HOMES.values()]) if name == "codec" else near,
+            )
 
         return self._clip(pieces, edit)
 

@@ -1,4 +1,4 @@
-// SPEC.md, "Axis orders": joints of codec 13 that are coded as Euler angles in another order of axes
+// SPEC.md, "Axis orders": joints of posewave that are coded as Euler angles in another order of axes
 // than the source has. All bits count here.
 
 import { Refused } from "./errors.js";

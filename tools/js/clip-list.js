@@ -42,7 +42,7 @@ class ClipList {
       nFrames: row.nFrames,
       frameRate: row.frameRate,
       rate: rateOf(row.frameRate),
-      codecs: row.signals.map(({ codec }) => codecLabel(codec)),
+      codecs: row.signals.map(codecLabel),
       nChannels: row.signals[0].nChannels,
       skeletonId: row.skeletonId,
       bytes: row.bytes,

@@ -51,6 +51,7 @@ const GROUPS_LISTED = 3;
  * @property {{nChannels: number, grid: object}[]} gridRuns
  * @property {boolean} integer has channels, and all grids are INTEGER: its values are i64
  * @property {number} codec id
+ * @property {number} preset of the codec, a name alone
  * @property {number} codecVersion
  * @property {Uint8Array} header of the codec
  * @property {number[]} groupSizes channels of each group, in column order
@@ -173,6 +174,7 @@ function readSignal(reader, index, skeleton, limits) {
   const spare = reader.varint();
   const gridRuns = readGrids(reader, channels.length);
   const codec = reader.varint();
+  const preset = reader.u8();
   const codecVersion = reader.varint();
   const header = reader.sized();
   const groupSizes = readGroups(reader, channels, ownChannels);
@@ -192,6 +194,7 @@ function readSignal(reader, index, skeleton, limits) {
     gridRuns,
     integer: gridRuns.length > 0 && gridRuns.every(({ grid }) => grid.kind === INTEGER),
     codec,
+    preset,
     codecVersion,
     header,
     groupSizes,

@@ -31,7 +31,7 @@ const MOST_NAMED = 2 ** 20; // clips whose names are compared at once, when a fi
  * @property {number} nFrames
  * @property {{numerator: number, denominator: number}} frameRate
  * @property {{nChannels: number, samplesPerFrame: number, skip: number, spare: number,
- *   codec: number, codecVersion: number}[]} signals
+ *   codec: number, preset: number, codecVersion: number}[]} signals
  * @property {Place} place of CLIP
  * @property {Place | null} end that of CEND
  * @property {number} bytes of the payloads of its segments

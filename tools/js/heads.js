@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 1: lossless": the heads of channels, which codec 14 has, too.
+// SPEC.md, "Codec 128: lossless": the heads of channels, which fast has, too.
 
 import {
   BINARY32,
@@ -18,7 +18,7 @@ export const COPY = 2;
 // Forms; 1 to 15 are classes of so many decimal digits.
 export const PLAIN = 0;
 export const MULTIPLES = 32;
-export const PRODUCTS = 33; // not in version 0 of codec 1
+export const PRODUCTS = 33; // not in version 0 of lossless
 export const COUNTS = 34; // nor is this
 const CLASSES_24 = 88;
 const CLASSES_53 = 117;

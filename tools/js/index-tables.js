@@ -30,6 +30,7 @@ export const TABLES = {
     skip: "varint",
     spare: "varint",
     codec: "varint",
+    preset: "varint",
     codecVersion: "varint",
   },
   segments: {

@@ -70,7 +70,7 @@ function factsOf({ name, nFrames, frameRate, skeleton, metadata, source, quality
     quality,
     signals: signals.map((signal) => ({
       name: signal.name,
-      codec: codecLabel(signal.codec),
+      codec: codecLabel(signal),
       nChannels: signal.channels.length,
       samplesPerFrame: signal.samplesPerFrame,
       nResolutions: signal.nResolutions,

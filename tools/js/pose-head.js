@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 13: posewave", "The head": which channels are kept, and a number of each.
+// SPEC.md, "Codec 3: posewave", "The head": which channels are kept, and a number of each.
 
 import { Refused } from "./errors.js";
 

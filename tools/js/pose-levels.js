@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 13: posewave": the levels of a segment, from rows in the metric to frames.
+// SPEC.md, "Codec 3: posewave": the levels of a segment, from rows in the metric to frames.
 
 import { clamp } from "./entropy.js";
 import { halvings, join } from "./lifting.js";

@@ -74,7 +74,7 @@ function compare(clip, row) {
 }
 
 function sameSignal(signal, listed) {
-  const fields = ["samplesPerFrame", "skip", "spare", "codec", "codecVersion"];
+  const fields = ["samplesPerFrame", "skip", "spare", "codec", "preset", "codecVersion"];
   const sameChannels = signal.channels.length === listed.nChannels;
   return sameChannels && fields.every((field) => signal[field] === listed[field]);
 }
@@ -394,13 +394,13 @@ function sizesOf(segment, signal) {
 }
 
 function factsOf(signal) {
-  const { name, index, role, of, codec, channels, gridRuns, integer, ownChannels } = signal;
+  const { name, index, role, of, channels, gridRuns, integer, ownChannels } = signal;
   return {
     name,
     index,
     role,
     of,
-    codec: codecLabel(codec),
+    codec: codecLabel(signal),
     nChannels: channels.length,
     channels,
     units: [...new Set(channels.map(({ unit }) => unit))],

@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 12: best", "Regressions".
+// SPEC.md, "Codec 2: best", "Regressions".
 
 const LIMIT = 2 ** 20;
 const FLOOR = 1e-6;

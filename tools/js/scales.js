@@ -1,6 +1,6 @@
-// First scales, quantizer steps and decimals, as the codecs 2 to 6 (and Space, steps) say them.
+// First scales, quantizer steps and decimals, as wavelet, qbc and pca (and Space, steps) say them.
 
-/** Largest magnitude of an integer of the codecs 2 to 11. */
+/** Largest magnitude of an integer of the published methods. */
 export const GREATEST = 2 ** 40;
 
 /** Where `decimals` is this, integers are multiples of a step. */

@@ -175,7 +175,7 @@ export function sumOfRows(out, n, factors, starts, table) {
   }
 }
 
-/** Adds the coefficients of frames to predictions, as the codecs 7 and 11 do. */
+/** Adds the coefficients of frames to predictions, as the lsdt-frame and online do. */
 export class FrameAdder {
   /** @param {Space} space */
   constructor({ matrices, weights, nRows }) {

@@ -58,9 +58,9 @@ function rowFrom(clip) {
     nFrames,
     frameRate,
     signals: clip.signals.map(({ channels, ...signal }) => {
-      const { samplesPerFrame, skip, spare, codec, codecVersion } = signal;
+      const { samplesPerFrame, skip, spare, codec, preset, codecVersion } = signal;
       const nChannels = channels.length;
-      return { nChannels, samplesPerFrame, skip, spare, codec, codecVersion };
+      return { nChannels, samplesPerFrame, skip, spare, codec, preset, codecVersion };
     }),
     place: { type: "CLIP", offset, length: payloadSize },
     end: end && { type: "CEND", offset: end.offset, length: end.length },

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mcz.codecs import CODECS
+from mcz.codecs import CODECS, bitstream
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, parse_header
 from mcz.container.limits import BASE
@@ -18,17 +18,17 @@ OPEN = 2**64 - 1
 
 
 def codecs_of(vector: Vector) -> list[str]:
-    """The names of the codecs of the clips, sorted; of a folder where a CLIP cannot be parsed."""
+    """The bitstreams of the clips, sorted; of a folder where a CLIP cannot be parsed."""
     found: set[str] = set()
     for payload in _payloads(vector.data, b"CLIP"):
         try:
             fields = parse(payloads.Clip, payload, "CLIP")
         except MczError:
             continue
-        found |= {CODECS[s.codec].name for s in fields.signals if s.codec in CODECS}
+        found |= {name for s in fields.signals if (name := bitstream(s.codec))}
     folder = vector.name.split("/")[1]
-    if not found and folder in {codec.name for codec in CODECS.values()}:
-        found.add(folder)
+    if not found and folder in CODECS:
+        found.add(bitstream(CODECS[folder].id) or "")
     return sorted(found)
 
 

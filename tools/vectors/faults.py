@@ -16,16 +16,12 @@ MOST_CHECKSUMS = 3  # vectors in which nothing is wrong but a checksum, beside t
 PARTS = "invalid/parts/"  # is about checksums
 SHARED = "*"  # the folder of rows that count in every folder of a codec
 KIN = {
-    "dwt": "mrdwt",
-    "awt": "mrdwt",
-    "mdtt": "lsdt-clip",
     "pca-rdo": "lsdt-clip",
     "fast": "lossless",
     "best": "lossless",
 }
 CODECS = tuple(
-    "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online "
-    "best posewave fast".split()
+    "raw lossless mrdwt qbc pca lsdt-frame lsdt-clip pca-rdo online best posewave fast".split()
 )
 
 

@@ -1,22 +1,22 @@
-"""Which vectors show the rules of codecs 0 to 6 and of what they share, beside those of breaks."""
+"""The tables of ``requirements`` for lossless codecs, wavelet, qbc, pca, and what they share."""
 
 from __future__ import annotations
 
 VECTORS: dict[str, tuple[str, ...]] = {
     "CODEC-01": ("invalid/*/integers",),
     "CODEC-02": ("valid/random/*", "valid/*/*rounding", "valid/mrdwt/inline-*", "invalid/*/hash-*"),
-    "CODEC-03": ("uncommon/container/unknown-codec",),
+    "CODEC-03": ("uncommon/container/*-codec",),
     "CODEC-04": ("uncommon/*/newer-version", "uncommon/container/newer-codec"),
     "CODEC-05": (
         "invalid/*/frames-0-header",
         "invalid/mrdwt/header-*",
         "invalid/qbc/header-*",
         "invalid/pca/header-*",
-        "invalid/?wt/header-*",
         "invalid/qbc/resolutions*",
         "invalid/*/frames-varint",
         "invalid/*/wavelet-*",
     ),
+    "CODEC-07": ("valid/container/preset-*", "valid/*/scaled", "valid/online/preset-*"),
     "RAW-02": ("invalid/raw/width-*",),
     "RAW-03": ("valid/raw/*",),
     "RAW-04": ("invalid/raw/*",),
@@ -157,8 +157,6 @@ VECTORS: dict[str, tuple[str, ...]] = {
         "invalid/mrdwt/byte-for-nothing",
     ),
     "MRDWT-35": ("valid/mrdwt/*", "invalid/mrdwt/hash-near"),
-    "DWT-01": ("valid/dwt/*", "invalid/dwt/*"),
-    "AWT-01": ("valid/awt/*", "invalid/awt/*"),
     "QBC-02": ("invalid/qbc/delta-*", "valid/qbc/delta-*"),
     "QBC-03": ("invalid/qbc/decimals-*", "valid/qbc/decimals-*"),
     "QBC-04": ("invalid/qbc/*step-*", "valid/qbc/step-*"),

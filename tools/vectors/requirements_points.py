@@ -1,4 +1,4 @@
-"""The tables of ``requirements`` for codecs 7 to 11, the post filter, and what is computed."""
+"""The tables of ``requirements`` for codecs of points, the post filter, and what is computed."""
 
 from __future__ import annotations
 
@@ -35,9 +35,6 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "FRAME-04": ("valid/lsdt-frame/segments-*", "valid/lsdt-frame/cut-*"),
     "FRAME-05": ("invalid/lsdt-frame/*",),
     "FRAME-08": ("valid/lsdt-frame/*",),
-    "LCLIP-01": ("valid/lsdt-clip/*", "invalid/lsdt-clip/*"),
-    "MDTT-01": ("valid/mdtt/*", "invalid/mdtt/*"),
-    "RDO-01": ("valid/pca-rdo/*", "invalid/pca-rdo/*"),
     "ONLINE-08": ("invalid/online/unit-*", "invalid/online/head-*", "invalid/online/size-*"),
     "ONLINE-09": ("invalid/online/kind-3-*",),
     "ONLINE-13": ("invalid/online/first-*tr", "invalid/online/live-fresh-*"),

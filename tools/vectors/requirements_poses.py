@@ -1,4 +1,4 @@
-"""Which vectors show the rules of codec 13 and of what it is made of."""
+"""Which vectors show the rules of posewave and of what it is made of."""
 
 from __future__ import annotations
 

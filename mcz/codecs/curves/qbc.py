@@ -1,6 +1,6 @@
-"""Codec 3, ``qbc``: quadratic Bezier curves, the channels of a joint as points of R^N.
+"""Codec 17, ``qbc``: quadratic Bezier curves, the channels of a joint as points of R^N.
 
-SPEC.md, "Codec 3: qbc", is normative; the names below are its field names.
+SPEC.md, "Codec 17: qbc", is normative; the names below are its field names.
 Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
 multidimensional quadratic Bezier curve break-and-fit method, 2014 and 2017. The preset
 ``khan2014`` follows the published implementation; by default middle points are those of least
@@ -303,7 +303,7 @@ def cut(header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[i
 
 
 CODEC = Codec(
-    id=3,
+    id=17,
     name="qbc",
     version=0,
     domain="values",

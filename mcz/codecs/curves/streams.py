@@ -1,6 +1,6 @@
 """The two streams of one joint in one segment: its marks, and the curves between them.
 
-SPEC.md, "Codec 3: qbc", is normative; names are its field names.
+SPEC.md, "Codec 17: qbc", is normative; names are its field names.
 """
 
 from __future__ import annotations

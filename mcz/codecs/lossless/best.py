@@ -1,6 +1,6 @@
-"""Codec 12, ``best``: ordinals predicted by regressions that are learned while they are used.
+"""Codec mrdwt, ``best``: ordinals predicted by regressions that are learned while they are used.
 
-SPEC.md, "Codec 12: best", is normative; the names below are its field names.
+SPEC.md, "Codec 2: best", is normative; the names below are its field names.
 
 Exactness: lossless and bit-exact. Predictions are binary64 in one stated order, of ``+ - * /`` and
 rounding down alone; all else is in integers. A stream holds all channels of a segment, so that each
@@ -52,7 +52,7 @@ def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int
 
 
 CODEC = Codec(
-    id=12,
+    id=2,
     name="best",
     version=0,
     domain="ordinals",

@@ -1,6 +1,6 @@
-"""The stream of a group of codec 12: heads as codec 1 has them, echoes, links, then bits.
+"""The stream of a group of best: heads as lossless has them, echoes, links, then bits.
 
-SPEC.md, "Codec 12: best", is normative; the names below are its field names.
+SPEC.md, "Codec 2: best", is normative; the names below are its field names.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from mcz.schema import read_varint, varint
 Ints = NDArray[np.int64]
 
 AS_CODEC_1, LINKED, ECHOED = range(3)  # method
-HEADS = 1  # the version of codec 1 that has them
+HEADS = 1  # the version of lossless that has them
 MAX_UNIT = 44
 MAX_SEEN = 8
 MAX_LINKS = 4096  # in a stream, so that what is learned takes little memory

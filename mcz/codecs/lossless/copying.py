@@ -1,6 +1,6 @@
-"""Streams of groups of one segment each, with constants and copies: what codecs 1 and 12 share.
+"""Streams of groups of one segment each, with constants and copies: what lossless and best share.
 
-SPEC.md, "Codec 1: lossless", is normative.
+SPEC.md, "Codec 128: lossless", is normative.
 """
 
 from __future__ import annotations

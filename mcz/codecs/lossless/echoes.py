@@ -1,7 +1,7 @@
-"""Echoes of codec 12: runs of numbers that were there before, of the same channel or another.
+"""Echoes of best: runs of numbers that were there before, of the same channel or another.
 
 A loop that is played twice has them, and a gait of which half was computed and half mirrored.
-SPEC.md, "Codec 12: best", is normative for what they say. How they are found is not.
+SPEC.md, "Codec 2: best", is normative for what they say. How they are found is not.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Codec 14, ``fast``: predicted ordinals in static distributions, made to be read.
+"""Codec lossless, ``fast``: predicted ordinals in static distributions, made to be read.
 
-SPEC.md, "Codec 14: fast", is normative.
+SPEC.md, "Codec 1: fast", is normative.
 
 Exactness: lossless and bit-exact; integers only, in 64 bits. A stream holds one group of one
 segment and needs no other, but for channels that are copies of another group's.
@@ -113,7 +113,7 @@ def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int
 
 
 CODEC = Codec(
-    id=14,
+    id=1,
     name="fast",
     version=0,
     domain="ordinals",

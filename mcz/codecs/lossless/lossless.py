@@ -1,6 +1,6 @@
-"""Codec 1, ``lossless``: predicted ordinals, entropy coded with mixed adaptive contexts.
+"""Codec 128, ``lossless``: predicted ordinals, entropy coded with mixed adaptive contexts.
 
-SPEC.md, "Codec 1: lossless", is normative; the names below are its field names.
+SPEC.md, "Codec 128: lossless", is normative; the names below are its field names.
 
 Exactness: lossless and bit-exact; integers only, coder state in u32, products below 2^53 but for
 ordinals themselves. A stream holds one group of one segment and needs no other, but for channels
@@ -94,7 +94,7 @@ def decode(
 
 
 CODEC = Codec(
-    id=1,
+    id=128,
     name="lossless",
     version=1,
     earlier={0: partial(decode, version=0)},

@@ -1,6 +1,6 @@
 """Units made of frames and frames of units, with all that is remembered from frame to frame.
 
-SPEC.md, "Codec 11: online", is normative; the names below are its field names.
+SPEC.md, "Codec 21: online", is normative; the names below are its field names.
 """
 
 from __future__ import annotations

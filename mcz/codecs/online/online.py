@@ -1,6 +1,6 @@
-"""Codec 11, ``online``: groups of frames after long-term references, with a step for each frame.
+"""Codec 21, ``online``: groups of frames after long-term references, with a step for each frame.
 
-SPEC.md, "Codec 11: online", is normative; the names below are its field names.
+SPEC.md, "Codec 21: online", is normative; the names below are its field names.
 Source: C.-H. Kwak, I. V. Bajic, Online MoCap data coding with bit allocation, rate control, and
 motion-adaptive post-processing, sections II and III.
 
@@ -41,7 +41,14 @@ from mcz.codecs.online.coder import (
     OnlineHeader,
     parse_header,
 )
-from mcz.codecs.online.options import CHANGEABLE, PARAMETERS, choose, choose_live, settled
+from mcz.codecs.online.options import (
+    CHANGEABLE,
+    PARAMETERS,
+    PRESET_IDS,
+    choose,
+    choose_live,
+    settled,
+)
 from mcz.codecs.online.units import Unit, build_units, parse_units
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import TARGET_BYTES
@@ -67,7 +74,9 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
     header = build(_header(choice.fields, order, chosen), f"{NAME} header")
     writer = _Writer(header, layout, chosen)
-    return Encoded(header, _segments(source, writer), models=choice.models, known=choice.known)
+    preset = PRESET_IDS[params["preset"]]
+    coded = _segments(source, writer)
+    return Encoded(header, coded, models=choice.models, known=choice.known, preset=preset)
 
 
 def _header(space: SpaceFields, order: int, chosen: Params) -> OnlineHeader:
@@ -207,7 +216,7 @@ class _LiveEncoder(LiveEncoder):
         chosen = settled(options)
         choice, order = choose_live(layout, chosen)
         self.header = build(_header(choice.fields, order, chosen), f"{NAME} header")
-        self.models = choice.models
+        self.models, self.preset = choice.models, PRESET_IDS[options["preset"]]
         found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
         self._writer = _Writer(self.header, found, chosen)
         self._rows = LiveRows(NAME, layout)
@@ -254,7 +263,7 @@ class _LiveDecoder:
 
 
 CODEC = Codec(
-    id=11,
+    id=21,
     name=NAME,
     version=0,
     domain="values",

@@ -54,6 +54,7 @@ PRESETS: dict[str, Settings] = {
     "rc": _PUBLISHED | {"rate_control": "rc"},
     "rca": _PUBLISHED | {"rate_control": "rca"},
 }
+PRESET_IDS = {"default": 0, "mod": 1, "rc": 2, "rca": 3}  # of CLIP
 # May change while frames come, at the border of a group.
 CHANGEABLE = {
     "step",

@@ -1,6 +1,6 @@
-"""Codec 4, ``pca``: principal components of the frames, coefficients predicted in time.
+"""Codec 18, ``pca``: principal components of the frames, coefficients predicted in time.
 
-SPEC.md, "Codec 4: pca", is normative; the names below are its field names.
+SPEC.md, "Codec 18: pca", is normative; the names below are its field names.
 Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
 multidimensional quadratic Bezier curve break-and-fit method, 2014, section 4; the preset
 ``khan2014`` has the errors that its tables print, the defaults improve upon it.
@@ -146,7 +146,7 @@ def _plain(values: Reals | Values) -> Floats:
 
 
 CODEC = Codec(
-    id=4,
+    id=18,
     name="pca",
     version=0,
     domain="values",

@@ -1,6 +1,6 @@
 """The stream of one segment of principal components: means, basis, coefficients.
 
-SPEC.md, "Codec 4: pca", is normative; names are its field names.
+SPEC.md, "Codec 18: pca", is normative; names are its field names.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Codec 13, ``posewave``: wavelets in time, coded in the metric of the pose."""
+"""Codec qbc, ``posewave``: wavelets in time, coded in the metric of the pose."""

@@ -1,6 +1,6 @@
 """Segments without levels, each of which may go on where the one before it ended.
 
-SPEC.md, "Codec 13: posewave", "Segments that go on", is normative.
+SPEC.md, "Codec 3: posewave", "Segments that go on", is normative.
 """
 
 from __future__ import annotations

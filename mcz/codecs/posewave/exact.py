@@ -1,4 +1,4 @@
-"""Exact channels of ``posewave``: groups of ordinals beside the rows, as those of codec 1.
+"""Exact channels of ``posewave``: groups of ordinals beside the rows, as those of lossless.
 
 SPEC.md, "Exact channels", is normative.
 """

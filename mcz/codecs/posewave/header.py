@@ -1,6 +1,6 @@
 """What the header of a ``posewave`` signal says: steps, the metric, the levels.
 
-SPEC.md, "Codec 13: posewave", is normative; the names below are its field names.
+SPEC.md, "Codec 3: posewave", is normative; the names below are its field names.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """``posewave`` frame by frame: no levels, no delay, each frame a segment.
 
-SPEC.md, "Codec 13: posewave", "Segments that go on", is normative; README.md here says what the
+SPEC.md, "Codec 3: posewave", "Segments that go on", is normative; README.md here says what the
 encoder chooses.
 """
 

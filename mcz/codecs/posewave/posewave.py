@@ -1,6 +1,6 @@
-"""Codec 13, ``posewave``: wavelets in time, coded in the metric of the pose.
+"""Codec qbc, ``posewave``: wavelets in time, coded in the metric of the pose.
 
-SPEC.md, "Codec 13: posewave", is normative; the names below are its field names.
+SPEC.md, "Codec 3: posewave", is normative; the names below are its field names.
 
 Frames become a pyramid: an approximation of every 32nd frame or so, and details of five levels. All
 channels of one time and level are a row. A row is not coded in degrees but in the metric of the
@@ -193,7 +193,7 @@ def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], S
 
 
 CODEC = Codec(
-    id=13,
+    id=3,
     name=NAME,
     version=1,
     earlier={0: partial(decode, version=0)},

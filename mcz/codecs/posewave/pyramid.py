@@ -1,6 +1,6 @@
 """The levels of a segment of ``posewave``: how many rows each has, when they are, what they weigh.
 
-SPEC.md, "Codec 13: posewave", is normative.
+SPEC.md, "Codec 3: posewave", is normative.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Streams of rows: one a level, of which a decoder needs those of all coarser levels.
 
-SPEC.md, "Codec 13: posewave", is normative.
+SPEC.md, "Codec 3: posewave", is normative.
 """
 
 from __future__ import annotations

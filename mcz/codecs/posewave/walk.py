@@ -1,6 +1,6 @@
 """From rows in the metric to the values of a segment, level by level, coarse to fine.
 
-SPEC.md, "Codec 13: posewave", is normative. Encoder and decoder go the same way: each level's rows
+SPEC.md, "Codec 3: posewave", is normative. Encoder and decoder go the same way: each level's rows
 are coded at the pose that a decoder has by then, so an encoder decodes what it has just coded.
 """
 

@@ -1,6 +1,7 @@
-"""Codec 8, ``lsdt-clip``: windows of frames, cosines in time, a learned basis in space.
+"""Codec 20, preset ``lsdt-clip``: windows of frames, cosines in time, a learned basis in space.
 
-SPEC.md, "Codec 8: lsdt-clip", is normative; the names below are its field names.
+SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has what a decoder needs, this file
+what an encoder chooses.
 Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using
 learned spatial decorrelation transform, 2016, section 3.2.
 
@@ -10,10 +11,8 @@ states). A window decodes by itself; its length is the delay.
 
 from __future__ import annotations
 
-from functools import partial
-
-from mcz.codecs.contract import Codec, Encoded, SignalSource
-from mcz.codecs.parameters import Dial, chosen_of, preset_parameter
+from mcz.codecs.contract import Encoded, SignalSource
+from mcz.codecs.parameters import chosen_of, preset_parameter
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
 from mcz.codecs.space_choices import (
     BASIS,
@@ -63,18 +62,10 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     return windows.encode(NAME, source, plan)
 
 
-CODEC = Codec(
-    id=8,
+CODEC = windows.BITSTREAM(
+    preset=1,
     name=NAME,
-    version=0,
-    domain="values",
-    lossless=False,
     encode=encode,
-    decode=partial(windows.decode, NAME),  # LCLIP-01
-    grouping="all",
-    positions=True,
-    uses=partial(windows.uses, NAME),
-    dial=Dial("step", 2.0**-60, 2.0**60),
     parameters=(
         preset_parameter(PRESETS),
         STEP,

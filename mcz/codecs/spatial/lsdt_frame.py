@@ -1,6 +1,6 @@
-"""Codec 7, ``lsdt-frame``: what each frame adds to the one before, in a learned basis.
+"""Codec 19, ``lsdt-frame``: what each frame adds to the one before, in a learned basis.
 
-SPEC.md, "Codec 7: lsdt-frame", is normative; the names below are its field names.
+SPEC.md, "Codec 19: lsdt-frame", is normative; the names below are its field names.
 Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using
 learned spatial decorrelation transform, 2016, section 3.1.
 
@@ -324,7 +324,7 @@ class _LiveDecoder:
 
 
 CODEC = Codec(
-    id=7,
+    id=19,
     name=NAME,
     version=0,
     domain="values",

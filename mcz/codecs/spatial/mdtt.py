@@ -1,6 +1,7 @@
-"""Codec 9, ``mdtt``: equal windows, cosines in time, the clip's own basis in space, of low rank.
+"""Codec 20, preset ``mdtt``: cosines in time, the clip's own basis in space, of low rank.
 
-SPEC.md, "Codec 9: mdtt", is normative; the names below are its field names.
+SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has what a decoder needs, this file
+what an encoder chooses.
 Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Human motion capture data tailored
 transform coding, 2015, as their paper of 2016 describes it in section 5.4.1.
 
@@ -10,10 +11,8 @@ states). The bases are in the file, as a model.
 
 from __future__ import annotations
 
-from functools import partial
-
-from mcz.codecs.contract import Codec, Encoded, SignalSource
-from mcz.codecs.parameters import Dial, chosen_of
+from mcz.codecs.contract import Encoded, SignalSource
+from mcz.codecs.parameters import chosen_of
 from mcz.codecs.space_choices import default_step, sample_of
 from mcz.codecs.spatial import windows
 from mcz.codecs.spatial.window_choices import THRESHOLD, asked_of, parameters_of, plan_of
@@ -40,17 +39,9 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     return windows.encode(NAME, source, plan)
 
 
-CODEC = Codec(
-    id=9,
+CODEC = windows.BITSTREAM(
+    preset=2,
     name=NAME,
-    version=0,
-    domain="values",
-    lossless=False,
     encode=encode,
-    decode=partial(windows.decode, NAME),
-    grouping="all",
-    positions=True,
-    uses=partial(windows.uses, NAME),
-    dial=Dial("step", 2.0**-60, 2.0**60),
     parameters=parameters_of(PRESETS, WINDOW),
 )

@@ -1,6 +1,7 @@
-"""Codec 10, ``pca-rdo``: principal components of poses, and of their courses in windows.
+"""Codec 20, preset ``pca-rdo``: principal components of poses, and of their courses in windows.
 
-SPEC.md, "Codec 10: pca-rdo", is normative; the names below are its field names.
+SPEC.md, "Codec 20: lsdt-clip", is normative; ``windows.py`` has what a decoder needs, this file
+what an encoder chooses.
 Source: L. Vasa, G. Brunnett, Rate-distortion optimized compression of motion capture data, 2014, as
 Hou 2016 describes it in sections 2.1 and 5.4.2.
 
@@ -10,11 +11,8 @@ states). Mean, components and courses are in the file, as a model.
 
 from __future__ import annotations
 
-from functools import partial
-
-from mcz.codecs.contract import Codec, Encoded, SignalSource
-from mcz.codecs.parameters import Dial, chosen_of
-from mcz.codecs.space import APART, COURSES, MEAN, WEIGHTED
+from mcz.codecs.contract import Encoded, SignalSource
+from mcz.codecs.parameters import chosen_of
 from mcz.codecs.space_choices import default_step, sample_of
 from mcz.codecs.spatial import windows
 from mcz.codecs.spatial.window_choices import THRESHOLD, asked_of, parameters_of, plan_of
@@ -41,17 +39,9 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     return windows.encode(NAME, source, plan)
 
 
-CODEC = Codec(
-    id=10,
+CODEC = windows.BITSTREAM(
+    preset=3,
     name=NAME,
-    version=0,
-    domain="values",
-    lossless=False,
     encode=encode,
-    decode=partial(windows.decode, NAME, flags=APART | WEIGHTED | MEAN | COURSES),  # RDO-01
-    grouping="all",
-    positions=True,
-    uses=partial(windows.uses, NAME),
-    dial=Dial("step", 2.0**-60, 2.0**60),
     parameters=parameters_of(PRESETS, WINDOW),
 )

@@ -1,6 +1,6 @@
 """The stream of one segment of windows: of each window its bytes, coded by themselves.
 
-SPEC.md, "Windows", is normative.
+SPEC.md, "Codec 20: lsdt-clip", is normative.
 """
 
 from __future__ import annotations

@@ -1,17 +1,19 @@
-"""Windows of frames, transformed in time and space: lsdt-clip, mdtt and pca-rdo.
+"""Codec 20, ``lsdt-clip``: windows of frames, transformed in time and space, of all its presets.
 
-SPEC.md, "Windows", is normative; the names below are its field names.
+SPEC.md, "Codec 20: lsdt-clip", is normative; the names below are its field names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
+    Codec,
     Encoded,
     Fetch,
     Layout,
@@ -23,8 +25,9 @@ from mcz.codecs.contract import (
     model_finder,
 )
 from mcz.codecs.gaps import FrameReader
+from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import SEGMENT_FRAMES, TARGET_BYTES
-from mcz.codecs.space import APART, WEIGHTED, Space, SpaceFields, check, space_of, uses_of
+from mcz.codecs.space import Space, SpaceFields, check, space_of, uses_of
 from mcz.codecs.spatial.prefix_streams import NO_CODES, CodeFields, Codes, codes_from, fields_of
 from mcz.codecs.spatial.window_streams import MAX_INDEX, build_window, parse_window, windows_of
 from mcz.errors import FormatError, MotionError
@@ -34,12 +37,13 @@ from mcz.transforms.dct import dct_matrix
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+NAME = "lsdt-clip"
 MAX_WINDOW = 2048  # WIND-05
 MAX_PRODUCTS = 2**30  # of a model's courses with cosines
 
 
 class WindowsHeader(Record):
-    """Header of lsdt-clip, mdtt and pca-rdo."""
+    """Header of lsdt-clip."""
 
     window: int = field(bounded(UVARINT, 1, MAX_WINDOW), "frames, 1 to 2048")
     n_frequencies: int = field(
@@ -100,7 +104,7 @@ class _Quantizer:
         layout = replace(layout, find_model=model_finder((*plan.models, *plan.known)))
         self.name, self.source, self.threshold = name, source, plan.threshold
         self.fields = parse(WindowsHeader, header, f"{name} header")
-        self.space = space_of_windows(name, self.fields, layout)
+        self.space = space_of_windows(self.fields, layout)
         self.analysis = self.space.analysis()
         self.from_courses: Floats | None = None
         if self.space.courses is not None:
@@ -162,62 +166,53 @@ def _segments(
 
 
 def decode(
-    name: str,
     header: bytes,
     layout: Layout,
     spans: Sequence[Span],
     request: Request,
     fetch: Fetch,
-    *,
-    flags: int = APART | WEIGHTED,  # LCLIP-01, MDTT-01
 ) -> Floats:
-    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes.
-
-    ``flags`` are those that the codec may have.
-    """
-    fields = parse(WindowsHeader, header, f"{name} header")
-    if fields.space.flags & ~flags:  # LCLIP-02, MDTT-02
-        raise FormatError(f"{name}: flags {fields.space.flags:#x}, it has no mean or courses")
-    check(name, layout, spans, fresh=True)
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+    fields = parse(WindowsHeader, header, f"{NAME} header")
+    check(NAME, layout, spans, fresh=True)
     n_channels = layout.n_channels if request.groups else 0
     out = np.zeros((request.stop - request.start, n_channels))
-    space = space_of_windows(name, fields, layout)
-    codes = codes_from(fields.code, f"{name} header")
+    space = space_of_windows(fields, layout)
+    codes = codes_from(fields.code, f"{NAME} header")
     if not n_channels:
         return out
     for index, span in enumerate(spans):
         if span.first < request.stop and request.start < span.stop:
-            _segment(name, space, fields, codes, span, fetch(index, 0, 0), request, out)
+            _segment(space, fields, codes, span, fetch(index, 0, 0), request, out)
     return out
 
 
-def uses(name: str, header: bytes) -> tuple[bytes, ...]:
+def uses(header: bytes) -> tuple[bytes, ...]:
     """The models that a header names."""
-    return uses_of(parse(WindowsHeader, header, f"{name} header").space)
+    return uses_of(parse(WindowsHeader, header, f"{NAME} header").space)
 
 
-def space_of_windows(name: str, fields: WindowsHeader, layout: Layout) -> Space:
+def space_of_windows(fields: WindowsHeader, layout: Layout) -> Space:
     """The Space of a header, its courses those of a whole window."""
     from mcz.codecs.spatial.window_kernels import synthesize_courses
 
-    space = space_of(name, fields.space, layout)
+    space = space_of(NAME, fields.space, layout)
     if space.courses is None:
         return space
     count, n_cosines = space.courses.shape
     if count != fields.n_frequencies or n_cosines > fields.window:  # WIND-16
         raise FormatError(
-            f"{name}: {count} courses of {n_cosines} cosines for {fields.n_frequencies} "
+            f"{NAME}: {count} courses of {n_cosines} cosines for {fields.n_frequencies} "
             f"coefficients and {fields.window} frames"
         )
     if count * n_cosines * fields.window > MAX_PRODUCTS:  # WIND-17
-        raise FormatError(f"{name}: {count} courses of {fields.window} frames are too many")
+        raise FormatError(f"{NAME}: {count} courses of {fields.window} frames are too many")
     courses = np.zeros((count, fields.window))
     synthesize_courses(courses, space.courses, dct_matrix(fields.window))
     return replace(space, courses=courses)
 
 
 def _segment(
-    name: str,
     space: Space,
     fields: WindowsHeader,
     codes: Codes | None,
@@ -230,7 +225,7 @@ def _segment(
     from mcz.codecs.spatial.window_kernels import synthesize
 
     n_windows = -(-span.n_frames // fields.window)
-    where = f"{name}: segment at {span.first}"
+    where = f"{NAME}: segment at {span.first}"
     for number, part in enumerate(windows_of(stream, n_windows, where)):
         start = span.first + number * fields.window
         stop = min(start + fields.window, span.stop)
@@ -257,3 +252,17 @@ def _segment(
         )
         if not whole:
             out[a - request.start : b - request.start] = block[a - start : b - start]
+
+
+BITSTREAM = partial(
+    Codec,
+    id=20,
+    version=0,
+    domain="values",
+    lossless=False,
+    decode=decode,
+    grouping="all",
+    positions=True,
+    uses=uses,
+    dial=Dial("step", 2.0**-60, 2.0**60),
+)

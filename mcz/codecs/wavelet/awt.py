@@ -1,24 +1,23 @@
-"""Codec 6, ``awt``: a wavelet transform in time, coefficients shared out among the channels.
+"""Codec 16, preset ``awt``: wavelets in time, coefficients shared out among the channels.
 
-SPEC.md, "Codec 6: awt", is normative; ``shared.py`` has what a decoder needs, this file
+SPEC.md, "Codec 16: wavelet", is normative; ``shared.py`` has what a decoder needs, this file
 what an encoder chooses.
 Source: P. Beaudoin, P. Poulin, M. van de Panne, Adapting wavelet compression to human motion
 capture clips, 2007, as M. A. Khan, An efficient algorithm for compression of motion capture signal
 using multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5, describes it;
 the preset ``khan2014`` is the method of the latter, the defaults improve upon it.
 
-Exactness: lossy; decoding is bit-exact, as that of codec 2. A stream holds one channel at one
+Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order
+that SPEC.md states). A stream holds one channel at one
 resolution of one segment. An encoder needs the whole clip in memory.
 """
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Encoded, SignalSource
+from mcz.codecs.contract import Encoded, SignalSource
 from mcz.codecs.parameters import (
     Dial,
     Parameter,
@@ -33,6 +32,7 @@ from mcz.codecs.wavelet import shared
 from mcz.codecs.wavelet.awt_choices import choose, coefficients_of, quantizer_of
 from mcz.codecs.wavelet.recoding import recoder
 from mcz.codecs.wavelet.shared import (
+    BITSTREAM,
     WAVELET,
     N,
     Plan,
@@ -94,17 +94,11 @@ def _weigh(source: SignalSource, options: Params) -> tuple[Floats, None]:
     return _weights(source, chosen_of(PRESETS, options)["distortion"]), None
 
 
-CODEC = Codec(
-    id=6,
+CODEC = BITSTREAM(
+    preset=3,
     name="awt",
-    version=0,
-    domain="values",
-    lossless=False,
     encode=encode,
-    decode=partial(shared.decode, "awt"),  # AWT-01
-    cut=partial(shared.cut, "awt"),
-    recode=recoder("awt", _weigh),
-    grouping="channel",
+    recode=recoder(_weigh),
     dial=Dial("a_w", 2.0**-20, 2.0**40, rises=True),
     parameters=(
         preset_parameter(PRESETS),

@@ -1,29 +1,29 @@
-"""Codec 5, ``dwt``: a wavelet transform in time, one threshold for all channels.
+"""Codec 16, preset ``dwt``: a wavelet transform in time, one threshold for all channels.
 
-SPEC.md, "Codec 5: dwt", is normative; ``shared.py`` has what a decoder needs, this file
+SPEC.md, "Codec 16: wavelet", is normative; ``shared.py`` has what a decoder needs, this file
 what an encoder chooses.
 Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
 multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5; the preset
 ``khan2014`` follows the published implementation, the defaults improve upon it.
 
-Exactness: lossy; decoding is bit-exact, as that of codec 2. A stream holds one channel at one
+Exactness: lossy; decoding is bit-exact (integers, then binary64 products and sums in the order
+that SPEC.md states). A stream holds one channel at one
 resolution of one segment.
 """
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Encoded, Layout, SignalSource
+from mcz.codecs.contract import Encoded, Layout, SignalSource
 from mcz.codecs.parameters import Dial, Parameter, chosen_of, number, preset_parameter
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, segment_frames_of, skeleton_of
 from mcz.codecs.wavelet import shared
 from mcz.codecs.wavelet.quantizer import make_quantizer
 from mcz.codecs.wavelet.recoding import recoder
 from mcz.codecs.wavelet.shared import (
+    BITSTREAM,
     WAVELET,
     N,
     Plan,
@@ -68,17 +68,11 @@ def _weigh(source: SignalSource, options: Params) -> tuple[Floats, float | None]
     return _weights(source.layout, unit_aware=options["preset"] != "khan2014"), options["t_w"]
 
 
-CODEC = Codec(
-    id=5,
+CODEC = BITSTREAM(
+    preset=2,
     name="dwt",
-    version=0,
-    domain="values",
-    lossless=False,
     encode=encode,
-    decode=partial(shared.decode, "dwt"),  # DWT-01
-    cut=partial(shared.cut, "dwt"),
-    recode=recoder("dwt", _weigh),
-    grouping="channel",
+    recode=recoder(_weigh),
     dial=Dial("t_w", 2.0**-20, 2.0**20),
     parameters=(
         preset_parameter(PRESETS),

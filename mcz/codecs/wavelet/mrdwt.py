@@ -1,6 +1,6 @@
-"""Codec 2, ``mrdwt``: a multiresolution wavelet transform in time, thresholds by joint.
+"""Codec 16, preset ``mrdwt``: a multiresolution wavelet transform in time, thresholds by joint.
 
-SPEC.md, "Codec 2: mrdwt", is normative; ``shared.py`` has what a decoder needs, this file
+SPEC.md, "Codec 16: wavelet", is normative; ``shared.py`` has what a decoder needs, this file
 what an encoder chooses.
 Source: M. A. Khan, Multiresolution coding of motion capture data for real-time multimedia
 applications, 2016; the preset ``khan2016`` follows the published implementation exactly, the
@@ -12,18 +12,17 @@ that SPEC.md states). A stream holds one channel at one resolution of one segmen
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Encoded, SignalSource
+from mcz.codecs.contract import Encoded, SignalSource
 from mcz.codecs.parameters import Dial, Parameter, choice, chosen_of, number, preset_parameter
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
 from mcz.codecs.wavelet import shared
 from mcz.codecs.wavelet.quantizer import make_quantizer
 from mcz.codecs.wavelet.recoding import recoder
 from mcz.codecs.wavelet.shared import (
+    BITSTREAM,
     WAVELET,
     N,
     Plan,
@@ -85,17 +84,11 @@ def _weigh(source: SignalSource, options: Params) -> tuple[Floats, float | None]
     return weights, T_g
 
 
-CODEC = Codec(
-    id=2,
+CODEC = BITSTREAM(
+    preset=1,
     name="mrdwt",
-    version=0,
-    domain="values",
-    lossless=False,
     encode=encode,
-    decode=partial(shared.decode, "mrdwt"),
-    cut=partial(shared.cut, "mrdwt"),
-    recode=recoder("mrdwt", _weigh),
-    grouping="channel",
+    recode=recoder(_weigh),
     dial=Dial("T_g", 2.0**-20, 2.0**20),
     parameters=(
         preset_parameter(PRESETS),

@@ -12,7 +12,7 @@ from mcz.codecs.contract import Recode, Recoding, SignalSource
 from mcz.codecs.groups import Part
 from mcz.codecs.steps import code_of
 from mcz.codecs.wavelet.quantizer import DEAD_ZONE, Quantizer
-from mcz.codecs.wavelet.shared import Plan, Transform, WaveletHeader, segment_streams
+from mcz.codecs.wavelet.shared import NAME, Plan, Transform, WaveletHeader, segment_streams
 from mcz.codecs.wavelet.windows import Frames
 from mcz.schema import parse
 from mcz.transforms.wavelets import INLINE, Wavelet, by_id
@@ -41,19 +41,19 @@ class _Held(Quantizer):
 Weigh = Callable[[SignalSource, Params], tuple[Floats, float | None]]
 
 
-def recoder(name: str, weigh: Weigh) -> Recode:
-    """The ``recode`` of a wavelet codec; where steps follow the thresholds each channel keeps its.
+def recoder(weigh: Weigh) -> Recode:
+    """The ``recode`` of a preset; where steps follow the thresholds each channel keeps its.
 
     Elsewhere its encoder's ``weigh`` says what is small.
     """
 
     def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
         """The streams of some channels with new values, with the steps of the header."""
-        fields = parse(WaveletHeader, asked.header, f"{name} header")
+        fields = parse(WaveletHeader, asked.header, f"{NAME} header")
         quantizer = _quantizer(fields, asked, *weigh(asked.source, asked.options))
-        plan = Plan(name, _transform(fields), quantizer, 0)
+        plan = Plan(NAME, _transform(fields), quantizer, 0)
         part = Part(asked.source, asked.groups, fields.coded_frames)
-        frames = Frames(name, part, plan.wavelet, plan.levels)
+        frames = Frames(NAME, part, plan.wavelet, plan.levels)
         for span in asked.spans:
             streams = segment_streams(frames, plan, span.first, span.stop)
             frames.keep(span.first, span.stop)

@@ -1,7 +1,7 @@
-"""What the wavelet codecs share: header, segments, and the decoder.
+"""Codec 16, ``wavelet``: header, segments, and the decoder of all its presets.
 
-SPEC.md, "Codec 2: mrdwt", is normative; names are its field names. A codec that uses this says how
-its encoder chooses a ``Plan``; to a decoder they are alike.
+SPEC.md, "Codec 16: wavelet", is normative; names are its field names. A preset says how its
+encoder chooses a ``Plan``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from construct import Float64l, If, Int8ul, this
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
+from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.parameters import MAX_DECIMALS, SCALED, Parameter, decimals_parameter, integer
 from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, halving
 from mcz.codecs.steps import ratio_of
@@ -29,6 +29,7 @@ from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id
 
 Floats = NDArray[np.float64]
 
+NAME = "wavelet"
 LEAST_FRAMES = 256  # of a segment: in fewer, hundreds of channels would cost more than they save
 INWARD = 1 / 16  # of a step: how far a scaled detail is set back towards zero (MRDWT-34)
 
@@ -36,7 +37,7 @@ TAPS = counted(Float64l, MAX_TAPS)  # MRDWT-06
 
 
 class WaveletHeader(Record):
-    """Header of mrdwt, dwt and awt."""
+    """Header of wavelet."""
 
     wavelet: int = field(Int8ul, "id of the registered wavelet; 0: its filters follow")
     lo: list[float] | None = field(
@@ -175,10 +176,10 @@ def segment_streams(frames: Frames, plan: Plan, first: int, stop: int) -> tuple[
 
 
 def decode(
-    name: str, header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> Floats:
     """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
-    decoder = _Decoder(name, header, layout, spans)
+    decoder = _Decoder(header, layout, spans)
     n_columns = sum(len(layout.groups[group]) for group in request.groups)
     if request.start == request.stop or not n_columns:
         return np.zeros((request.stop - request.start, n_columns))
@@ -188,24 +189,24 @@ def decode(
 class _Decoder:
     """Header and segments of a signal, checked."""
 
-    def __init__(self, name: str, header: bytes, layout: Layout, spans: Sequence[Span]) -> None:
-        fields = parse(WaveletHeader, header, f"{name} header")  # CODEC-05
-        self.name, self.fields, self.layout, self.spans = name, fields, layout, spans
+    def __init__(self, header: bytes, layout: Layout, spans: Sequence[Span]) -> None:
+        fields = parse(WaveletHeader, header, f"{NAME} header")  # CODEC-05
+        self.fields, self.layout, self.spans = fields, layout, spans
         if layout.samples_per_frame != 1:  # MRDWT-02
-            raise FormatError(f"{name}: {layout.samples_per_frame} samples a frame, it has 1")
+            raise FormatError(f"{NAME}: {layout.samples_per_frame} samples a frame, it has 1")
         if layout.n_resolutions > fields.levels + 1:  # CUT-04, MRDWT-03
             raise FormatError(
-                f"{name}: {layout.n_resolutions} resolutions, but {fields.levels} levels"
+                f"{NAME}: {layout.n_resolutions} resolutions, but {fields.levels} levels"
             )
         if any(len(group) != 1 for group in layout.groups):  # MRDWT-01
-            raise FormatError(f"{name}: a group of more than one channel")
+            raise FormatError(f"{NAME}: a group of more than one channel")
         self.wavelet = (
             by_id(fields.wavelet)
             if fields.wavelet != INLINE
             else Wavelet(tuple(fields.lo or ()), tuple(fields.hi or ()))
         )
         scaled = fields.decimals == SCALED
-        self.coding = Coding(name, scaled, fields.least, (self.wavelet.n_taps - 2) // 2)
+        self.coding = Coding(NAME, scaled, fields.least, (self.wavelet.n_taps - 2) // 2)
         self.lengths = self.wavelet.lengths(fields.coded_frames, fields.levels)
         unit, end = 1 << fields.levels, spans[-1].stop if spans else 0
         lead = self.wavelet.lead(fields.levels)
@@ -213,17 +214,17 @@ class _Decoder:
             # MRDWT-15, MRDWT-16, MRDWT-17
             if (span.lead, span.tail, span.fresh) != (min(span.first, lead), 0, True):
                 raise FormatError(
-                    f"{name}: the segment at {span.first} bears upon {span.lead} frames before and "
+                    f"{NAME}: the segment at {span.first} bears upon {span.lead} frames before and "
                     f"{span.tail} after, not {min(span.first, lead)} and 0, or is not fresh"
                 )
         # MRDWT-05, MRDWT-12
         if any(span.first % unit for span in spans) or end > fields.coded_frames:
             raise FormatError(
-                f"{name}: segments of {unit} frames a coefficient, up to {end} of "
+                f"{NAME}: segments of {unit} frames a coefficient, up to {end} of "
                 f"{fields.coded_frames}, do not fit"
             )
         if end < fields.coded_frames and end % unit:  # MRDWT-13
-            raise FormatError(f"{name}: segments that end at {end}, inside a coefficient")
+            raise FormatError(f"{NAME}: segments that end at {end}, inside a coefficient")
 
     def read(self, request: Request, fetch: Fetch) -> Floats:
         levels = self.fields.levels
@@ -255,7 +256,7 @@ class _Decoder:
                 self._fill(bands, column, owns, wanted, stream)
         if due < wanted[0][1]:  # MRDWT-18
             raise FormatError(
-                f"{self.name}: frames {request.start}:{request.stop} need approximations up to "
+                f"{NAME}: frames {request.start}:{request.stop} need approximations up to "
                 f"{wanted[0][1]}, there are none from {due} on"
             )
         absent = np.zeros((0, len(request.groups)))
@@ -300,10 +301,20 @@ def _stream(fetch: Fetch, segment: int, group: int, band: int) -> bytes:
     return fetch(segment, band, group)
 
 
-def cut(
-    name: str, header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]
-) -> bytes:
+def cut(header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]) -> bytes:
     """The header for stored frames first <= f < stop alone."""
-    fields = parse(WaveletHeader, header, f"{name} header")
+    fields = parse(WaveletHeader, header, f"{NAME} header")
     fields.coded_frames -= first
-    return build(fields, f"{name} header")
+    return build(fields, f"{NAME} header")
+
+
+BITSTREAM = partial(
+    Codec,
+    id=16,
+    version=0,
+    domain="values",
+    lossless=False,
+    decode=decode,
+    cut=cut,
+    grouping="channel",
+)

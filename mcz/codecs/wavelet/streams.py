@@ -1,6 +1,6 @@
 """The streams of one channel of one segment: its quantized wavelet coefficients, band by band.
 
-SPEC.md, "Codec 2: mrdwt", is normative; names are its field names.
+SPEC.md, "Codec 16: wavelet", is normative; names are its field names.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
 """Ordinals of channels to the stream of a group, and back.
 
-SPEC.md, "Codec 1: lossless", is normative; other codecs have such streams, too.
+SPEC.md, "Codec 128: lossless", is normative; other codecs have such streams, too.
 """

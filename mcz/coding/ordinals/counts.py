@@ -1,6 +1,6 @@
 """Channels that were counts of a converter: scaled, moved and rounded to binary32.
 
-``Law.ordinals`` is normative (SPEC.md, "Codec 1: lossless", form 34); finding a law is not.
+``Law.ordinals`` is normative (SPEC.md, "Codec 128: lossless", form 34); finding a law is not.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Channels of rounding noise: angles that were a few units in the last place, printed in degrees.
 
-``of_products`` is normative (SPEC.md, "Codec 1: lossless", form 33); finding a unit is not.
+``of_products`` is normative (SPEC.md, "Codec 128: lossless", form 33); finding a unit is not.
 """
 
 from __future__ import annotations

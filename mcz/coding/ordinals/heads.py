@@ -1,6 +1,6 @@
 """The head of each channel of a stream of the codec ``lossless``, and what it says.
 
-SPEC.md, "Codec 1: lossless", is normative.
+SPEC.md, "Codec 128: lossless", is normative.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def read_heads(
 
     Also the offset after the heads. The map (None: none) turns coded integers into ordinals.
     Rests: whether further integers are coded, which are added to these.
-    ``version``: that of codec 1; streams within other codecs are of 0.
+    ``version``: that of lossless; streams within other codecs are of 0.
     """
     heads: list[tuple[int, Any, bytes]] = []
     at = 0

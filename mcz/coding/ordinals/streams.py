@@ -1,6 +1,6 @@
 """The stream of a group: heads of its channels, then the bits of those that are coded.
 
-SPEC.md, "Codec 1: lossless", is normative; the names below are its field names.
+SPEC.md, "Codec 128: lossless", is normative; the names below are its field names.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def build_stream(
     """One stream: ``ordinals`` of one group, (rows, channels); grids in force and of the clip.
 
     ``seen``: where a channel was coded that a later one may repeat; None: there shall be no copies.
-    ``version``: of codec 1, which says what forms there are.
+    ``version``: of lossless, which says what forms there are.
     """
     heads, plans, coded = plan_stream(ordinals, grids, group, seen, version)
     return heads + (code(coded, plans) if plans else b"")
@@ -188,7 +188,7 @@ def parse_stream(
 ) -> tuple[Ints, dict[int, tuple[int, int]]]:
     """The ordinals of a group, (n_rows, channels), and which channels are copies of which.
 
-    ``uncode``: how what follows the heads is decoded, if not as codec 1 does.
+    ``uncode``: how what follows the heads is decoded, if not as lossless does.
     """
     columns = np.zeros((n_rows, len(grids)), np.int64)
     heads, end = read_heads(stream, grids, version)

@@ -1,6 +1,6 @@
 """Channels whose binary32 values are whole multiples of a unit: integers scaled by some recorder.
 
-``of_multiples`` is normative (SPEC.md, "Codec 1: lossless", form 32); finding a unit is not.
+``of_multiples`` is normative (SPEC.md, "Codec 128: lossless", form 32); finding a unit is not.
 """
 
 from __future__ import annotations

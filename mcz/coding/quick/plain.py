@@ -1,8 +1,8 @@
-"""The streams of a segment, as codec 14, ``fast``, decodes them where there is no compiler.
+"""The streams of a segment, as ``fast``, decodes them where there is no compiler.
 
 The loops of ``kernels`` and ``stream_kernels`` in the Python that runs quickest: numbers of Python
 in lists and local names, one function a channel. It decodes 62 channels some five times as quickly
-as plain Python runs those loops. SPEC.md, "Codec 14: fast", is normative.
+as plain Python runs those loops. SPEC.md, "Codec 1: fast", is normative.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The stream of a group as codec 14, ``fast``, has it: heads of its channels, then their values.
+"""The stream of a group as ``fast``, has it: heads of its channels, then their values.
 
-SPEC.md, "Codec 14: fast", is normative; the names below are its field names.
+SPEC.md, "Codec 1: fast", is normative; the names below are its field names.
 """
 
 from __future__ import annotations

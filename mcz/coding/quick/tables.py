@@ -1,4 +1,4 @@
-"""The distributions of symbols with which codec 14, ``fast``, codes: an annex of SPEC.md."""
+"""The distributions of symbols with which ``fast``, codes: an annex of SPEC.md."""
 
 from __future__ import annotations
 

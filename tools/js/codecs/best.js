@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 12: best".
+// SPEC.md, "Codec 2: best".
 
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, clamp } from "../entropy.js";
@@ -10,7 +10,7 @@ import { Learner, bounded } from "../regressions.js";
 import { restart } from "../start-models.js";
 import { BitDecoder, CodedChannel, guessed } from "./lossless.js";
 
-export const id = 12;
+export const id = 2;
 export const name = "best";
 export const version = 0;
 

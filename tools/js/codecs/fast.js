@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 14: fast".
+// SPEC.md, "Codec 1: fast".
 
 import { annexJson } from "../annex.js";
 import { bits, clamp } from "../entropy.js";
@@ -18,7 +18,7 @@ import { halvesOf, setHalves, setInteger } from "../int64.js";
 import { ordinalOf } from "../ordinals.js";
 import { SignalDecoder } from "../ordinal-streams.js";
 
-export const id = 14;
+export const id = 1;
 export const name = "fast";
 export const version = 0;
 

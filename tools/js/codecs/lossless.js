@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 1: lossless".
+// SPEC.md, "Codec 128: lossless".
 
 import { RangeDecoder, bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
@@ -20,7 +20,7 @@ import { SignalDecoder } from "../ordinal-streams.js";
 import { Residuals, side } from "../residuals.js";
 import { restart, startModels } from "../start-models.js";
 
-export const id = 1;
+export const id = 128;
 export const name = "lossless";
 export const version = 1;
 

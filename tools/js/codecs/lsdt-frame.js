@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 7: lsdt-frame": each frame as what it adds to the one before.
+// SPEC.md, "Codec 19: lsdt-frame": each frame as what it adds to the one before.
 
 import { BitReader } from "../bits.js";
 import { ByteReader } from "../bytes.js";
@@ -9,9 +9,9 @@ import { GREATEST } from "../scales.js";
 import { APART, FrameAdder, WEIGHTS, makeSpace, readCode, readSpace } from "../space.js";
 import { sparseList } from "../sparse.js";
 import { startModels } from "../start-models.js";
-import { checkLayout, checkReach, coefficientResiduals } from "../windows.js";
+import { checkLayout, checkReach, coefficientResiduals } from "./lsdt-clip.js";
 
-export const id = 7;
+export const id = 19;
 export const name = "lsdt-frame";
 export const version = 0;
 

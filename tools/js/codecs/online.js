@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 11: online": groups of frames that begin with a long-term reference (LTR).
+// SPEC.md, "Codec 21: online": groups of frames that begin with a long-term reference (LTR).
 
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits } from "../entropy.js";
@@ -6,10 +6,10 @@ import { Refused } from "../errors.js";
 import { GREATEST } from "../scales.js";
 import { APART, FrameAdder, WEIGHTS, makeSpace, readSpace } from "../space.js";
 import { startModels } from "../start-models.js";
-import { checkLayout, checkReach, coefficientResiduals } from "../windows.js";
+import { checkLayout, checkReach, coefficientResiduals } from "./lsdt-clip.js";
 import { RowMemory } from "./lsdt-frame.js";
 
-export const id = 11;
+export const id = 21;
 export const name = "online";
 export const version = 0;
 
@@ -209,7 +209,7 @@ class OnlineFrames {
   }
 }
 
-/** Coefficients with `coder` 0: the steps of codec 7. */
+/** Coefficients with `coder` 0: the steps of lsdt-frame. */
 class Mixed {
   constructor(space) {
     this.memory = new RowMemory(space);

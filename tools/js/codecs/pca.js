@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 4: pca".
+// SPEC.md, "Codec 18: pca".
 
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits } from "../entropy.js";
@@ -7,10 +7,10 @@ import { EXACT_POWERS } from "../grids.js";
 import { CONTEXTS, MIXERS, Residuals, side } from "../residuals.js";
 import { GREATEST, SCALED, firstScale, stepOf } from "../scales.js";
 import { restart, startModels } from "../start-models.js";
-import { predictedChange } from "./mrdwt.js";
+import { predictedChange } from "./wavelet.js";
 import { first } from "./qbc.js";
 
-export const id = 4;
+export const id = 18;
 export const name = "pca";
 export const version = 0;
 

@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 13: posewave": wavelets in time, in the metric of the pose.
+// SPEC.md, "Codec 3: posewave": wavelets in time, in the metric of the pose.
 
 import { AxisOrders } from "../axis-orders.js";
 import { ByteReader } from "../bytes.js";
@@ -13,7 +13,7 @@ import { HEAD, startTable } from "../pose-start.js";
 import { stepOf } from "../scales.js";
 import { decodeGroups } from "./lossless.js";
 
-export const id = 13;
+export const id = 3;
 export const name = "posewave";
 export const version = 1;
 

@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 3: qbc".
+// SPEC.md, "Codec 17: qbc".
 
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits, clamp } from "../entropy.js";
@@ -9,7 +9,7 @@ import { GREATEST, SCALED, firstScale, isStep } from "../scales.js";
 import { checkCuts } from "../segments.js";
 import { restart, startModels } from "../start-models.js";
 
-export const id = 3;
+export const id = 17;
 export const name = "qbc";
 export const version = 0;
 

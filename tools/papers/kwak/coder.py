@@ -21,7 +21,7 @@ from tools.papers.kwak.measure import NAME, STEP_CM, Coded, code, dialed, live_b
 
 Ints = NDArray[np.int64]
 
-MOST_ONES = 16  # of a prefix; SPEC.md, "Codec 11: online"
+MOST_ONES = 16  # of a prefix; SPEC.md, "Codec 21: online"
 ESCAPE_BITS = 6  # the length of what follows such a prefix
 GOLOMB, MIXED, RICE = "golomb", "mixed", "Rice alone"
 PLACES: tuple[tuple[str, Mapping[str, Any]], ...] = (

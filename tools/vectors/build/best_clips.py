@@ -1,4 +1,4 @@
-"""Streams of codec 12, ``best``, to order: heads and links that its encoder would never choose.
+"""Streams of ``best``, to order: heads and links that its encoder would never choose.
 
 Nothing here is fitted or estimated, so the bytes do not depend on a machine's arithmetic.
 """
@@ -22,7 +22,7 @@ from tools.vectors.build import lossless_clips
 from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.lossless_clips import UNEXAMINED, USUAL, Head, Ints
 
-HEADING = "Codec 12: best"
+HEADING = "Codec 2: best"
 Links = Sequence[Link]
 
 
@@ -32,7 +32,7 @@ def codec_of(
     methods: Sequence[int] = (LINKED,),
     echoes: Sequence[Echo] = (),
 ) -> Codec:
-    """Codec 12 with these heads, channel by channel, and links, coded channel by coded channel.
+    """Codec best with these heads, channel by channel, and links, coded channel by coded channel.
 
     A channel without a head is ``USUAL``, one without a link has one of ``usual``. ``methods`` are
     those of the groups, the last of all further ones. A parameter ``segment_frames`` of 0 makes
@@ -108,7 +108,7 @@ def _code_to_the_fault(coded: Ints, plans: Sequence[Ints], links: Links) -> byte
 
 
 class Streams(Whole):
-    """A Shelf of files of one clip that codec 12 codes."""
+    """A Shelf of files of one clip that best codes."""
 
     def code(
         self,

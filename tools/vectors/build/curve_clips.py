@@ -1,4 +1,4 @@
-"""Clips of codec 3, ``qbc``, to order: control points, curves and headers that no encoder chooses.
+"""Clips of ``qbc``, to order: control points, curves and headers that no encoder chooses.
 
 Control points are integers that are written out or counted, so the bytes do not depend on a
 machine's arithmetic; values are those of the decoder.
@@ -25,7 +25,7 @@ from mcz.schema import varint
 from tools.vectors.build.files import Whole, file_of, partial
 from tools.vectors.build.motions import puppet, wave
 
-HEADING = "Codec 3: qbc"
+HEADING = "Codec 17: qbc"
 PUPPET = (4, 2)  # channels of its joints that have any
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 Ints = NDArray[np.int64]
@@ -244,7 +244,7 @@ def _streams(plan: Plan, path: Path, first: int, stop: int) -> tuple[bytes, byte
 
 
 def codec_of(plan: Plan, made: Sequence[Path]) -> Codec:
-    """Codec 3 with this content, whatever the values of the motion."""
+    """Codec qbc with this content, whatever the values of the motion."""
 
     def encode(source: Any, params: Any) -> Encoded:
         return Encoded(header(plan), iter(segments_of(plan, made)), plan.n_resolutions)
@@ -291,7 +291,7 @@ def file_with(plan: Plan, made: Sequence[Path], motion: Motion, **edits: Any) ->
 
 
 class Curves(Whole):
-    """A Shelf of files of one clip that codec 3 codes."""
+    """A Shelf of files of one clip that qbc codes."""
 
     def curve(
         self,

@@ -1,4 +1,4 @@
-"""Streams of codec 14, ``fast``, to order: heads that its encoder would never choose.
+"""Streams of ``fast``, to order: heads that its encoder would never choose.
 
 Nothing here is fitted or estimated, so the bytes do not depend on a machine's arithmetic.
 """
@@ -34,7 +34,7 @@ from tools.vectors.build.lossless_clips import (
 )
 
 Ints = NDArray[np.int64]
-HEADING = "Codec 14: fast"
+HEADING = "Codec 1: fast"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ REST = Coded(PLAIN, scale=0, from_last=0)
 
 
 def codec_of(*segments: Sequence[Head]) -> Codec:
-    """Codec 14 with these heads, channel by channel, in the first segment, the second, ...
+    """Codec fast with these heads, channel by channel, in the first segment, the second, ...
 
     The last counts for all further segments; a channel without a head is ``USUAL``. A parameter
     ``segment_frames`` of 0 makes segments as long as the grids allow.
@@ -163,7 +163,7 @@ def _head(head: Coded, plan: Ints) -> bytes:
 
 
 class Streams(Whole):
-    """A Shelf of files of one clip that codec 14 codes."""
+    """A Shelf of files of one clip that fast codes."""
 
     def code(
         self,

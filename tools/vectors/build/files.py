@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs import raw
+from mcz.codecs import bitstream, by_name, raw
 from mcz.codecs.contract import Codec, Request, Span, model_finder
 from mcz.container import index_records, payloads
 from mcz.container.chunks import (
@@ -310,6 +310,12 @@ class Crafter(Writer):
             packed |= {"flags": index_records.CONTINUES, "previous": previous_of(since)}
         payload = self.edited("INDX", built(index_records.Indx, packed, "INDX"))
         return build_chunk(b"INDX", payload, ChunkFlag.ANCILLARY)
+
+
+def heading_of(name: str) -> str:
+    """The heading of SPEC.md of the codec called ``name``."""
+    id_ = by_name(name).id
+    return f"Codec {id_}: {bitstream(id_)}"
 
 
 def file_of(

@@ -1,4 +1,4 @@
-"""Streams of codec 1, ``lossless``, to order: heads that its encoder would never choose.
+"""Streams of ``lossless``, to order: heads that its encoder would never choose.
 
 Nothing here is fitted or estimated, so the bytes do not depend on a machine's arithmetic.
 """
@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 # Forms; 1 to 15: digits of base 10.
 PLAIN, MULTIPLES, PRODUCTS, COUNTS, BINARY32, BINARY64 = 0, 32, 33, 34, 88, 117
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
-HEADING = "Codec 1: lossless"
+HEADING = "Codec 128: lossless"
 WHOLE, SIX = Grid(GridKind.INTEGER), Grid(GridKind.GENERAL, 6)
 DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 
@@ -71,7 +71,7 @@ USUAL = Coded()
 
 
 def codec_of(*segments: Sequence[Head], version: int = 0) -> Codec:
-    """Codec 1 with these heads, channel by channel, in the first segment, the second, ...
+    """Codec lossless with these heads, channel by channel, in the first segment, the second, ...
 
     The last counts for all further segments; a channel without a head is ``USUAL``. A parameter
     ``segment_frames`` of 0 makes segments as long as the grids allow.
@@ -184,7 +184,7 @@ def _code_to_the_fault(ordinals: Ints, plans: Sequence[Ints]) -> bytes:
 
 
 class Streams(Whole):
-    """A Shelf of files of one clip that codec 1 codes."""
+    """A Shelf of files of one clip that lossless codes."""
 
     def code(
         self,

@@ -1,4 +1,4 @@
-"""Files of codec 11, ``online``, to order, and what is in them.
+"""Files of ``online``, to order, and what is in them.
 
 The values are summed from the coefficients, never decoded: a decoder has to agree.
 """
@@ -72,7 +72,8 @@ def codec_of(plan: Plan, coding: type[Coding] = Coding) -> Any:
     known = (model,) if model and plan.known else ()
 
     def encode(source: Any, params: Any) -> Encoded:
-        return Encoded(header(plan), iter(segments_of(plan, coding)), models=own, known=known)
+        made = iter(segments_of(plan, coding))
+        return Encoded(header(plan), made, models=own, known=known, preset=plan.preset)
 
     def decode(header: bytes, layout: Any, spans: Any, request: Any, fetch: Any) -> Floats:
         return values_of(plan)[request.start : request.stop]
@@ -102,7 +103,7 @@ def file_with(
 
 
 class Groups(Whole):
-    """A Shelf of files of one clip of codec 11."""
+    """A Shelf of files of one clip of online."""
 
     def plan(
         self,

@@ -1,6 +1,6 @@
-"""Clips of codec 11, ``online``, to order: units, steps and coefficients that no encoder chooses.
+"""Clips of ``online``, to order: units, steps and coefficients that no encoder chooses.
 
-The bits are written here as SPEC.md, "Codec 11: online", reads them, so that whatever can be said
+The bits are written here as SPEC.md, "Codec 21: online", reads them, so that whatever can be said
 can be written, and what must not be, too. All that is coded is integers, written out or counted, so
 the bytes do not depend on a machine's arithmetic.
 """
@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs import by_name
 from mcz.codecs.basis_models import Basis
 from mcz.codecs.contract import Segment
 from mcz.codecs.online.units import Unit, build_units
@@ -24,7 +23,7 @@ from tools.vectors.build import spatial_clips
 from tools.vectors.build.spatial_clips import FRAME, Ints, waves
 
 ONLINE = "online"
-HEADING = f"Codec {by_name(ONLINE).id}: {ONLINE}"
+HEADING = "Codec 21: online"
 STR, LTR, INTRA = 0, 1, 2  # what the first frame of a unit is predicted from
 MIXED, GOLOMB = 0, 1  # coders
 AS_IS, REORDERED = 0, 1  # orders
@@ -64,6 +63,7 @@ class Plan:
     steps: Callable[[int, int], int] = usual
     fill: Callable[[int, int, int], Ints] = waves
     said: tuple[int, ...] = ()
+    preset: int = 0
 
     @property
     def parts(self) -> list[list[tuple[int, int]]]:
@@ -84,7 +84,7 @@ class Plan:
 
     @property
     def space(self) -> spatial_clips.Plan:
-        """The same matrices, of codec 7."""
+        """The same matrices, of lsdt-frame."""
         names = "n_channels", "segments", "apart", "weights", "bases", "known", "embedded", "step"
         return spatial_clips.Plan(FRAME, **{name: getattr(self, name) for name in names})
 

@@ -1,4 +1,4 @@
-"""Clips of codec 4, ``pca``, to order: integers, heads and headers that no encoder chooses.
+"""Clips of ``pca``, to order: integers, heads and headers that no encoder chooses.
 
 Everything coded is integers that are written out or counted, so the bytes do not depend on a
 machine's arithmetic; values are those of the decoder.
@@ -25,7 +25,7 @@ from mcz.schema import varint
 from tools.vectors.build.files import Whole, file_of, partial
 from tools.vectors.build.motions import wave
 
-HEADING = "Codec 4: pca"
+HEADING = "Codec 18: pca"
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 Ints = NDArray[np.int64]
 
@@ -110,7 +110,7 @@ def segments_of(plan: Plan) -> list[Segment]:
 
 
 def codec_of(plan: Plan) -> Codec:
-    """Codec 4 with this content, whatever the values of the motion."""
+    """Codec pca with this content, whatever the values of the motion."""
 
     def encode(source: Any, params: Any) -> Encoded:
         return Encoded(bytes((plan.decimals,)), iter(segments_of(plan)))
@@ -146,7 +146,7 @@ def file_with(plan: Plan, motion: Motion, **edits: Any) -> bytes:
 
 
 class Parts(Whole):
-    """A Shelf of files of one clip that codec 4 codes."""
+    """A Shelf of files of one clip that pca codes."""
 
     def hold_plan(
         self,

@@ -1,4 +1,4 @@
-"""Clips of codec 13, ``posewave``, to order: any skeleton, header and steps of rows.
+"""Clips of ``posewave``, to order: any skeleton, header and steps of rows.
 
 Streams are those of the encoder of one segment: binary64 + - * / alone, so that the bytes do not
 depend on a machine's arithmetic. Values are those of the decoder.
@@ -29,7 +29,7 @@ from tools.records import built
 from tools.vectors.build.files import Whole, file_of, partial
 from tools.vectors.build.motions import channels, wave
 
-HEADING = "Codec 13: posewave"
+HEADING = "Codec 3: posewave"
 Floats = NDArray[np.float64]
 
 PLAIN_FIELDS: dict[str, Any] = {
@@ -165,7 +165,7 @@ def with_exact(plan: Plan, source: SignalSource) -> Iterator[Segment]:
 
 
 def codec_of(plan: Plan) -> Codec:
-    """Codec 13 with this content, whatever the values of the motion."""
+    """Codec posewave with this content, whatever the values of the motion."""
 
     def encode(source: Any, params: Any) -> Encoded:
         made = with_exact(plan, source) if plan.exact else iter(segments_of(plan))
@@ -213,7 +213,7 @@ def file_with(plan: Plan, motion: Motion | None = None, **edits: Any) -> bytes:
 
 
 class Poses(Whole):
-    """A Shelf of files of one clip that codec 13 codes."""
+    """A Shelf of files of one clip that posewave codes."""
 
     def plan(
         self,

@@ -195,7 +195,7 @@ def _fill(chance: Chance) -> Callable[[int, int, int], Ints]:
 
 
 def _about(chance: Chance) -> dict[str, Any]:
-    """What codecs 7 to 11 have in common."""
+    """What lsdt-frame, lsdt-clip and online have in common."""
     apart = chance.random() < 0.4
     n = 3 * chance.randrange(1, 4) if apart else chance.randrange(1, 8)
     bases = ()

@@ -1,4 +1,4 @@
-"""Clips of codecs 0 and 1 made at random: grids, changes of grid, exceptions, masks, copies."""
+"""Clips of raw and lossless made at random: grids, changes of grid, exceptions, masks, copies."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _column(chance: Chance, grid: Grid, n: int) -> list[int]:
     """Ordinals of a grid: small, or anywhere up to its ends."""
     limit = grid.limit
     if grid.kind in (GridKind.FIXED, GridKind.TRIMMED, GridKind.SCALED, GridKind.INTEGER):
-        limit = min(limit, 2**43)  # which codec 1 holds as plain numbers
+        limit = min(limit, 2**43)  # which lossless holds as plain numbers
     if chance.random() < 0.6:
         return [max(-limit, min(limit, value)) for value in integers(chance, n, limit)]
     return [chance.randrange(-limit, limit + 1) for _ in range(n)]
@@ -242,7 +242,7 @@ def _lossless_streams(
 def _best_streams(
     chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
 ) -> tuple[bytes, ...]:
-    """The same of codec 12, with any links."""
+    """The same of best, with any links."""
     every = _heads(chance, layout, grids, block, copies)
     streams = []
     for group in layout.groups:
@@ -283,7 +283,7 @@ def _heads(
 def _fast_streams(
     chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
 ) -> tuple[bytes, ...]:
-    """The same of codec 14; numbers of too many classes are plain."""
+    """The same of fast; numbers of too many classes are plain."""
     place = {c: (g, k) for g, group in enumerate(layout.groups) for k, c in enumerate(group)}
     heads: list[fast_clips.Head] = []
     for c in range(layout.n_channels):

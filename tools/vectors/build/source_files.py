@@ -232,7 +232,7 @@ def with_source(motion: Motion, text: bytes, detail: Edit | None = None) -> Moti
 def lossy(
     plan: Plan, columns: Columns, name: str, details: Sequence[int] = ()
 ) -> tuple[Motion, Codec]:
-    """A clip of codec 2 whose approximations are ``columns``, 0 behind their ends.
+    """A clip of mrdwt whose approximations are ``columns``, 0 behind their ends.
 
     ``details`` are those of level 1, of all channels; there are no others.
     """

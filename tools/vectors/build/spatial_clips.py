@@ -1,5 +1,4 @@
-"""Clips of codecs 7 to 10, of Hou's family, to order: models, headers and coefficients that no
-encoder chooses.
+"""Clips of lsdt-frame and lsdt-clip to order: models, headers, coefficients no encoder chooses.
 
 Everything coded is integers that are written out or counted, so the bytes do not depend on a
 machine's arithmetic; values are those of the decoder.
@@ -41,7 +40,8 @@ SCATTERED = (0, 40, 3, 37, 6, 33, 9, 30, 12)  # shifts: sums of such vectors are
 Ints = NDArray[np.int64]
 Lengths = tuple[Sequence[int], Sequence[int]]  # of the codes of gaps and values
 FRAME, CLIP, MDTT, PCA_RDO = "lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo"
-HEADINGS = {name: f"Codec {by_name(name).id}: {name}" for name in (FRAME, CLIP, MDTT, PCA_RDO)}
+WINDOWS = "Codec 20: lsdt-clip"
+HEADINGS = {FRAME: "Codec 19: lsdt-frame", CLIP: WINDOWS, MDTT: WINDOWS, PCA_RDO: WINDOWS}
 
 
 def waves(number: int, n_rows: int, n: int) -> Ints:
@@ -298,7 +298,7 @@ class Spaces(Whole):
     def __init__(self, codec: str) -> None:
         super().__init__(f"valid/{codec}")
         self.codec = codec
-        self.spec = HEADINGS[codec] + ("" if codec == FRAME else "; Windows")
+        self.spec = HEADINGS[codec]
 
     def plan(
         self,

@@ -1,4 +1,4 @@
-"""Streams of codecs 7 to 10 that no coder would write, and what a lax reader makes of them."""
+"""Odd streams of lsdt-frame and lsdt-clip, and what a lax reader makes of them."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ def values_from(plan: Plan) -> NDArray[np.float64]:
             lsdt_frame._kernels().add_frames(out, coder._values, table, coder.space.transform())
         return values
     fields = parse(WindowsHeader, header(plan), plan.codec)
-    space = space_of_windows(plan.codec, fields, plan.layout)
+    space = space_of_windows(fields, plan.layout)
     sizes, at = [n for _, own in plan.windows() for n in own], 0
     for n, table in zip(sizes, found, strict=True):
         window_streams._kernels().synthesize(
@@ -204,7 +204,7 @@ def values_from(plan: Plan) -> NDArray[np.float64]:
 
 def spec_of(name: str, *more: str) -> str:
     """Headings of SPEC.md: those of the codec, and more."""
-    return "; ".join((HEADINGS[name], *(() if name == FRAME else ("Windows",)), *more))
+    return "; ".join((HEADINGS[name], *more))
 
 
 def silent(plan: Plan, motion: Motion | None = None, **edits: Any) -> bytes:

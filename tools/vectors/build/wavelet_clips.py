@@ -1,4 +1,4 @@
-"""Clips of codec 2, ``mrdwt``, to order: coefficients, heads and headers that no encoder chooses.
+"""Clips of ``mrdwt``, to order: coefficients, heads and headers that no encoder chooses.
 
 Coefficients are integers that are written out or counted, so the bytes do not depend on a machine's
 arithmetic; values are those of the decoder.
@@ -27,7 +27,7 @@ from mcz.transforms.wavelets import Wavelet, by_id
 from tools.vectors.build.files import Whole, file_of, partial
 from tools.vectors.build.motions import puppet, wave
 
-HEADING = "Codec 2: mrdwt"
+HEADING = "Codec 16: wavelet"
 HAAR, DB2, DB3, DB8, BIOR = 1, 2, 3, 8, 10  # ids
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 Ints = NDArray[np.int64]
@@ -229,7 +229,7 @@ def _bits(number: int, loop: Callable[..., int], *, faulty: bool) -> bytes:
 
 
 def codec_of(plan: Plan, channels: Sequence[Wave]) -> Codec:
-    """Codec 2 with this content, whatever the values of the motion."""
+    """Codec mrdwt with this content, whatever the values of the motion."""
 
     def encode(source: Any, params: Any) -> Encoded:
         return Encoded(header(plan), iter(_segments(plan, channels)), plan.resolutions)
@@ -267,7 +267,7 @@ def file_with(plan: Plan, channels: Sequence[Wave], motion: Motion, **edits: Any
 
 
 class Waves(Whole):
-    """A Shelf of files of one clip that codec 2 codes."""
+    """A Shelf of files of one clip that mrdwt codes."""
 
     def wave(
         self,

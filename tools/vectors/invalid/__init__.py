@@ -1,14 +1,11 @@
 """Files with one fault: a module or a package a folder of conformance/vectors/invalid."""
 
 from tools.vectors.invalid import (
-    awt,
     best,
-    dwt,
     fast,
     lossless,
     lsdt_clip,
     lsdt_frame,
-    mdtt,
     mrdwt,
     online,
     parts,
@@ -31,12 +28,9 @@ MODULES = (
     mrdwt,
     qbc,
     pca,
-    dwt,
-    awt,
     best,
     lsdt_frame,
     lsdt_clip,
-    mdtt,
     pca_rdo,
     online,
     posewave,

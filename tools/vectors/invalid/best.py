@@ -1,4 +1,4 @@
-"""Invalid, one fault each: streams of codec 12, ``best``."""
+"""Invalid, one fault each: streams of ``best``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: streams of codec 14, ``fast``."""
+"""Invalid, one fault each: streams of ``fast``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: streams of codec 1, ``lossless``."""
+"""Invalid, one fault each: streams of ``lossless``."""
 
 from __future__ import annotations
 
@@ -253,7 +253,7 @@ def _counts(shelf: Broken) -> None:
 
 
 def _sizes(shelf: Broken) -> None:
-    spec = "Entropy coding; Codec 1: lossless"
+    spec = "Entropy coding; Codec 128: lossless"
     cases: tuple[tuple[str, str, Edit], ...] = (
         ("byte-0-behind", "A byte 0 behind the bits, which changes none.", plus(b"\0")),
         ("byte-behind", "A byte 255 behind the bits.", plus(b"\xff")),

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: codec 8, ``lsdt-clip``, and the bases of any."""
+"""Invalid, one fault each: ``lsdt-clip``, and the bases of any."""
 
 from __future__ import annotations
 

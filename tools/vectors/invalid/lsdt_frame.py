@@ -1,4 +1,4 @@
-"""Invalid, one fault each: codec 7, ``lsdt-frame``."""
+"""Invalid, one fault each: ``lsdt-frame``."""
 
 from __future__ import annotations
 

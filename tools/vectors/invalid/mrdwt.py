@@ -1,4 +1,4 @@
-"""Invalid, one fault each: headers, segments and streams of codec 2, ``mrdwt``.
+"""Invalid, one fault each: headers, segments and streams of ``mrdwt``.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes.
 """
@@ -385,4 +385,4 @@ def _lead_hidden(shelf: Broken) -> None:
     edits = window(motion, 20, 24)
     data = wavelet_clips.file_with(plan, channels, motion, **edits, segments=headed(1, lead=1))
     purpose = "A lead of a frame less than the filters reach, of a segment that nobody needs."
-    shelf.add("segment-lead-hidden", "Codec 2: mrdwt; CLIP; DATA", purpose, data)
+    shelf.add("segment-lead-hidden", "Codec 16: wavelet; CLIP; DATA", purpose, data)

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: codec 10, ``pca-rdo``."""
+"""Invalid, one fault each: means and courses of lsdt-clip, which its preset ``pca-rdo`` has."""
 
 from __future__ import annotations
 
@@ -34,16 +34,12 @@ from tools.vectors.build.spatial_streams import (
     stream_with,
     with_model,
 )
-from tools.vectors.invalid.common import every_codec, spatial
 
 WIDE = 2049  # channels
 
 
 def vectors() -> Iterable[Vector]:
     shelf = Broken(f"invalid/{PCA_RDO}")
-    spatial.add(shelf, PCA_RDO)
-    spatial.add_once(shelf, PCA_RDO)
-    every_codec.add(shelf, PCA_RDO)
     _courses(shelf, PCA_RDO)
     _too_many(shelf, PCA_RDO)
     _mean(shelf)

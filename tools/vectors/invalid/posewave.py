@@ -1,4 +1,4 @@
-"""Invalid, one fault each: headers, segments, heads, rows and notes of codec 13, ``posewave``.
+"""Invalid, one fault each: headers, segments, heads, rows and notes of ``posewave``.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes.
 """

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: contacts of codec 13, ``posewave``, in headers and streams."""
+"""Invalid, one fault each: contacts of ``posewave``, in headers and streams."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: headers, segments and streams of codec 3, ``qbc``.
+"""Invalid, one fault each: headers, segments and streams of ``qbc``.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes.
 """

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: streams of codec 0, ``raw``."""
+"""Invalid, one fault each: streams of ``raw``."""
 
 from __future__ import annotations
 

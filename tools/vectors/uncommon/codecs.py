@@ -63,7 +63,7 @@ def _late_model(shelf: Whole) -> None:
 def _lossless() -> Iterable[Vector]:
     shelf = Whole("uncommon/lossless")
     data = file_of(dance(), codec=codec_of(version=2))
-    purpose = "Version 2 of codec 1, which this format does not have."
+    purpose = "Version 2 of lossless, which this format does not have."
     shelf.add("newer-version", "Codecs", purpose, data, exit=(UNSUPPORTED,))
     return shelf.vectors
 
@@ -74,7 +74,7 @@ def _mrdwt() -> Iterable[Vector]:
     made = waves(plan, 6)
     later = replace(wavelet_clips.codec_of(plan, made), version=1)
     data = file_of(dance_of(plan, made), grouping="channel", codec=later)
-    purpose = "Version 1 of codec 2, which this format does not have."
+    purpose = "Version 1 of mrdwt, which this format does not have."
     shelf.add("newer-version", "Codecs", purpose, data, exit=(UNSUPPORTED,))
     return shelf.vectors
 
@@ -85,7 +85,7 @@ def _qbc() -> Iterable[Vector]:
     made = paths(plan, PUPPET)
     later = replace(curve_clips.codec_of(plan, made), version=1)
     data = file_of(curve_clips.dance_of(plan, made), codec=later)
-    purpose = "Version 1 of codec 3, which this format does not have."
+    purpose = "Version 1 of qbc, which this format does not have."
     shelf.add("newer-version", "Codecs", purpose, data, exit=(UNSUPPORTED,))
     return shelf.vectors
 

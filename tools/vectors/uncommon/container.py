@@ -385,13 +385,17 @@ def _segments(shelf: Whole) -> None:
 
 def _needs_more(shelf: Whole) -> None:
     """A reader of this version must say that it lacks something."""
-    crafters = Crafter(), Crafter(), Crafter()
+    crafters = tuple(Crafter() for _ in range(5))
     crafters[0].clip(dance(), codec=replace(raw.CODEC, id=2**20))
     crafters[1].clip(dance(), codec=replace(raw.CODEC, version=9))
+    crafters[3].clip(dance(), codec=replace(raw.CODEC, id=5))
+    crafters[4].clip(dance(), codec=replace(raw.CODEC, id=255))
     crafters[2].plain_chunk(b"ROOM", b"what the room looked like")
     crafters[2].clip(dance())
     cases = (
         ("unknown-codec", "Codecs", "A codec id beyond the registry.", finished(crafters[0])),
+        ("old-codec", "Codecs", "Codec 5, which was dwt in 0.9.", finished(crafters[3])),
+        ("private-codec", "Codecs", "A codec for private use.", finished(crafters[4])),
         ("newer-codec", "Codecs", "A later version of a known codec.", finished(crafters[1])),
         ("unknown-critical", "Chunks", "A critical chunk of unknown type.", finished(crafters[2])),
         ("newer-major", "HEAD", "A later major version.", file_of(dance(), HEAD=at(2, b"\2\0"))),

@@ -1,4 +1,4 @@
-"""Valid: codec 6, ``awt``, which is coded as codec 2 is."""
+"""Valid: preset ``awt`` of wavelet, which is coded as mrdwt is."""
 
 from __future__ import annotations
 

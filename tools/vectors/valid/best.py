@@ -1,4 +1,4 @@
-"""Valid: codec 12, ``best``."""
+"""Valid: ``best``."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _counts(shelf: Streams) -> None:
         "Rests of two channels are numbered behind the coded ones, and look at any before them."
     )
     shelf.code("counts-rests", purpose, motion, heads, links)
-    purpose = "The same, coded as codec 1 does."
+    purpose = "The same, coded as lossless does."
     shelf.code("counts-as-codec-1", purpose, motion, heads, methods=(AS_CODEC_1,))
 
 
@@ -125,7 +125,7 @@ def _methods(shelf: Streams) -> None:
     heads = [Coded(), Coded(taps=(32,)), Copy(0, 0), Coded(from_last=0)]
     for name, methods in (("0-1", (AS_CODEC_1, LINKED)), ("1-0", (LINKED, AS_CODEC_1))):
         given = {"grouping": "joint", "methods": methods}
-        purpose = f"Methods {name}: one stream as of codec 1, one with links, and copies between."
+        purpose = f"Methods {name}: one stream as of lossless, one with links, and copies between."
         shelf.code(f"methods-{name}", purpose, motion, heads, **given)
     motion = panel([[0.5] * 9, wave(9), [0.25] * 9, wave(9)], (HUNDREDTHS,) * 4, (4,))
     heads = [Constant(), Coded(), Constant(), Copy(0, 1)]
@@ -135,7 +135,7 @@ def _methods(shelf: Streams) -> None:
     heads = [Constant(), Coded(), Copy(0, 1), Coded(), Coded()]
     purpose = "Coded channels are counted without constants and copies: when weights are solved."
     shelf.code("constants-before", purpose, motion, heads)
-    purpose = "Constants alone, in a stream of codec 1."
+    purpose = "Constants alone, in a stream of lossless."
     shelf.code("constants", purpose, panel([[0.5] * 4], (HUNDREDTHS,)), [Constant()])
 
 

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from mcz.clock import MAX_NUMBER
+from mcz.codecs import raw
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, ChunkType
 from mcz.container.limits import ARCHIVE
 from mcz.container.metadata import Record
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tools.records import built
+from tools.vectors.build import wavelet_clips
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.deflate import END, Bits, code_of, own_lengths
 from tools.vectors.build.edits import at, both, put
@@ -40,6 +42,7 @@ def vectors() -> Iterable[Vector]:
     _versions(shelf)
     _unknown(shelf)
     _columns(shelf)
+    _presets(shelf)
     _deflate(shelf)
     _words(shelf)
     _frame_numbers(shelf)
@@ -63,6 +66,21 @@ def _clips(shelf: Whole) -> None:
     shelf.hold("frame-numbers", "Time", purpose, file_of(numbered), numbered)
     data = finished(Crafter(profile=ARCHIVE), dance())
     shelf.hold("archive-profile", "Limits and profiles", "The archive profile.", data, dance())
+
+
+def _presets(shelf: Whole) -> None:
+    for preset, of in ((1, "a codec that has none"), (255, "an unknown preset")):
+        data = file_of(dance(), codec=replace(raw.CODEC, preset=preset))
+        purpose = f"Preset {preset}: of {of}, which a reader ignores."
+        shelf.hold(f"preset-{preset}", "Codecs", purpose, data, dance())
+    plan = wavelet_clips.Plan(8)
+    made = wavelet_clips.waves(plan, 6)
+    for preset in (0, 99):
+        codec = replace(wavelet_clips.codec_of(plan, made), preset=preset)
+        motion = wavelet_clips.dance_of(plan, made)
+        data = file_of(motion, codec=codec, grouping="channel")
+        purpose = f"A clip of wavelet whose preset is {preset}."
+        shelf.hold(f"preset-wavelet-{preset}", "Codecs; Codec 16: wavelet", purpose, data, motion)
 
 
 def _attachments(shelf: Whole) -> None:

@@ -117,7 +117,7 @@ def _joints(shelf: Whole) -> None:
     motion = shown(_joint_alone(whole, (1, 2)), 2, 12)
     purpose = "Copies of channels of a group that has another number since joints were cut."
     parts = (partial(motion, (0, 3), (2,)),)
-    spec = f"{CUT_HEADING}; Codec 1: lossless"
+    spec = f"{CUT_HEADING}; Codec 128: lossless"
     shelf.hold("copies", spec, purpose, data, motion, parts=parts)
 
 

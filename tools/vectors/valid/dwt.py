@@ -1,4 +1,4 @@
-"""Valid: codec 5, ``dwt``, which is coded as codec 2 is."""
+"""Valid: preset ``dwt`` of wavelet, which is coded as mrdwt is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Valid: codec 8, ``lsdt-clip``."""
+"""Valid: ``lsdt-clip``."""
 
 from __future__ import annotations
 

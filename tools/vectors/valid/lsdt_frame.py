@@ -1,4 +1,4 @@
-"""Valid: codec 7, ``lsdt-frame``."""
+"""Valid: ``lsdt-frame``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Valid: codec 9, ``mdtt``."""
+"""Valid: ``mdtt``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Valid: codec 4, ``pca``: heads, tables, segments, groups."""
+"""Valid: ``pca``: heads, tables, segments, groups."""
 
 from __future__ import annotations
 

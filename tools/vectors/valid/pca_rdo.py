@@ -1,4 +1,4 @@
-"""Valid: codec 10, ``pca-rdo``."""
+"""Valid: ``pca-rdo``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Valid: codec 3, ``qbc``: marks, curves, segments, groups, cuts."""
+"""Valid: ``qbc``: marks, curves, segments, groups, cuts."""
 
 from __future__ import annotations
 

@@ -33,8 +33,8 @@ from tools.vectors.build.random_clips import clip
 from tools.vectors.build.random_parts import LETTERS, OLDER, Chance, Clip, skeleton, split, text
 from tools.vectors.build.source_files import ODD, PLAIN, take
 
-OLD_COUNT = 80  # files that are older than codec 13, and stay as they are
-COUNT = OLD_COUNT + 3 * 8  # vectors: eight each begin with codecs 13, 14 and 12
+OLD_COUNT = 80  # files that are older than posewave, and stay as they are
+COUNT = OLD_COUNT + 3 * 8  # vectors: eight each begin with posewave, fast and best
 SPEC = ("Grammar", "CLIP", "DATA")
 TYPES = (b"xtra", b"zVOL", b"Qnot", b"NOTE")
 

@@ -1,4 +1,4 @@
-"""Valid: codec 0, ``raw``: segments, widths, groups, signals."""
+"""Valid: ``raw``: segments, widths, groups, signals."""
 
 from __future__ import annotations
 

@@ -6,18 +6,18 @@ from mcz.codecs import by_name
 from mcz.container import payloads
 from mcz.schema import varint
 from tools.vectors.build.edits import Edit, put, span
-from tools.vectors.build.files import Broken, Crafter, finished
+from tools.vectors.build.files import Broken, Crafter, finished, heading_of
 from tools.vectors.build.motions import dance
 
 
 def add(shelf: Broken, name: str) -> None:
     """Headers of clips in which there is nothing to decode."""
     codec = by_name(name)
-    spec = f"Codec {codec.id}: {name}; CLIP"
+    spec = f"{heading_of(name)}; CLIP"
 
     def edited(edit: Edit) -> bytes:
         crafter = Crafter(CLIP=edit)
-        segments = {"segment_frames": 8} if codec.id > 1 else {}
+        segments = {"segment_frames": 8} if name not in ("raw", "lossless") else {}
         crafter.clip(dance(0), codec=codec, grouping=codec.grouping, **segments)
         return finished(crafter)
 

@@ -1,4 +1,4 @@
-"""Faults of headers and models of codecs 7 and 8.
+"""Faults of headers and models of lsdt-frame and lsdt-clip.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes.
 """

@@ -1,4 +1,4 @@
-"""Invalid, one fault each: streams of codecs 7 to 10.
+"""Invalid, one fault each: streams of lsdt-frame and lsdt-clip.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes.
 """

@@ -1,10 +1,7 @@
-"""Faults of clips of codecs 7 to 10: headers, signals, segments."""
+"""Faults of clips of lsdt-frame and lsdt-clip: headers, signals, segments."""
 
 from __future__ import annotations
 
-import math
-import struct
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,33 +11,29 @@ from mcz.container import payloads
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
 from tools.records import built
-from tools.vectors.build import spatial_clips
-from tools.vectors.build.edits import headed, plus, put, says, stream
-from tools.vectors.build.files import Broken, file_of, rehash
+from tools.vectors.build.edits import headed, put, says
+from tools.vectors.build.files import Broken, rehash
 from tools.vectors.build.spatial_clips import (
-    CLIP,
     FRAME,
-    PCA_RDO,
     Plan,
     basis_of,
     file_with,
     header,
 )
-from tools.vectors.build.spatial_streams import silent, sized, spec_of
+from tools.vectors.build.spatial_streams import silent, spec_of
 
 
 def add(shelf: Broken, name: str) -> None:
-    _flags(shelf, name)
     _signal(shelf, name)
     _segments(shelf, name)
-    if name != FRAME:
+    if name == FRAME:
+        _flags(shelf, name)
+    else:
         _windows(shelf, name)
 
 
 def _flags(shelf: Broken, name: str) -> None:
     """A mean and courses, of a codec that has none."""
-    if name == PCA_RDO:
-        return
     nothing = basis_of(1, 1, entries=[[0]])
     plan = Plan(name, 1, (6,), window=1, bases=(nothing,))
     for case, purpose, flag in (
@@ -57,12 +50,9 @@ def _windows(shelf: Broken, name: str) -> None:
         "window-0": ("Windows of 0 frames.", {"window": b"\0", "n_frequencies": b"\0"}),
         "frequencies-0": ("No frequencies.", {"n_frequencies": b"\0"}),
         "frequencies-9": ("9 frequencies of 8 frames.", {"n_frequencies": b"\x09"}),
+        "window-varint": ("A window of 8 frames, in two bytes.", {"window": b"\x88\0"}),
+        "frequencies-varint": ("4 frequencies, in two bytes.", {"n_frequencies": b"\x84\0"}),
     }
-    if name == CLIP:
-        cases |= {
-            "window-varint": ("A window of 8 frames, in two bytes.", {"window": b"\x88\0"}),
-            "frequencies-varint": ("4 frequencies, in two bytes.", {"n_frequencies": b"\x84\0"}),
-        }
     for case, (purpose, parts) in cases.items():
         made = replace(plan, frequencies=8) if case == "frequencies-9" else plan
         data = silent(made, CLIP=says(header(made, **parts)))
@@ -109,76 +99,3 @@ def _segments(shelf: Broken, name: str) -> None:
         cases += [("segment-first", "The first segment is not fresh.", headed(0, flags=0))]
     for case, purpose, edit in cases:
         shelf.add(case, spec, purpose, file_with(plan, segments=edit))
-
-
-def add_once(shelf: Broken, name: str) -> None:
-    plan = spatial_clips.Plan(name, 4, (6,), bases=(basis_of(4, 2),))
-    spec = spec_of(name, "Space")
-    weighted = replace(plan, weights=bytes(4))
-    heads: tuple[tuple[str, str, spatial_clips.Plan, dict[str, bytes]], ...] = (
-        ("flags-16", "A flag that is reserved.", plan, {"flags": b"\x10"}),
-        ("basis-2", "A basis of kind 2.", plan, {"basis": b"\2"}),
-        ("coder-2", "Coder 2.", plan, {"coder": b"\2"}),
-        ("model-absent", "Bases of a model, which is not named.", plan, {"model": b""}),
-        ("weights-fewer", "3 weights of 4 channels.", weighted, {"weights": b"\3" + bytes(3)}),
-        ("step-0", "A step of 0.0.", plan, {"step": bytes(8)}),
-        ("step-NaN", "A step of nan.", plan, {"step": struct.pack("<d", math.nan)}),
-        ("header-and-byte", "A byte behind the header.", plan, {"coder": b"\0\0"}),
-    )
-    for case, purpose, made, parts in heads:
-        data = silent(made, CLIP=says(spatial_clips.header(made, **parts)))
-        shelf.add(case, spec, purpose, data)
-    short = spatial_clips.Plan(name, 4, (6,), bases=(basis_of(4, 2),))
-    other = replace(short, bases=(basis_of(3, 2),))
-    data = _with_model(short, other)
-    shelf.add("model-points-3", spec_of(name, "Bases"), "Vectors of 3 entries for 4 points.", data)
-    full = spatial_clips.Plan(name, 3, (20,))
-    cases: tuple[tuple[str, str, Callable[[bytes], bytes]], ...] = (
-        ("byte-behind", "A byte 255 behind the bits of the last window.", _longer(b"\xff")),
-        ("byte-0-behind", "A byte 0 behind the bits of the last window.", _longer(b"\0")),
-        ("byte-missing", "The last window without its last byte.", _longer(None)),
-        ("window-behind", "A byte behind the last window.", plus(b"\0")),
-        ("window-missing", "The third window is missing.", lambda data: sized(*_split(data)[:2])),
-        ("stream-empty", "No window.", lambda data: b""),
-    )
-    for case, purpose, edit in cases:
-        data = spatial_clips.file_with(full, segments=stream(0, edit))
-        shelf.add(case, spec_of(name), purpose, data)
-
-
-def _with_model(plan: spatial_clips.Plan, other: spatial_clips.Plan) -> bytes:
-    """A file of zeros by ``plan``, whose header names the model of ``other``, which is there."""
-    made = replace(plan, fill=spatial_clips.still)
-    motion = spatial_clips.motion_of(made)
-    model = other.model
-    assert model is not None
-    codec = spatial_clips.codec_of(made)
-
-    def encode(source: Any, params: Any) -> Any:
-        found = codec.encode(source, params)
-        return replace(found, header=spatial_clips.header(other), models=(model,))
-
-    def decode(header: bytes, layout: Any, spans: Any, request: Any, fetch: Any) -> Any:
-        return np.zeros((request.stop - request.start, plan.n_channels))
-
-    return file_of(motion, codec=replace(codec, encode=encode, decode=decode), grouping="all")
-
-
-def _split(data: bytes) -> list[bytes]:
-    """The windows of a stream, each shorter than 128 bytes."""
-    found = []
-    while data:
-        assert data[0] < 128
-        found.append(data[1 : 1 + data[0]])
-        data = data[1 + data[0] :]
-    return found
-
-
-def _longer(more: bytes | None) -> Callable[[bytes], bytes]:
-    """The last window with these bytes behind it, or without its last one."""
-
-    def edit(data: bytes) -> bytes:
-        *others, last = _split(data)
-        return sized(*others, last[:-1] if more is None else last + more)
-
-    return edit

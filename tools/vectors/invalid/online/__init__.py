@@ -1,4 +1,4 @@
-"""Invalid, one fault each: codec 11, ``online``."""
+"""Invalid, one fault each: ``online``."""
 
 from __future__ import annotations
 

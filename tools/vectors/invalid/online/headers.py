@@ -1,4 +1,4 @@
-"""Invalid, one fault each: headers, models, signals and segments of codec 11, online.
+"""Invalid, one fault each: headers, models, signals and segments of online.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes: the clips are of
 zeros, which every header makes of frames with nothing in them.

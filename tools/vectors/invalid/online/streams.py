@@ -1,4 +1,4 @@
-"""Invalid, one fault each: bits of codec 11, online.
+"""Invalid, one fault each: bits of online.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes.
 """

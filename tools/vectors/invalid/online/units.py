@@ -1,4 +1,4 @@
-"""Invalid, one fault each: units of codec 11, online.
+"""Invalid, one fault each: units of online.
 
 Where a reader can overlook the fault, the hash is that of what it then decodes.
 """

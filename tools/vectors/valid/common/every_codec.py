@@ -30,7 +30,7 @@ from tools.vectors.build import (
 )
 from tools.vectors.build.cuts import CUT_HEADING, cut, shown
 from tools.vectors.build.edits import Made, both, put
-from tools.vectors.build.files import Crafter, Whole, file_of, finished, partial
+from tools.vectors.build.files import Crafter, Whole, file_of, finished, heading_of, partial
 from tools.vectors.build.lossless_clips import codec_of
 from tools.vectors.build.motions import HUNDREDTHS, dance, numbers
 from tools.vectors.build.pca_clips import Part, part_of
@@ -49,7 +49,7 @@ OPENED = both(put(payloads.Clip, "flags", b"\1"), put(payloads.Clip, "n_frames",
 
 def add(shelf: Whole, name: str) -> None:
     """Add what the codec ``name`` has."""
-    spec = f"Codec {by_name(name).id}: {name}"
+    spec = heading_of(name)
     _clips(shelf, spec, name)
     _ancillary(shelf, spec, name)
     _packets(shelf, spec, name)
@@ -359,5 +359,5 @@ def no_channels(shelf: Whole, name: str) -> None:
     still = Motion(spatial_clips.markers(0), (Signal(numbers(7, 0)),), name="still")
     own = by_name(name)
     data = file_of(still, codec=own)
-    heading = f"Codec {own.id}: {name}"
+    heading = heading_of(name)
     shelf.hold("no-channels", heading, "A clip of 7 frames without a channel.", data, still)

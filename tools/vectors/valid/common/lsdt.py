@@ -1,4 +1,4 @@
-"""What codecs 7 and 8 have: lengths, matrices, steps, codes, sizes, models."""
+"""What lsdt-frame and lsdt-clip have: lengths, matrices, steps, codes, sizes, models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What several of codecs 7 to 10 have: clips, cuts, vectors of their own, windows."""
+"""What several of lsdt-frame and lsdt-clip have: clips, cuts, vectors of their own, windows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What codecs 5 and 6 have: streams of codec 2 under another id."""
+"""What dwt and awt have: streams of mrdwt under another preset."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tools.vectors.build.cuts import CUT_HEADING, cut
 from tools.vectors.build.edits import put
 from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.motions import UNROUNDED
-from tools.vectors.build.wavelet_clips import as_codec
+from tools.vectors.build.wavelet_clips import HEADING, as_codec
 
 HALVES = Wavelet((0.5, 0.25, -0.75, 1.5), (1.25, -0.5, 0.5, -0.125))
 
@@ -26,9 +26,8 @@ def add(shelf: Whole, name: str) -> None:
 
 
 def _plans(shelf: Whole, name: str) -> None:
-    """Coefficients and resolutions of codec 2, under another id."""
+    """Coefficients and resolutions."""
     codec = by_name(name)
-    heading = f"Codec {codec.id}: {name}"
     cases = (
         (
             "scaled",
@@ -51,12 +50,12 @@ def _plans(shelf: Whole, name: str) -> None:
         data = file_of(motion, codec=own, grouping="channel")
         requests = [(0, (7, 30), None), (1, (0, 45), None)]
         parts = tuple(wavelet_clips.request(plan, made, motion, *request) for request in requests)
-        shelf.hold(case, heading, purpose, data, motion, parts=parts)
+        shelf.hold(case, HEADING, purpose, data, motion, parts=parts)
 
 
 def _waves(shelf: Whole, name: str) -> None:
-    """What codec 2 reads, under another id."""
-    spec = f"Codec {by_name(name).id}: {name}; Wavelets"
+    """Headers, streams and groups."""
+    spec = f"{HEADING}; Wavelets"
 
     def hold(case: str, purpose: str, plan: wavelet_clips.Plan, n: int = 1, **edits: Any) -> None:
         made = wavelet_clips.waves(plan, n)

@@ -1,4 +1,4 @@
-"""Valid: codec 14, ``fast``."""
+"""Valid: ``fast``."""
 
 from __future__ import annotations
 

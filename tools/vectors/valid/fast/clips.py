@@ -1,4 +1,4 @@
-"""Clips of codec 14: groups, segments, notes, lengths."""
+"""Clips of fast: groups, segments, notes, lengths."""
 
 from __future__ import annotations
 

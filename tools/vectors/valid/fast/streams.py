@@ -1,4 +1,4 @@
-"""Streams of codec 14: heads, forms, predictors, ranks, symbols, ends."""
+"""Streams of fast: heads, forms, predictors, ranks, symbols, ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Valid: codec 1, ``lossless``."""
+"""Valid: ``lossless``."""
 
 from __future__ import annotations
 

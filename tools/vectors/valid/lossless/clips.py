@@ -1,4 +1,4 @@
-"""Clips of codec 1: groups, segments, notes, lengths."""
+"""Clips of lossless: groups, segments, notes, lengths."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Streams of codec 1: counts, the laws that make numbers of them, and rests."""
+"""Streams of lossless: counts, the laws that make numbers of them, and rests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Streams of codec 1: heads, forms, predictors, copies, residuals."""
+"""Streams of lossless: heads, forms, predictors, copies, residuals."""
 
 from __future__ import annotations
 

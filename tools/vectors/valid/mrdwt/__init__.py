@@ -1,4 +1,4 @@
-"""Valid: codec 2, ``mrdwt``."""
+"""Valid: ``mrdwt``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clips of codec 2: segments, groups, masks, resolutions, cuts."""
+"""Clips of mrdwt: segments, groups, masks, resolutions, cuts."""
 
 from __future__ import annotations
 

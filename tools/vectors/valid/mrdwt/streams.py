@@ -1,4 +1,4 @@
-"""Streams of codec 2: wavelets, levels, steps, heads, coefficients."""
+"""Streams of mrdwt: wavelets, levels, steps, heads, coefficients."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Valid: codec 11, ``online``."""
+"""Valid: ``online``."""
 
 from __future__ import annotations
 

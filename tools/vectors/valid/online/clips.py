@@ -1,4 +1,4 @@
-"""Clips of codec 11: units in segments, positions, cuts, packets."""
+"""Clips of online: units in segments, positions, cuts, packets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Streams of codec 11: units, predictors, matrices, steps, models."""
+"""Streams of online: units, predictors, matrices, steps, models."""
 
 from __future__ import annotations
 
@@ -82,7 +82,8 @@ def _presets(shelf: Groups) -> None:
         "rc": replace(reordered, units=("I15 L15 L15",), steps=_wandering),
         "rca": replace(reordered, units=("I15 L15 L7",), steps=_far_apart),
     }
-    for preset, plan in plans.items():
+    for number, (preset, made) in enumerate(plans.items()):
+        plan = replace(made, preset=number)
         motion = motion_of(plan, skeleton=markers(3))
         frames = sum(plan.segments)
         shelf.plan(

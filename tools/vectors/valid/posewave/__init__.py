@@ -1,4 +1,4 @@
-"""Valid: codec 13, ``posewave``."""
+"""Valid: ``posewave``."""
 
 from __future__ import annotations
 

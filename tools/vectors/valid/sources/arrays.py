@@ -191,7 +191,7 @@ def _pieces(shelf: Whole) -> None:
 
 
 def _lossy(shelf: Whole) -> None:
-    """Values of codec 2, which are no binary32; what is invalid becomes NaN."""
+    """Values of mrdwt, which are no binary32; what is invalid becomes NaN."""
     thirds = [33, -33, 66, -67, 100, 101, -1, 0, 1, 12345, -99, 7]
     plan = Plan(len(thirds), HAAR, 0, 3)
     channels = [Wave([column]) for column in (thirds, thirds[::-1], [3 * k for k in thirds])]

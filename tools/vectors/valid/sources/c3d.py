@@ -28,7 +28,7 @@ def add(shelf: Whole) -> None:
 
 
 def hold(shelf: Whole, name: str, purpose: str, file: Made, coded: bool = False) -> None:
-    """Add the file, its clip coded by raw or by codec 1."""
+    """Add the file, its clip coded by raw or by lossless."""
     source = file.build()
     motion = take_c3d(source, name)
     _check(motion, file)
@@ -54,9 +54,9 @@ def _orders(shelf: Whole) -> None:
             purpose = f"Points and analog samples, {order}, {word}."
             hold(shelf, f"{order}-{word}", purpose, c3d_file(processor=processor, size=size))
     file = c3d_file(9, 3, 2, 3)
-    hold(shelf, "lossless", "A C3D file whose signals codec 1 codes.", file, coded=True)
+    hold(shelf, "lossless", "A C3D file whose signals lossless codes.", file, coded=True)
     file = c3d_file(9, 3, 2, 3, DEC, scale=0.1)
-    hold(shelf, "lossless-dec", "VAX floats in classes of codec 1.", file, coded=True)
+    hold(shelf, "lossless-dec", "VAX floats in classes of lossless.", file, coded=True)
 
 
 def _parts(shelf: Whole) -> None:
@@ -99,14 +99,14 @@ def _odd_words(shelf: Whole) -> None:
         file.points[1, 1] = 0x80000000, 0x7F800000, 0xFF800000, 1
         purpose = f"NaN whose signs and payloads must come back, infinities, -0; {order}."
         for name, coded in (("", False), ("-lossless", True)):
-            how = "codec 1" if coded else "raw"
+            how = "lossless" if coded else "raw"
             hold(shelf, f"nan-{order}{name}", f"{purpose[:-1]}, {how}.", file, coded)
     file = c3d_file(processor=DEC)
     file.points[0, 0, :3] = 0x00008000, 0x12348000, 0x12340000
     file.points[1, 1, :3] = 0xFFFF7FFF, 0xFFFFFFFF, 0x00000080
     purpose = "Reserved operands of a VAX, a zero with a fraction, the ends of its range."
     hold(shelf, "vax-reserved", purpose, file)
-    hold(shelf, "vax-reserved-lossless", f"{purpose[:-1]}; codec 1.", file, coded=True)
+    hold(shelf, "vax-reserved-lossless", f"{purpose[:-1]}; lossless.", file, coded=True)
 
 
 def _around(shelf: Whole) -> None:

@@ -33,7 +33,7 @@ def add(shelf: Whole) -> None:
 
 
 def hold(shelf: Whole, name: str, purpose: str, file: Made, coded: bool = False) -> None:
-    """Add the file, its clip coded by raw or by codec 1."""
+    """Add the file, its clip coded by raw or by lossless."""
     source = file.build()
     motion = take_c3d(source, name)
     assert motion.source is not None and motion.source.format == "c3d-outputs"
@@ -48,7 +48,7 @@ def _orders(shelf: Whole) -> None:
             purpose = f"Outputs between points, {order}, {word}."
             file = c3d_outputs(processor=processor, size=size)
             hold(shelf, f"outputs-{order}-{word}", purpose, file)
-    purpose = "Outputs between points, whose signals codec 1 codes."
+    purpose = "Outputs between points, whose signals lossless codes."
     hold(shelf, "outputs-lossless", purpose, c3d_outputs(n_frames=9), coded=True)
 
 
@@ -115,7 +115,7 @@ def _masks(shelf: Whole) -> None:
 
 
 def _lossy(shelf: Whole) -> None:
-    """Positions of codec 2; outputs remain as they are."""
+    """Positions of mrdwt; outputs remain as they are."""
     file = c3d_file(13, 2, 0, 1, size=2, scale=0.1)
     file.parameters = {"POINT": lists(file, ANGLES=["p0"])}
     whole = take_c3d(file.build(), "outputs-lossy")

@@ -189,7 +189,7 @@ def _gaps(shelf: Whole) -> None:
         )
         _hold(shelf, f"gaps-{order}", purpose, motion, f"Masks; {C3D_SPEC}")
         if order == "sgi":
-            purpose = f"{purpose.removesuffix('.')}, in codec 1."
+            purpose = f"{purpose.removesuffix('.')}, in lossless."
             _hold(shelf, "gaps-lossless", purpose, motion, f"Masks; {C3D_SPEC}", codec_of())
     file = c3d_file(4, size=2)
     file.points[:, :, 3] = [[0, 5], [0xFFFF, 7], [0x8000, 0], [1, 0xFFFF]]
@@ -235,7 +235,7 @@ def _limited(shelf: Whole) -> None:
 
 
 def _lossy(shelf: Whole) -> None:
-    """Values of codec 2 halfway between words."""
+    """Values of mrdwt halfway between words."""
     halves = [5, -5, 15, -15, 25, -25, 35, 125, 3_276_705, 3_276_715, -3_276_805, -3_276_815, 1]
     for scale in (0.1, 0.5, 1.0):
         file = c3d_file(len(halves), 1, 0, 1, size=2, scale=scale)

@@ -315,7 +315,7 @@ def _beside(shelf: Whole) -> None:
     header = wavelet_clips.header(plan)
     edits: dict[str, Callable[..., Any]] = {
         "CLIP": both(
-            put(payloads.Clip, "signals.1.codec", b"\2"),
+            put(payloads.Clip, "signals.1.codec", b"\x10"),
             put(payloads.Clip, "signals.1.header", varint(len(header)) + header),
         ),
         "segments": lambda made: [
@@ -334,4 +334,4 @@ def _beside(shelf: Whole) -> None:
 
 def _second_codec(row: Any) -> Any:
     first, second = row.signals
-    return replace(row, signals=(first, replace(second, codec=2)))
+    return replace(row, signals=(first, replace(second, codec=16)))

@@ -31,7 +31,7 @@ def add(shelf: Whole) -> None:
 
 
 def _lossy(shelf: Whole) -> None:
-    """Values that are on no grid, by codec 2: halves, and numbers beyond the ends of grids."""
+    """Values that are on no grid, by mrdwt: halves, and numbers beyond the ends of grids."""
     integers = [0, 1, -1, 3, -5, 12345, -99999, 2**40, -(2**40), 2**39 + 1, 7, -3]
     steps = [136, 136, 128, 128, 124, 130, 255, 255, 136, 200, 0, 64]
     grids = (
@@ -56,7 +56,7 @@ def _lossy(shelf: Whole) -> None:
 def _of_steps(
     grids: Sequence[Grid], integers: Sequence[int], steps: Sequence[int], unit: float, name: str
 ) -> tuple[Motion, object]:
-    """A clip of codec 2 whose every frame is a segment with a step of its own."""
+    """A clip of mrdwt whose every frame is a segment with a step of its own."""
     n = len(integers)
     plan = Plan(n, HAAR, 0, SCALED, unit, ends=tuple(range(1, n)))
     heads = tuple(Head(step, 0, 63) for step in steps)

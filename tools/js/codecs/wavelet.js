@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 2: mrdwt". The codecs 5 and 6, dwt and awt, are read alike.
+// SPEC.md, "Codec 16: wavelet".
 
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits } from "../entropy.js";
@@ -10,8 +10,8 @@ import { checkCuts } from "../segments.js";
 import { restart, startModels } from "../start-models.js";
 import { WAVELETS, bandLengths, neededRanges, synthesis } from "../wavelets.js";
 
-export const id = 2;
-export const name = "mrdwt";
+export const id = 16;
+export const name = "wavelet";
 export const version = 0;
 
 const MAX_LEVELS = 16;
@@ -19,7 +19,7 @@ const GREATEST_LEAST = 2 ** 39;
 const EQUAL = 63;
 
 /**
- * Opens a signal of codec 2, 5 or 6.
+ * Opens a signal of wavelet.
  *
  * @param {Uint8Array} header WAVELET_HEADER
  * @param {object} layout the signal, as CLIP has it
