@@ -70,6 +70,19 @@ def test_times_of_a_table_are_a_signal_of_their_own(tmp_path: Path) -> None:
         assert clip.source_bytes() == text.encode() and not file.attachments
 
 
+def test_times_of_a_table_without_a_signal_are_kept(tmp_path: Path) -> None:
+    """A file of 0.9 has those that its source made of frame numbers; a decoder needs none now."""
+    rows = "".join(f"{n},{n / 50:.2f},{n}.5\n" for n in (4, 5, 6, 9))
+    (tmp_path / "a.csv").write_text(f"frame,time,x\n{rows}")
+    for codec in ("raw", "dwt"):
+        old = tmp_path / f"{codec}.mcz"
+        mcz.encode(tmp_path / "a.csv", old, codec=codec)
+        with mcz.open(migrated(old)) as file:
+            clip = file.only_clip()
+            assert clip.frame_numbers.tolist() == [4, 5, 6, 9]
+            assert np.abs(clip.times - [0.08, 0.1, 0.12, 0.18]).max() < 1e-9
+
+
 def facts(path: Path) -> dict[str, tuple[object, ...]]:
     with mcz.open(path) as file:
         return {

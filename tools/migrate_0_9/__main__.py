@@ -53,7 +53,7 @@ def migrate(
             migration.write()
         if held.content["redundancy"] is not None:
             mcz.protect(made, held.content["redundancy"])
-        if lost := list(write_new.differences(held, made, migration.split)):
+        if lost := list(write_new.differences(held, made, migration.split, migration.untimed)):
             sys.exit(f"{old}: not the same in the new file: {'; '.join(lost)}")
         with made.open("rb") as own:
             shutil.copyfileobj(own, stream)

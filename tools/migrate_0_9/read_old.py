@@ -93,6 +93,7 @@ def is_times(found: Any) -> bool:
 
 def clip(found: Any, folder: Folder) -> dict[str, Any]:
     motion, rate, source = found.motion(), found.frame_rate, found.source
+    line = found.timeline
     pairs = zip(motion.signals, found.value_hashes, strict=True)
     return {
         "name": found.name,
@@ -103,6 +104,8 @@ def clip(found: Any, folder: Folder) -> dict[str, Any]:
         "is_rate_exact": found.frame_rate_exact,
         "metadata": {k: v for k, v in found.metadata.items() if k != "frame-numbers"},
         "frame_numbers": folder.keep(found.frame_numbers.astype("<i8").tobytes()),
+        "times": None if line is None else folder.keep(line.times.astype("<f8").tobytes()),
+        "rounding": 0.0 if line is None else line.rounding,
         "quality": found.quality,
         "signals": [signal(one, sha256, folder) for one, sha256 in pairs],
         "file": None if source is None else folder.file(source.path, found.source_bytes()),

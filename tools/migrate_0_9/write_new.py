@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 import mcz
+from mcz.clock import EXACT, Timeline, numbers_or_rows
 from mcz.codecs import by_name
 from mcz.container import payloads
 from mcz.container.metadata import Record
@@ -88,7 +89,17 @@ class Old:
         )
 
     def frame_numbers(self, clip: Content) -> np.ndarray[Any, np.dtype[np.int64]]:
-        return np.frombuffer(self.data(clip["frame_numbers"]), "<i8")
+        """Those of the clip; where they do not ascend, they count from the first on."""
+        numbers = np.frombuffer(self.data(clip["frame_numbers"]), "<i8")
+        if (numbers[1:] > numbers[:-1]).all():
+            return numbers
+        return numbers[0] + np.arange(len(numbers))
+
+    def times(self, clip: Content) -> Timeline | None:
+        if clip["times"] is None:
+            return None
+        rate = None if clip["rate"] is None else Fraction(*clip["rate"])
+        return Timeline(np.frombuffer(self.data(clip["times"]), "<f8"), rate, clip["rounding"])
 
     def motion(self, clip: Content, skeleton: Skeleton) -> Motion:
         """A clip by its numbers alone, without a source."""
@@ -108,7 +119,6 @@ class Old:
             clip["name"],
             {key: value for key, value in clip["metadata"].items() if key != START},
             frame_numbers=None if counted else numbers,
-            first_time=float(clip["metadata"][START]) if START in clip["metadata"] else None,
         )
 
 
@@ -133,6 +143,7 @@ class Migration:
         self.writer = Writer(stream, profile=profile_of(large), copies=old.content["has_copies"])
         self._skeletons: dict[str, tuple[bytes, Skeleton]] = {}  # by their old ids
         self.split = set[str]()  # clips whose column of times is a signal of its own now
+        self.untimed = set[str]()  # clips whose times were not those of their frame numbers
         self._as_files: dict[str, str] = {}  # clips whose file is an attachment now
 
     def write(self) -> None:
@@ -160,12 +171,25 @@ class Migration:
         motion = self.old.motion(clip, skeleton)
         if clip["file"] is not None:
             motion = self._sourced(clip, motion)
+        if not motion.signals_of("times"):
+            motion = self._timed(clip, motion)
         kept = clip["codec"] if clip["codec"] in KEPT else "fast"
         write_clip(self.writer, motion, by_name(self.codec or kept), {})
         if clip["quality"] is not None:
             self.writer.ancillary(CHUNK, quality_payload(clip["quality"]))
         if clip["file"] is not None and motion.source is None:
             self._as_attachment(clip)
+
+    def _timed(self, clip: Content, motion: Motion) -> Motion:
+        """The clip at the times that it had, where its frame numbers give them."""
+        timed = motion.at_times(self.old.times(clip))
+        kept = numbers_or_rows(timed.frame_numbers, timed.n_frames)
+        is_same = np.array_equal(kept, self.old.frame_numbers(clip))
+        if is_same and len(timed.signals) == len(motion.signals):
+            return timed
+        self.notes.append(f"clip {clip['name']}: its times are those of its frame numbers")
+        self.untimed.add(clip["name"])
+        return motion
 
     def _sourced(self, clip: Content, motion: Motion) -> Motion:
         """The clip with its source, read again from restored bytes; without where it differs."""
@@ -251,8 +275,13 @@ def _role(held: Content, index: int) -> tuple[str, int | None]:
     return (name if name in ("analog", "outputs", "rotations") else ""), None
 
 
-def differences(old: Old, path: Path, split: Collection[str]) -> Iterator[str]:
-    """What of the old file the new one does not give back; ``split``: whose times moved."""
+def differences(
+    old: Old, path: Path, split: Collection[str], untimed: Collection[str] = ()
+) -> Iterator[str]:
+    """What of the old file the new one does not give back; ``split``: whose times moved.
+
+    ``untimed``: whose times are not to be compared.
+    """
     content = old.content
     for problem in mcz.verify(path, max_decoded=2**53):
         yield problem.message
@@ -265,10 +294,19 @@ def differences(old: Old, path: Path, split: Collection[str]) -> Iterator[str]:
             moved = clip["name"] in split
             found = _of_clip(old, file.clips[clip["name"]], clip, moved)
             yield from (f"clip {clip['name']}: {what}" for what in found)
+            new, was = file.clips[clip["name"]].timeline, old.times(clip)
+            if was is not None and clip["name"] not in untimed and not _is_near(new, was):
+                yield f"clip {clip['name']}: times"
         restored = {name: data() for name, data in named_files(file)}
         for name, sha256 in _old_files(content):
             if hashlib.sha256(restored.get(name, b"")).hexdigest() != sha256:
                 yield f"file {name}"
+
+
+def _is_near(new: Timeline | None, was: Timeline) -> bool:
+    if new is None:
+        return False
+    return new.is_near(was) or bool(np.abs(new.times - was.times).max() <= was.rounding + EXACT)
 
 
 def _of_clip(old: Old, clip: mcz.Clip, was: Content, moved: bool) -> Iterator[str]:
@@ -292,8 +330,6 @@ def _of_clip(old: Old, clip: mcz.Clip, was: Content, moved: bool) -> Iterator[st
             yield "skeleton"
         if (clip.base_skeleton is None) != (held["base"] is None):
             yield "base of the skeleton"
-    if START in was["metadata"] and clip.first_time != float(was["metadata"][START]):
-        yield "time of the first frame"
 
 
 def _old_files(content: Content) -> Iterator[tuple[str, str]]:
