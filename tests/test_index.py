@@ -6,6 +6,7 @@ from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 import conformance
 import mcz
 from mcz.codecs import raw
+from mcz.container import http, index
 from mcz.container.chunks import Chunk
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
 from mcz.container.index import build_index, index_chunk, index_content
@@ -27,6 +29,7 @@ from mcz.schema.records import Record
 from mcz.schema.types import SIZED, TEXT, UVARINT, Exactly
 from mcz.writing.clip_writer import write_clip
 from tests.motions import smooth
+from tests.web_server import Server, served
 
 VECTORS = Path(conformance.__file__).parent / "vectors" / "valid"
 
@@ -224,6 +227,25 @@ def test_appends_leave_few_indexes_and_write_little() -> None:
         whole = len(build_index(replace(file.container.directory, indexes=())))
     assert not mcz.verify(sink.getvalue())
     assert sorted(sizes)[40] < whole / 4
+
+
+def test_four_requests_open_a_file_of_many_appends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing is taken in because it is small, and each INDX lies far from the next one."""
+    monkeypatch.setattr(index, "GROWTH", 0)
+    monkeypatch.setattr(http, "TAIL", 2000)
+    sink, directory = BytesIO(), None
+    for number in range(10):
+        writer = Writer(sink, directory=directory, offset=len(sink.getvalue()))
+        writer.attachment(f"note {number}", np.random.default_rng(number).bytes(5000))
+        write_clip(writer, smooth(1, name=f"clip {number}"), raw.CODEC, {})
+        writer.finish()
+        with mcz.open(sink.getvalue()) as file:
+            directory = file.container.directory
+    assert len(directory.indexes) == 4
+    server = Server(sink.getvalue())
+    with served(server), mcz.open(server.address) as file:
+        assert list(file.clips) == [f"clip {number}" for number in range(10)]
+        assert len(server.asked) <= 4
 
 
 def test_a_rewriter_makes_one_index_and_copies_none(tmp_path: Path) -> None:

@@ -101,12 +101,10 @@ def with_sizes(archive: Path) -> None:
 
     with mcz.open(archive) as file:
         n_segments = sum(len(row.segments) for row in file.container.directory.clips.values())
-        index = file.container.index
-        assert index is not None
-        each = index.index_length / len(file)
+        index_bytes = file.container.directory.index_bytes
         print(
             f"{len(file):,} clips of {n_segments:,} segments, {file.size:,} bytes; "
-            f"INDX {index.index_length:,} bytes, {each:.1f} a clip",
+            f"INDX {index_bytes:,} bytes, {index_bytes / len(file):.1f} a clip",
             flush=True,
         )
 

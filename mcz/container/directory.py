@@ -255,6 +255,11 @@ class Directory:
     end: int = 0
     indexes: tuple[IndexPlace, ...] = field(default=(), compare=False)
 
+    @property
+    def index_bytes(self) -> int:
+        """Bytes of the INDX chunks that it was read from."""
+        return sum(place.length for place in self.indexes)
+
 
 def parse_head(payload: bytes) -> Profile:
     """The profile of the file; raises UnsupportedError where it needs a newer reader."""

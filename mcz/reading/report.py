@@ -66,7 +66,7 @@ def info(file: File, names: Sequence[str] | None = None, where: Where | None = N
         "needs_version": file.header["needs_version"],
         "profile": file.header["profile"],
         "file_bytes": file.size,
-        "index_bytes": container.index.index_length if container.index else 0,
+        "index_bytes": container.directory.index_bytes,
         "copy_bytes": sum(chunk.size for chunk in container.copies()),
         "parts": file_parts(container, sizes) if whole else None,
         "skeletons": [_skeleton_info(container, i, s) for i, s in file.skeletons if i in ids],

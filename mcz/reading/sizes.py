@@ -97,7 +97,7 @@ def file_parts(container: Container, sizes: Iterable[Sizes]) -> dict[str, int]:
         "quality": sum(one.quality for one in sizes),
         "attachments": sum(part.size for part in attachments),
         "copies": sum(chunk.size for chunk in container.copies()),
-        "index": container.index.index_length + FOOT.size if container.index else 0,
+        "index": directory.index_bytes + FOOT.size * bool(directory.indexes),
     }
     return parts | {"other": container.source.size - sum(parts.values())}
 
