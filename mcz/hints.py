@@ -9,7 +9,6 @@ from enum import StrEnum
 class Hint(StrEnum):
     """The way out, as a code; ``PYTHON_HINTS`` words it for callers of this package."""
 
-    ARCHIVE = "archive"
     CONVERT = "convert"
     ENCODE = "encode"
     FEET = "feet"
@@ -20,6 +19,7 @@ class Hint(StrEnum):
     JOBS = "jobs"
     KEEP_ALL = "keep-all"
     KEY_ERROR = "key-error"
+    LARGE = "large"
     MAX_DECODED = "max-decoded"
     NAME_CODEC = "name-codec"
     OLD_FORMAT = "old-format"
@@ -39,7 +39,6 @@ class Hint(StrEnum):
 Words = Mapping[Hint, str]
 
 PYTHON_HINTS: Words = {
-    Hint.ARCHIVE: "archive=True allows more",
     Hint.CONVERT: "mcz.convert gives its numbers to another format",
     Hint.ENCODE: "mcz.encode makes one of a source file",
     Hint.FEET: "name the joints of feet (joints=)",
@@ -50,6 +49,7 @@ PYTHON_HINTS: Words = {
     Hint.JOBS: "jobs=1 needs less memory",
     Hint.KEEP_ALL: "keep_all=True keeps it",
     Hint.KEY_ERROR: "allow more (key_error_mm=)",
+    Hint.LARGE: "profile='large' allows more",
     Hint.MAX_DECODED: "max_decoded raises it",
     Hint.NAME_CODEC: "name a codec to code it anew",
     Hint.OLD_FORMAT: "version 0.9 of package mcz reads it, and tools/migrate_0_9 converts it",

@@ -175,7 +175,7 @@ def edit_files(folder: Path) -> None:
     (folder / "texts").mkdir()
     (folder / "texts" / "walk.bvh").write_bytes(bvh.write(bvh_walk().cut(0, 24)))
     whole, bad = folder / "whole.mcz", folder / "bad.mcz"
-    mcz.pack(folder / "texts", whole, archive=True)
+    mcz.pack(folder / "texts", whole, profile="large")
     mcz.unpack(whole, folder / "again")
     vector = VECTORS / "fast" / "groups-channel.mcz"
     first = mcz.read(vector).skeleton.joints[0]

@@ -76,7 +76,7 @@ KINDS: dict[str, Callable[[Path], bytes]] = {
     "c3d-best": described,
     "posewave": encoded("walk.bvh", codec="posewave", unit="cm"),
     "mrdwt": encoded("walk.bvh", codec="mrdwt", params={"segment_frames": 50}),
-    "mdtt-archive": encoded("walk.c3d", codec="mdtt", archive=True),
+    "mdtt-archive": encoded("walk.c3d", codec="mdtt", profile="large"),
     "live": live,
     "csv-normal": table,
     "npz": arrays,

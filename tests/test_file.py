@@ -15,9 +15,10 @@ from hypothesis import given
 import mcz
 from mcz import Signal
 from mcz.annexes import annex_bytes
+from mcz.container.scan import scan
 from mcz.container.value_hash import canonical
 from mcz.numbers import Grid, GridKind
-from mcz.reading.report import info
+from mcz.reading.report import info, validate
 from mcz.writing.names import METADATA_KEYS
 from tests.motions import motions, skeleton, smooth, written
 
@@ -149,10 +150,38 @@ def test_limits_of_the_profile() -> None:
     with pytest.raises(mcz.LimitError, match="joints: 4097"):
         written(motion)
     out = io.BytesIO()
-    mcz.write(motion, out, archive=True)
+    mcz.write(motion, out, profile="large")
     with mcz.open(out.getvalue()) as file:
-        assert file.header["profile"] == "archive"
+        assert file.header["profile"] == "large"
         assert file.clips["motion"].read().shape == (1, 4097)
+
+
+def test_a_small_file_is_for_embedded_readers(tmp_path: Path) -> None:
+    """Its chunks and segments are short, nothing is packed; what does not fit is refused."""
+    motion, path = smooth(3000), tmp_path / "small.mcz"
+    mcz.write(motion, path, profile="small", copies=True)
+    with mcz.open(path) as file:
+        assert file.header["profile"] == "small"
+        assert validate(file) == []
+        clip = file.clips[motion.name]
+        np.testing.assert_array_equal(clip.values[:], motion.signals[0].values)
+        container = file.container
+        chunks = scan(container.source).chunks
+        assert max(chunk.length or 0 for chunk in chunks) <= 64 * 1024
+        rows = container.directory.clips[clip.name].segments
+        assert len(rows) > 1
+        assert all(row.header.n_frames <= 1024 for row in rows)
+        assert not {chunk.type for chunk in chunks} & {b"INDX", b"COPY", b"MODL"}
+    for codec in ("best", "mrdwt"):
+        with pytest.raises(mcz.LimitError, match="small has raw and fast"):
+            mcz.write(motion, path, codec, force=True, profile="small")
+    with pytest.raises(mcz.OptionError, match="none of small, base and large"):
+        mcz.write(motion, path, profile="tiny", force=True)
+    joints = tuple(mcz.Joint(f"j{i}", channels=(mcz.Channel("rx"),)) for i in range(257))
+    bones = mcz.Skeleton(joints)
+    wide = mcz.Motion(bones, (Signal(np.zeros((1, 257))),))
+    with pytest.raises(mcz.LimitError, match="limit of 256"):
+        mcz.write(wide, path, profile="small", force=True)
 
 
 def test_unit_and_rate_are_taken_not_guessed(tmp_path: Path) -> None:

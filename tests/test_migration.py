@@ -153,7 +153,7 @@ def test_motions_without_a_source(tmp_path: Path) -> None:
         metadata={"subject": "x"},
         source=None,
     )
-    mcz.write(motion, tmp_path / "one.mcz", "best", archive=True, copies=True)
+    mcz.write(motion, tmp_path / "one.mcz", "best", profile="large", copies=True)
     live = mcz.stream_encode(
         values[:, :6], ["a", "b"], params={"step": 0.5}, frame_rate=Fraction(60)
     )

@@ -39,6 +39,7 @@ def registry(text: str) -> dict[str, Any]:
     version = re.search(r"^Version (\d+\.\d+)", text, re.M)
     assert version is not None
     limits = rows_after(text, "## Limits and profiles\n")
+    limits += [row for row in rows_after(text, "by profile:\n") if row[2] != "any"]
     parts = PARTS.read_text("utf-8")
     return {
         "format_version": version[1],
@@ -48,8 +49,8 @@ def registry(text: str) -> dict[str, Any]:
         "chunk_types": _keyed(rows_after(text, "**Chunk types**"), "type", "flags", "meaning"),
         "packet_kinds": _keyed(rows_after(text, "**Kinds of packets**"), "id", "name"),
         "profiles": [
-            {"id": at, "name": name, "limits": {row[0]: _number(row[1 + at]) for row in limits}}
-            for at, name in enumerate(("base", "archive"))
+            {"id": id_, "name": name, "limits": {row[0]: _number(row[at]) for row in limits}}
+            for id_, name, at in ((0, "base", 2), (1, "large", 3), (2, "small", 1))
         ],
         "codecs": _keyed(
             rows_after(text, "## Codecs\n"),

@@ -33,7 +33,7 @@ def train(paths: list[Path]) -> np.ndarray:
     total = np.zeros_like(state)
     for number, path in enumerate([*paths, *paths]):
         out = io.BytesIO()
-        mcz.write(mcz.read(path), out, codec="best", archive=True)
+        mcz.write(mcz.read(path), out, codec="best", profile="large")
         print(f"{path.name}: {path.stat().st_size / len(out.getvalue()):.3f}", file=sys.stderr)
         if number >= len(paths):
             total += state

@@ -113,5 +113,5 @@ def command(
 
 
 def _known(options: Settings) -> Settings:
-    """Without --archive: the file's own profile stays."""
-    return {key: value for key, value in options.items() if key != "archive"}
+    """Without --profile: the file's own profile stays."""
+    return {key: value for key, value in options.items() if key != "profile"}

@@ -56,7 +56,7 @@ class Input:
         existing(self.file)
         coded = io.BytesIO()
         with about(self.file):
-            written = mcz.encode(self.file, coded, archive=True, **self.facts)
+            written = mcz.encode(self.file, coded, profile="large", **self.facts)
             for note in written.notes:
                 say(f"{self.file}: {in_options(note)}")
             with mcz.open(coded.getvalue(), max_decoded=NO_LIMIT) as file:

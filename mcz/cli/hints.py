@@ -5,7 +5,6 @@ from __future__ import annotations
 from mcz.hints import PYTHON_HINTS, Hint, Words, worded
 
 OPTION_HINTS: Words = {
-    Hint.ARCHIVE: "--archive allows more",
     Hint.CONVERT: "choose a format with --to",
     Hint.ENCODE: "mcz encode makes one of a source file",
     Hint.FEET: "name the joints of feet (--feet)",
@@ -16,6 +15,7 @@ OPTION_HINTS: Words = {
     Hint.JOBS: "--jobs 1 needs less memory",
     Hint.KEEP_ALL: "--keep-all keeps it",
     Hint.KEY_ERROR: "allow more (--key-error)",
+    Hint.LARGE: "--profile large allows more",
     Hint.MAX_DECODED: "--max-decoded raises it",
     Hint.NAME_CODEC: "--codec codes it anew",
     Hint.OLD_FORMAT: PYTHON_HINTS[Hint.OLD_FORMAT],

@@ -295,7 +295,12 @@ def encoding_options(function: Function) -> Function:
         arrays_option,
         model_option,
         click.option("--verbatim", is_flag=True, help="Keep what cannot be parsed as attachment."),
-        click.option("--archive", is_flag=True, help="Use the profile of large limits."),
+        click.option(
+            "--profile",
+            type=click.Choice(("small", "base", "large")),
+            default="base",
+            help="Limits of the file; small is for embedded readers.",
+        ),
     )
 
     @wraps(function)

@@ -106,7 +106,8 @@ def encode_lines(
     from mcz.reading.source_options import SourceOptions
     from mcz.writing.options import encoding_options
 
-    for name in ("verbatim", "archive", "copies", "effort"):
+    options["profile"] = options["profile"] != "base"
+    for name in ("verbatim", "profile", "copies", "effort"):
         if options.pop(name):
             raise Failure(f"--{name} has no meaning for what is coded frame by frame", Exit.USAGE)
     stream = live_input()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mcz.errors import LimitError
+from mcz.errors import LimitError, OptionError
 from mcz.hints import Hint
 
 MIB = 2**20
@@ -27,6 +27,10 @@ class Profile:
     chunk_bytes: int
     packet_bytes: int
     text_bytes: int
+    signals: int
+    rows: int
+    is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``plain.py``
+    coded_bytes: int = 2**53  # decoded, of a segment that writers make, so that its DATA is short
 
     @property
     def counts(self) -> dict[str, int]:
@@ -44,9 +48,25 @@ BASE = Profile(
     chunk_bytes=2**31,  # LIMIT-07
     packet_bytes=64 * 1024,  # LIMIT-08
     text_bytes=64 * MIB,  # LIMIT-09
+    signals=2**16,  # LIMIT-18
+    rows=2**23,  # LIMIT-19
 )
-ARCHIVE = Profile(1, "archive", 2**20, 2**18, 2**34, 2**31, 2**40, MIB, 2**31)
-PROFILES = {profile.id: profile for profile in (BASE, ARCHIVE)}
+LARGE = Profile(1, "large", 2**20, 2**18, 2**34, 2**31, 2**40, MIB, 2**31, 2**20, 2**31)
+KIB = 2**10
+SMALL = Profile(
+    *(2, "small", 256, 256, 2 * MIB, 0, 64 * KIB, 64 * KIB, 64 * KIB, 16, 1024),
+    is_plain=True,
+    coded_bytes=48 * KIB,
+)
+PROFILES = {profile.id: profile for profile in (BASE, LARGE, SMALL)}
+
+
+def profile_named(name: str) -> Profile:
+    """The profile "small", "base" or "large"; raises OptionError."""
+    for profile in PROFILES.values():
+        if profile.name == name:
+            return profile
+    raise OptionError(f"profile {name!r} is none of small, base and large", value=name)
 
 
 def check(what: str, value: int, limit: int) -> None:

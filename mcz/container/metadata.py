@@ -12,7 +12,7 @@ from sys import intern
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
 from mcz.container.directory import ClipRow
-from mcz.container.limits import MIB, check, metadata_limit
+from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.container.metadata_keys import INTERPRETED
 from mcz.container.packed import smallest
 from mcz.container.strict import decoded
@@ -79,20 +79,22 @@ def as_one(name: str, records: Iterable[Record]) -> Record:
     return Record(name, entries, tuple(key for key in removed if key not in entries))
 
 
-def build_metas(records: Sequence[Record], *, short: bool = False) -> Iterator[bytes]:
+def build_metas(
+    records: Sequence[Record], *, short: bool = False, profile: Profile = BASE
+) -> Iterator[bytes]:
     """The payloads of the META chunks that hold ``records``, each of about 1 MiB at most."""
     content = bytearray()
     for record in records:
         content += record_bytes(record)
-        if len(content) >= MIB:
-            yield _payload(bytes(content), short)
+        if len(content) >= min(MIB, profile.coded_bytes):
+            yield _payload(bytes(content), short, profile)
             content.clear()
     if content:
-        yield _payload(bytes(content), short)
+        yield _payload(bytes(content), short, profile)
 
 
-def _payload(content: bytes, short: bool) -> bytes:
-    encoding, data = smallest(content, short=short)
+def _payload(content: bytes, short: bool, profile: Profile) -> bytes:
+    encoding, data = smallest(content, short=short, plain=profile.is_plain)
     return build(payloads.Meta(encoding=encoding, size=len(content), data=data), "META")
 
 

@@ -22,8 +22,13 @@ def words() -> bytes:
     return annex_bytes("words.bin")
 
 
-def smallest(data: bytes, *, short: bool) -> tuple[int, bytes]:
-    """The encoding of SRCE, ATTA and COPY and its bytes; ``short``: also after words."""
+def smallest(data: bytes, *, short: bool, plain: bool = False) -> tuple[int, bytes]:
+    """The encoding of SRCE, ATTA and META and its bytes; ``short``: also after words.
+
+    ``plain``: stored.
+    """
+    if plain:
+        return payloads.STORED, data
     found = [(payloads.STORED, data), (payloads.DEFLATED, deflate(data))]
     if short:
         found.append((payloads.AFTER_WORDS, deflate(data, words=words())))
@@ -39,11 +44,17 @@ def pack_skeleton(payload: bytes) -> bytes:
     return min(payload, packed, key=len)
 
 
+def is_packed(payload: bytes, where: str) -> bool:
+    """Whether the fields of a SKEL are packed."""
+    at = _flags_at(payload, where)
+    return at < len(payload) and bool(payload[at] & PACKED)
+
+
 def unpacked(payload: bytes, where: str, profile: Profile) -> bytes:
     """The payload of a SKEL without packing; one that was never packed as it is."""
-    at = _flags_at(payload, where)
-    if at >= len(payload) or not payload[at] & PACKED:
+    if not is_packed(payload, where):
         return payload
+    at = _flags_at(payload, where)
     try:
         size, start = read_varint(payload, at + 1)
     except FormatError as error:

@@ -50,7 +50,7 @@ class Head(Record):
     needs_minor: int = field(
         NEEDS_MINOR, "least format version that reads the file, minor", default=FORMAT[1]
     )
-    profile: int = field(Int8ul, "profile id: 0 base, 1 archive")
+    profile: int = field(Int8ul, "profile id: 0 base, 1 large, 2 small")
     extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
 
 

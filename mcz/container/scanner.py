@@ -23,10 +23,11 @@ from mcz.container.grammar import CRITICAL, OTHER
 from mcz.container.index_check import IndexCheck
 from mcz.container.limits import check, index_limit
 from mcz.container.parser import ALL, PASS, Parser
-from mcz.container.segments import parse_header
+from mcz.container.plain import check_plain
+from mcz.container.segments import GROUP_NOTES, parse_header
 from mcz.container.strict_ancillary import check_ancillary
 from mcz.container.writer import payload_id
-from mcz.errors import FormatError
+from mcz.errors import FormatError, LimitError
 from mcz.schema import parse
 
 PEEK = 64  # enough for the fields of a segment before its table
@@ -93,7 +94,10 @@ class Scanner:
             self.found.feet.append(event.offset)
             self.found.directory.end = event.end
         elif event.chunk.length is not None:
-            self._handlers[event.thing](event.chunk, event.payload)
+            chunk, is_read = event.chunk, event.payload or not event.chunk.length
+            if self.parser.profile.is_plain and is_read and chunk.type != ChunkType.DATA:
+                check_plain(chunk.type, event.payload, chunk.label)
+            self._handlers[event.thing](chunk, event.payload)
             self.found.chunks.append(event.chunk)
 
     def finish(self) -> None:
@@ -171,6 +175,8 @@ class Scanner:
             raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
         if not fields.signals:  # CLIP-05
             raise FormatError(f"chunk {chunk.label}: a clip without a signal")
+        # LIMIT-18
+        check(f"chunk {chunk.label}: signals", len(fields.signals), self.parser.profile.signals)
         if self.strict and strict.check_clip(
             fields, chunk.label, self.found.directory, self._templates
         ):  # ALIA-02
@@ -196,6 +202,8 @@ class Scanner:
     def _segment(self, row: SegmentRow) -> None:
         header, at = row.header, row.offset - HEADER.size
         assert self.clip is not None
+        if self.parser.profile.is_plain and header.flags & GROUP_NOTES:  # LIMIT-21
+            raise LimitError(f"DATA at {at}: the profile small has no group notes")
         if header.signal >= len(self.first):
             raise FormatError(f"DATA at {at}: signal {header.signal}")  # DATA-06
         due = self.first[header.signal]

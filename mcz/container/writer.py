@@ -42,6 +42,7 @@ from mcz.container.packets import (
     build_packet,
     numbered_frame,
 )
+from mcz.container.plain import check_plain
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.errors import FormatError, MotionError
 from mcz.motion import Skeleton
@@ -89,14 +90,14 @@ class Writer:
         short: bool = False,
     ) -> None:
         self._sink = sink
-        self.short = short
+        self.short = short and not profile.is_plain
         self.profile = profile
         self.offset = offset
         self.directory = directory or Directory()
         self._clip: ClipRow | None = None
         self._next_packet: int | None = None  # while a DATA is open
         self.last_skeleton: tuple[Skeleton, bytes] | None = None  # and its id
-        self._copies = list(uncopied) if copies else None  # of what was written so far
+        self._copies = list(uncopied) if copies and not profile.is_plain else None
         if offset == 0:
             self._write_head(head_extension)
 
@@ -112,6 +113,8 @@ class Writer:
     def chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
         """Write one closed chunk and return where it lies."""
         check(f"chunk {kind.decode()}: bytes", len(payload), self.profile.chunk_bytes)
+        if self.profile.is_plain:
+            check_plain(kind, payload, kind.decode())
         chunk = Chunk(kind, flags, self.offset, len(payload))
         self._write(build_chunk(kind, payload, flags))
         if self._copies is not None and kind in COPIED:
@@ -129,7 +132,7 @@ class Writer:
     def template(self, format_id: int, template: bytes) -> bytes:
         """Write a SRCE and return its id."""
         check("template: bytes", len(template), self.profile.text_bytes)
-        encoding, data = smallest(template, short=self.short)
+        encoding, data = smallest(template, short=self.short, plain=self.profile.is_plain)
         record = payloads.Srce(format=format_id, encoding=encoding, size=len(template), data=data)
         return self.shared(ChunkType.SRCE, build(record, "SRCE"))
 
@@ -137,12 +140,13 @@ class Writer:
         """Write a whole file, opaque, in parts of 1 MiB."""
         self._between_clips("ATTA")
         self._new_name(name, self.directory.attachments)
-        n_parts = max(1, -(-len(data) // ATTACHMENT_PART))
+        most = min(ATTACHMENT_PART, self.profile.coded_bytes)
+        n_parts = max(1, -(-len(data) // most))
         digest = hashlib.sha256(data).digest()
         row = AttachmentRow(name, len(data), [])
         for part in range(n_parts):
-            piece = data[part * ATTACHMENT_PART :][:ATTACHMENT_PART]
-            encoding, packed = smallest(piece, short=self.short)
+            piece = data[part * most :][:most]
+            encoding, packed = smallest(piece, short=self.short, plain=self.profile.is_plain)
             record = payloads.Atta(
                 name=name,
                 part=part,
@@ -273,7 +277,7 @@ class Writer:
         self._between_clips("META")
         if records and not self.directory.clips:
             raise MotionError("metadata in a file without a clip")  # META-01
-        for payload in build_metas(records, short=self.short):
+        for payload in build_metas(records, short=self.short, profile=self.profile):
             self.ancillary(ChunkType.META, payload)
 
     def begin_carried(self, row: ClipRow, payload: bytes) -> None:
@@ -305,7 +309,7 @@ class Writer:
         for run in runs(copies):
             self.ancillary(ChunkType.COPY, build_copies(run, self.offset), safe_to_copy=False)
         start, length = 0, 0
-        if index and not (self.short and self.offset <= UNINDEXED):
+        if index and not (self.profile.is_plain or (self.short and self.offset <= UNINDEXED)):
             chunk = build_index(self.directory)
             check("INDX: bytes", len(chunk), self.profile.chunk_bytes)
             start, length = self.offset, len(chunk)

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from mcz.container.limits import profile_named
 from mcz.dask.cluster import Cluster, connected
 from mcz.dask.sources import FarAsk, Found, coded_there, listed, skeletons_beside
 from mcz.editing.archive import write_in_turn
@@ -21,7 +22,7 @@ from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
 from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry
-from mcz.writing.options import EncodingOptions, WritingOptions, encoding_options, profile_of
+from mcz.writing.options import EncodingOptions, WritingOptions, encoding_options
 
 
 def pack(
@@ -41,7 +42,7 @@ def pack(
     verbatim: bool = False,
     keep_all: bool = False,
     force: bool = False,
-    archive: bool = False,
+    profile: str = "base",
     copies: bool = True,
     progress: Progress | None = None,
 ) -> Report:
@@ -69,7 +70,7 @@ def pack(
     encoding = encoding_options(codec, effort, params)
     paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
     inputs = (*paths, *encoding.params.values())
-    report, writing = Report(), WritingOptions(force, profile_of(archive), copies)
+    report, writing = Report(), WritingOptions(force, profile_named(profile), copies)
     skeletons = [one.name for one in found if one.name.lower().endswith(".asf")]
     beside = {one.name: skeletons_beside(one.name, skeletons) for one in taken}
     asks = (

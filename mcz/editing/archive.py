@@ -9,6 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 from mcz.container import payloads
+from mcz.container.limits import profile_named
 from mcz.container.metadata import Record
 from mcz.editing.appending import growing
 from mcz.editing.carrying import UNPROTECTED
@@ -39,7 +40,7 @@ from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry
 from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_name
-from mcz.writing.options import WritingOptions, encoding_options, profile_of
+from mcz.writing.options import WritingOptions, encoding_options
 
 
 def pack(
@@ -58,7 +59,7 @@ def pack(
     verbatim: bool = False,
     keep_all: bool = False,
     force: bool = False,
-    archive: bool = False,
+    profile: str = "base",
     copies: bool = True,
     mtimes: bool = False,
     threads: int | None = None,
@@ -95,7 +96,7 @@ def pack(
         flat=True,
     )
     encoding = encoding_options(codec, effort, params)
-    writing = WritingOptions(force, profile_of(archive), copies, threads, jobs)
+    writing = WritingOptions(force, profile_named(profile), copies, threads, jobs)
     named = [(path, path.relative_to(root).as_posix()) for path in paths]
     entries = [Entry(path, name, options, encoding) for path, name in named]
     inputs = (*paths, *encoding.params.values())

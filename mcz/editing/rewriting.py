@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.container.limits import BASE, Profile
+from mcz.container.limits import Profile
 from mcz.container.locks import lock
 from mcz.container.metadata import Record
 from mcz.container.reader import Container
@@ -159,7 +159,7 @@ def writer_like(stream: BinaryIO, files: Iterable[File]) -> Writer:
     profiles: list[Profile] = [file.container.profile for file in files]
     return Writer(
         stream,
-        profile=next((profile for profile in profiles if profile is not BASE), BASE),
+        profile=max(profiles, key=lambda profile: profile.channels),
         head_extension=bytes(head.extension),
         copies=any(file.container.copies() for file in files),
     )

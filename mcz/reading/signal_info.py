@@ -199,6 +199,8 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
         if not (row.header.first or row.header.flags & FRESH):  # DATA-12
             raise FormatError("the first segment needs one before it", where=where)
         check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
+        n_rows = row.header.n_frames * info.layout.samples_per_frame
+        check(f"{where}: rows of a segment", n_rows, container.profile.rows)  # LIMIT-19
         if row.header.first != due and not container.salvage:
             raise FormatError(f"a segment begins at {row.header.first}, {due} is due", where=where)
         due = row.header.stop

@@ -18,6 +18,7 @@ from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, Segme
 from mcz.container.skeletons import build_skeleton
 from mcz.container.time_base import put_time_base, time_base_of
 from mcz.container.writer import Writer
+from mcz.errors import LimitError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Skeleton
 from mcz.types import Params, Progress, Values
@@ -186,6 +187,8 @@ def _segment(
         streams.append(notes)
     group_notes = source.group_notes(start, stop)
     if any(group_notes):
+        if profile.is_plain:  # LIMIT-21
+            raise LimitError("the profile small has no numbers beyond their grid (group notes)")
         flags |= GROUP_NOTES
         streams += group_notes
     masks = source.masks(start, stop)

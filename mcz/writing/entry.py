@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from mcz.clock import SAME_RATE
-from mcz.container.limits import BASE, Profile
+from mcz.container.limits import LARGE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError, remark_of
 from mcz.formats import Format, format_of, wants_skeleton
@@ -146,5 +146,5 @@ def _refuse_early(source_format: Format, data: bytes, profile: Profile) -> None:
     if source_format.has_more_joints and source_format.has_more_joints(data, profile.joints):
         raise LimitError(
             f"joints: there are more than the limit of {profile.joints}",
-            hint=Hint.ARCHIVE if profile is BASE else None,
+            hint=Hint.LARGE if profile is not LARGE else None,
         )

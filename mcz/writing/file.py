@@ -12,6 +12,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+from mcz.container.limits import profile_named
 from mcz.container.writer import Writer
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.formats import is_table
@@ -24,7 +25,7 @@ from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry
 from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_metadata
-from mcz.writing.options import encoding_options, profile_of
+from mcz.writing.options import encoding_options
 from mcz.writing.prepare import prepare, under_its_path
 from mcz.writing.sources import with_true_sources
 from mcz.writing.tuning import write_motion
@@ -40,7 +41,7 @@ def write(
     *,
     effort: str | None = None,
     force: bool = False,
-    archive: bool = False,
+    profile: str = "base",
     copies: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -49,13 +50,13 @@ def write(
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
     ``effort`` names a lossless codec in place of ``codec``: "fast", the default, is read fastest,
-    "normal" is a little smaller, "best" smallest. ``params`` are the codec's; ``archive`` chooses
-    the profile of large limits. ``copies``: what holds the clip together, skeleton and template
-    among it, stands in the file a second time, so that a flipped bit there costs no frame
-    (``mcz.open`` with ``salvage``). ``threads`` may code at once, by default one a processor; the
-    bytes are the same. Raises OptionError, MotionError, or LimitError where the profile is too
-    small; MotionError also for a key of the metadata that SPEC.md does not register, unless it is
-    private (``x-...``).
+    "normal" is a little smaller, "best" smallest. ``params`` are the codec's; ``profile`` is
+    "base", "large", which allows more, or "small", which embedded readers decode. ``copies``: what
+    holds the clip together, skeleton and template among it, stands in the file a second time, so
+    that a flipped bit there costs no frame (``mcz.open`` with ``salvage``). ``threads`` may code at
+    once, by default one a processor; the bytes are the same. Raises OptionError, MotionError, or
+    LimitError where the profile is too small; MotionError also for a key of the metadata that
+    SPEC.md does not register, unless it is private (``x-...``).
     """
     if not isinstance(motion, Motion):
         raise OptionError(f"a motion is written to a target, not {type(motion).__name__}")
@@ -64,7 +65,7 @@ def write(
     motion = with_true_sources(motion, lossless=found.lossless)
     prepared = prepare(motion, found, params, (under_its_path(motion.skeleton),))
     with limited(threads), replacing(target, force=force, inputs=params.values()) as stream:
-        writer = Writer(stream, profile=profile_of(archive), copies=copies)
+        writer = Writer(stream, profile=profile_named(profile), copies=copies)
         quality = write_motion(writer, prepared, found, params, progress)
         writer.finish()
     return written(writer.directory, writer.offset, quality)
@@ -85,7 +86,7 @@ def encode(
     model: str | os.PathLike[str] | None = None,
     verbatim: bool = False,
     force: bool = False,
-    archive: bool = False,
+    profile: str = "base",
     copies: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -118,7 +119,7 @@ def encode(
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
         short = is_table(path) or (path.exists() and path.stat().st_size <= SHORT)
-        draft = Draft(stream, profile_of(archive), hold=verbatim, copies=copies, short=short)
+        draft = Draft(stream, profile_named(profile), hold=verbatim, copies=copies, short=short)
         entry.write(draft, progress)
         refuse_inputs(target, entry.inputs)
         draft.finish()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from mcz import jobs, threads
 from mcz.codecs import DEFAULT, by_name, chosen
 from mcz.codecs.contract import Codec
-from mcz.container.limits import ARCHIVE, BASE, Profile
+from mcz.container.limits import BASE, Profile
 from mcz.types import Params, Progress
 
 
@@ -60,7 +60,3 @@ class WritingOptions:
         """Let what is called meanwhile use so many threads and processes."""
         with threads.limited(self.threads), jobs.limited(self.jobs):
             yield
-
-
-def profile_of(archive: bool) -> Profile:
-    return ARCHIVE if archive else BASE

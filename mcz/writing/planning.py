@@ -13,7 +13,7 @@ from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded
 from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
-from mcz.container.limits import ARCHIVE, Profile, check
+from mcz.container.limits import LARGE, Profile, check
 from mcz.container.skeletons import channel_records
 from mcz.container.strict import is_plain_path
 from mcz.container.time_base import put_time_base, time_base_of
@@ -84,8 +84,7 @@ def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile
     for signal in motion.signals:
         check(f"signal {signal.name!r}: channels", signal.n_channels, profile.channels)
     signals = tuple(
-        _signal_plan(motion, index, codec, options, profile.segment_bytes)
-        for index in range(len(motion.signals))
+        _signal_plan(motion, index, codec, options, profile) for index in range(len(motion.signals))
     )
     models = tuple(model for plan in signals for model in _models(plan.encoded, profile))
     stored = Prepared(motion, prepared.bases, prepared.derives)
@@ -108,7 +107,7 @@ def asked(options: Params) -> JsonObject:
 
 
 def _signal_plan(
-    motion: Motion, index: int, codec: Codec, options: Params, segment_bytes: int
+    motion: Motion, index: int, codec: Codec, options: Params, profile: Profile
 ) -> SignalPlan:
     if index and not codec.lossless:
         codec = by_name(BESIDE)
@@ -118,7 +117,9 @@ def _signal_plan(
         raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
     if codec.domain == "values" and signal.values.dtype == np.int64:
         raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
-    source = MemorySource(motion, index, codec, segment_bytes, options)
+    row_bytes = 8 * max(1, signal.n_channels)
+    most = min(profile.segment_bytes, profile.coded_bytes, profile.rows * row_bytes)
+    source = MemorySource(motion, index, codec, most, options)
     if codec.domain == "values" and source.signal.values.dtype == np.int64:
         raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
     return SignalPlan(source, codec, codec.encode(source, options))
@@ -126,7 +127,7 @@ def _signal_plan(
 
 def _models(encoded: Encoded, profile: Profile) -> Iterator[bytes]:
     """Models that a signal needs; well-known ones where all shall be in the file."""
-    known = encoded.known if profile is ARCHIVE else ()
+    known = encoded.known if profile is LARGE else ()
     for model in (*encoded.models, *known):
         yield build(payloads.Modl(kind=model.kind, data=model.data), "MODL")
 

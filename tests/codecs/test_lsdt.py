@@ -128,10 +128,10 @@ def test_frames_behind_a_request_may_be_damaged() -> None:
 
 def test_an_archive_has_the_well_known_models_too() -> None:
     data = basis_models.known_models()["cmu31"].data
-    for archive in (False, True):
+    for profile in ("base", "large"):
         out = io.BytesIO()
-        mcz.write(markers(20, 31), out, codec="lsdt-clip", basis="known", archive=archive)
-        assert (data in out.getvalue()) == archive
+        mcz.write(markers(20, 31), out, codec="lsdt-clip", basis="known", profile=profile)
+        assert (data in out.getvalue()) == (profile == "large")
 
 
 @given(st.integers(1, 12), st.integers(1, 12), st.integers(0, 40), st.integers(0, 2**32 - 1))

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
-from mcz.container.limits import ARCHIVE, BASE
+from mcz.container.limits import BASE, LARGE
 from mcz.formats import amc, asf, bvh, hierarchy, likely_formats, limits
 from mcz.formats.notes import join_notes
 from mcz.numbers import Grid, GridKind
@@ -214,10 +214,10 @@ def test_what_a_profile_cannot_hold_is_refused_before_it_is_read(
     joints = b"JOINT j\n{\n}\n" * BASE.joints
     path.write_bytes(b"HIERARCHY\nROOT r\n{\n%s}\nMOTION\nFrames: 0\nFrame Time: 1\n" % joints)
     monkeypatch.setattr(hierarchy, "_Node", None)  # none is looked at
-    with pytest.raises(mcz.LimitError, match="the limit of 4096; archive=True allows more"):
+    with pytest.raises(mcz.LimitError, match="the limit of 4096; profile='large' allows more"):
         mcz.encode(path, tmp_path / "a.mcz")
     monkeypatch.undo()
-    assert mcz.encode(path, tmp_path / "a.mcz", archive=True).clips[0].n_channels == 0
+    assert mcz.encode(path, tmp_path / "a.mcz", profile="large").clips[0].n_channels == 0
     assert not hierarchy.has_more_joints(path.read_bytes(), BASE.joints + 1)
     after = b"HIERARCHY\nROOT r\n{\n}\nMOTION\n" + joints
     assert not hierarchy.has_more_joints(after, 10)
@@ -235,7 +235,7 @@ def test_channels_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_limits_are_those_of_the_largest_profile() -> None:
-    assert (ARCHIVE.joints, ARCHIVE.channels) == (limits.MOST_JOINTS, limits.MOST_CHANNELS)
+    assert (LARGE.joints, LARGE.channels) == (limits.MOST_JOINTS, limits.MOST_CHANNELS)
     assert BASE.joints == limits.MOST_DEPTH
 
 

@@ -31,7 +31,7 @@ from mcz.container.chunks import (
 )
 from mcz.container.directory import Directory
 from mcz.container.index import build_index
-from mcz.container.limits import ARCHIVE
+from mcz.container.limits import LARGE
 from mcz.container.packets import (
     END,
     NUMBERED,
@@ -86,7 +86,7 @@ def pieces_of(data: bytes) -> Pieces:
         indexed = chunk.type == b"INDX"
         if chunk.length is None:
             read = Forward(source, chunk.payload_offset)
-            packets = tuple(read_packets(read, ARCHIVE.packet_bytes))
+            packets = tuple(read_packets(read, LARGE.packet_bytes))
             pieces.append(Piece(chunk.type, chunk.flags, b"", packets))
             at = read.at
         else:

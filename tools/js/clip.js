@@ -5,6 +5,7 @@ import { Refused } from "./errors.js";
 import { INTEGER, parseGrid } from "./grids.js";
 import { readNeeds } from "./head.js";
 import { within } from "./limits.js";
+import { checkPlainSignal } from "./plain.js";
 import { MOTION, RESIDUALS, TIMES, TIMES_PER_SECOND, checkSourceFormat } from "./registry.js";
 import { checkPath } from "./shared.js";
 import { readChannel } from "./skel.js";
@@ -89,6 +90,8 @@ export function readClip(payload, offset, file) {
   const source = reader.optional(() => readClipSource(reader, file));
   const signals = reader.counted((_, index) => readSignal(reader, index, skeleton, file.limits));
   if (signals.length === 0) reader.refuse("a clip without a signal");
+  within(signals.length, file.limits.signals, "signals of a clip");
+  if (file.limits.plain) signals.forEach(checkPlainSignal);
   checkRoles(reader, signals, timeBase);
   reader.rest();
   for (const signal of signals) checkStoredFrames(signal, nFrames, open);

@@ -119,6 +119,8 @@ function checkSegment(segment, signal, limits) {
   count(firstFrame + nFrames + tail, `${what}: its end`);
   count((firstFrame + nFrames) * signal.samplesPerFrame, `${what}: its rows`);
   within(decodedBytes(nRows, signal.channels.length), limits.segmentBytes, `${what}: its bytes`);
+  within(nRows, limits.rows, `${what}: its rows`);
+  within(limits.plain ? segment.flags & FLAG_GROUP_NOTES : 0, 0, `${what}: group notes`);
 }
 
 function nStreams(flags, signal) {

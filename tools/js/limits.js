@@ -4,7 +4,7 @@ import { LimitExceeded, Unsupported } from "./errors.js";
 
 const MIB = 2 ** 20;
 
-/** The limits of each profile, by its id in HEAD. */
+/** The limits of each profile, by its id in HEAD; `plain`: see plain.js. */
 const PROFILES = [
   {
     name: "base",
@@ -15,9 +15,12 @@ const PROFILES = [
     payloadBytes: 2 ** 31,
     packetBytes: 64 * 1024,
     templateBytes: 64 * MIB,
+    signals: 2 ** 16,
+    rows: 2 ** 23,
+    plain: false,
   },
   {
-    name: "archive",
+    name: "large",
     channels: 2 ** 20,
     joints: 2 ** 18,
     segmentBytes: 2 ** 34,
@@ -25,6 +28,22 @@ const PROFILES = [
     payloadBytes: 2 ** 40,
     packetBytes: MIB,
     templateBytes: 2 ** 31,
+    signals: 2 ** 20,
+    rows: 2 ** 31,
+    plain: false,
+  },
+  {
+    name: "small",
+    channels: 256,
+    joints: 256,
+    segmentBytes: 2 * MIB,
+    modelBytes: 0,
+    payloadBytes: 64 * 1024,
+    packetBytes: 64 * 1024,
+    templateBytes: 64 * 1024,
+    signals: 16,
+    rows: 1024,
+    plain: true,
   },
 ];
 

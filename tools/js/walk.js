@@ -11,6 +11,7 @@ import { Refused, Unsupported } from "./errors.js";
 import { readHead } from "./head.js";
 import { checkIndex } from "./index.js";
 import { profile, within } from "./limits.js";
+import { checkPlainChunk } from "./plain.js";
 import { apply, readRecords } from "./metadata.js";
 import { readQuality } from "./qual.js";
 import { sha256 } from "./sha256.js";
@@ -88,6 +89,7 @@ export class Walk {
     if (this.attachment && chunk.type !== "ATTA") {
       this.refuse(`${chunk.type} between the parts of attachment ${this.attachment.name}`);
     }
+    if (this.file.limits.plain && !chunk.open) checkPlainChunk(chunk);
     this.dispatch(chunk);
   }
 

@@ -16,7 +16,7 @@ import numpy as np
 from mcz.codecs import CODECS
 from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, ChunkType
-from mcz.container.limits import ARCHIVE
+from mcz.container.limits import LARGE
 from mcz.container.segments import SegmentHeader
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
@@ -155,6 +155,23 @@ def wide(n_channels: int) -> Motion:
 
 
 @base
+def chain(n_joints: int) -> Motion:
+    """No frames of so many joints, each the child of the one before, the first with a channel."""
+    first = replace(motions.puppet().joints[0], channels=motions.channels("tx"))
+    others = [replace(first, name=f"j{i}", parent=i - 1, channels=()) for i in range(1, n_joints)]
+    skeleton = replace(motions.puppet(), joints=(first, *others))
+    return Motion(skeleton, (Signal(np.zeros((0, 1))),), name="chain")
+
+
+@base
+def signals(n_signals: int) -> Motion:
+    """The dance with so many signals, those beside the motion of one channel each."""
+    signal = Signal(np.zeros((4, 1)), channels=(Channel("", "force"),))
+    others = tuple(replace(signal, name=f"s{i}") for i in range(1, n_signals))
+    return replace(motions.dance(), signals=(*motions.dance().signals, *others))
+
+
+@base
 def masked() -> Motion:
     """Three frames, the middle one invalid."""
     mask = np.ones((3, 6), np.bool_)
@@ -235,7 +252,7 @@ def segments_of_zeros(n_rows: int, n_segments: int, padding: int = 0) -> bytes:
 def _limited(found: Base, options: dict[str, Any]) -> bytes:
     """The file of clips beyond the base profile, which its HEAD has all the same."""
     crafter = Crafter()
-    crafter.profile = ARCHIVE
+    crafter.profile = LARGE
     for motion in found.motions:
         crafter.clip(motion, **options)
     return finished(crafter)

@@ -134,7 +134,6 @@ ARGUED: dict[str, str] = {
     "RECV-01": _REPAIR + "test_recovery.py::test_the_vectors_are_repaired",
     "RECV-02": _REPAIR + "test_recovery.py::test_any_damage_is_repaired_or_salvaged_or_refused",
     "RECV-03": _REWRITER + "test_recovery.py::test_what_follows_a_protected_file_is_protected",
-    "LIMIT-07": "a file that breaks it has more than 2 GiB, or ends before the chunk (CHUNK-05)",
     "LIMIT-11": "raw deflate makes at most 1032 times its bytes, less than the 4096 times the file "
     "that is allowed: whatever states more is refused by LIMIT-14, ATTA-03 or ATTA-04",
     "PATH-06": "of readers that write files, which a decoder under test does not: shown by tests/"

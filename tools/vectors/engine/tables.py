@@ -15,7 +15,7 @@ from tools.vectors.build.files import OK, REFUSED, Vector, arrays, partial
 from tools.vectors.engine.edits import edited
 
 FOLDER = Path(__file__).parent.parent / "tables"
-HEAD = {"folder", "spec", "base", "file", "rules", "also", "modes", "exit"}
+HEAD = {"folder", "spec", "base", "file", "rules", "also", "modes", "exit", "edit"}
 ROW = {"purpose", "spec", "rules", "also", "fault", "base", "file", "edit"} | {
     "exit", "modes", "parts", "holds", "since",
 }  # fmt: skip

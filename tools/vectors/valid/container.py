@@ -14,7 +14,7 @@ from mcz.clock import MAX_NUMBER
 from mcz.codecs import raw
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, ChunkType
-from mcz.container.limits import ARCHIVE
+from mcz.container.limits import LARGE
 from mcz.container.metadata import Record
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tools.records import built
@@ -64,7 +64,7 @@ def _clips(shelf: Whole) -> None:
     numbered = dance(frame_numbers=np.array([-3, -2, 10, 11]))
     purpose = "Frame numbers that do not begin at 1 and have a gap."
     shelf.hold("frame-numbers", "Time", purpose, file_of(numbered), numbered)
-    data = finished(Crafter(profile=ARCHIVE), dance())
+    data = finished(Crafter(profile=LARGE), dance())
     shelf.hold("archive-profile", "Limits and profiles", "The archive profile.", data, dance())
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, ChunkType
-from mcz.container.limits import ARCHIVE, BASE
+from mcz.container.limits import BASE, LARGE
 from mcz.container.packets import END, SEGMENT, Packet, build_packet
 from mcz.container.segments import FRESH, SegmentHeader
 from mcz.container.time_base import missing_runs
@@ -99,7 +99,7 @@ class _Maker:
 
     def file(self) -> Made:
         chance = self.chance
-        profile = ARCHIVE if chance.random() < 0.2 else BASE
+        profile = LARGE if chance.random() < 0.2 else BASE
         self.crafter = _Odd(self, profile=profile, HEAD=self.head())
         for _ in range(chance.choice((1, 1, 1, 2, 3))):
             for item in self.items():

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcz.container.limits import ARCHIVE
+from mcz.container.limits import LARGE
 from mcz.motion import Joint, Motion, Signal, Skeleton
 from tools.vectors.build.files import Crafter, finished
 from tools.vectors.build.spatial_clips import (
@@ -184,7 +184,7 @@ def _models(shelf: Spaces) -> None:
         shelf.plan("known-embedded", purpose, embedded, [(4, 7)], motion=motion, **about)
     else:
         purpose = "A well-known model in a file of the archive profile, which has it."
-        how = {"motion": motion, "profile": ARCHIVE}
+        how = {"motion": motion, "profile": LARGE}
         shelf.plan("known-archive", purpose, embedded, [(4, 7)], **how, **about)
     _shared(shelf)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import mcz
 from mcz.codecs import by_name
-from mcz.container.limits import ARCHIVE
+from mcz.container.limits import LARGE
 from mcz.container.writer import Writer
 from mcz.motion import Motion, Signal
 from mcz.sample import acclaim_walk, sample_files
@@ -38,7 +38,7 @@ HOSTILE = [
 def archive(path: Path, motions: list[Motion]) -> None:
     """One file of all the motions, each under its name."""
     with path.open("xb+") as stream:
-        writer = Writer(stream, profile=ARCHIVE)
+        writer = Writer(stream, profile=LARGE)
         for motion in motions:
             write_clip(writer, motion, by_name("raw"), {})
         writer.finish()
