@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz import FormatError, LostFrameError, OptionError
-from mcz.codecs.contract import Codec, Encoded, Segment
+from mcz.codecs.contract import Codec, Encoded, LiveEncoder, Segment
 from mcz.codecs.parameters import Parameter, integer, number
 from mcz.schema import read_varint, varint
 
@@ -35,7 +35,7 @@ def _unpacked(stream, n_frames, n_channels):
     return np.array(found, np.int64).reshape(n_frames, n_channels)
 
 
-class Encoder:
+class Encoder(LiveEncoder):
     models = ()
     version: int | None = None
     header = HEADER

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import io
 import struct
 import tracemalloc
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 import mcz
 from mcz.container.chunks import FOOT, build_foot
-from mcz.container.packets import END, FRAME, NUMBERED, Packet, build_packet, read_packets
+from mcz.container.feeding import packets
+from mcz.container.packets import FRAME, Packet, build_packet, implied_by
 from mcz.container.scan import scan
+from mcz.container.segments import mask_of
+from mcz.container.segments import parse_header as parse_segment
 from mcz.container.source import open_source
 from tools.fuzz import repair
 from tools.fuzz.repair import Piece, pieces_of, table_of, with_payload
@@ -60,28 +62,31 @@ def with_index_content(data: bytes, change: Callable[[bytes], bytes]) -> bytes:
 
 
 def with_packets(data: bytes, change: Callable[[Packet], Packet]) -> bytes:
-    """The file, without an index, with every packet passed through ``change``."""
-    out, at = b"", 0
-    for chunk in scan(open_source(data)).chunks:
+    """The file, without an index, with every packet passed through ``change``, and right checks."""
+    out, at, source = b"", 0, open_source(data)
+    for chunk in scan(source).chunks:
         if chunk.length is None:
-            stream = io.BytesIO(data)
-            stream.seek(chunk.payload_offset)
-            packets = [change(packet) for packet in read_packets(stream.read, 2**20)]
-            end = Packet(END, len(packets), b"")
-            out += data[at : chunk.payload_offset] + b"".join(map(build_packet, [*packets, end]))
-            at = stream.tell()
+            found = list(packets(source, chunk))
+            changed = implying([change(event.packet) for event in found[:-1]])
+            out += data[at : chunk.payload_offset] + b"".join(map(build_packet, changed))
+            at = found[-1].offset
     return out + data[at : FOOT.unpack(data[-FOOT.size :])[2]] + build_foot(0, 0)
 
 
-def as_kind_2(data: bytes) -> bytes:
-    """The file as format 0.3 has it: packets of frames do not check the frame's number."""
-
-    def change(packet: Packet) -> Packet:
-        if packet.kind != NUMBERED:
-            return packet
-        return replace(packet, kind=FRAME, check=None)
-
-    return with_packets(data, change)
+def implying(packets: Iterable[Packet]) -> list[Packet]:
+    """The packets of an open DATA, those of kind 2 with what they imply."""
+    due, mask, found = 0, b"", []
+    for packet in packets:
+        if packet.kind == FRAME:
+            found.append(replace(packet, implied=implied_by(due, mask)))
+            due += 1
+            continue
+        with suppress(mcz.FormatError):
+            header, _ = parse_segment(packet.body)
+            if header.signal == 0:
+                due, mask = header.stop, mask_of(packet.body)
+        found.append(packet)
+    return found
 
 
 def use(data: bytes, *, salvage: bool = False) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,20 +15,22 @@ from conformance.run import VECTORS
 from mcz.codecs import by_name
 from mcz.container import chunks, payloads
 from mcz.container.chunks import FOOT, HEADER, ChunkFlag, build_chunk, build_foot
+from mcz.container.feeding import packets
+from mcz.container.masks import build_mask
 from mcz.container.packets import (
+    CHECK_SIZE,
     END,
     FRAME,
-    NUMBERED,
+    SEGMENT,
     Packet,
-    body_check,
     build_packet,
-    check_number,
-    numbered_frame,
-    read_packets,
+    implied_by,
 )
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import (
+    FRESH,
+    MASKS,
     SegmentHeader,
     StreamCounts,
     build_segment,
@@ -197,38 +200,39 @@ def test_segment_table_round_trip() -> None:
     assert (table.codec(0, 0), table.codec(1, 2)) == (7, 12)
 
 
+def packets_in(data: bytes) -> list[Packet]:
+    """The packets of an open DATA without its header."""
+    chunk = chunks.Chunk(b"DATA", 0, 0, None)
+    padded = open_source(bytes(chunk.payload_offset) + data)
+    return [event.packet for event in packets(padded, chunk)]
+
+
 def test_packets_round_trip_and_order() -> None:
-    packets = [Packet(FRAME, 0, b"one"), Packet(FRAME, 1, b"", fresh=False)]
-    data = b"".join(map(build_packet, [*packets, Packet(END, 2, b"")]))
-    assert list(read_packets(io.BytesIO(data).read, 100)) == packets
-    swapped = b"".join(map(build_packet, [packets[1], packets[0]]))
-    with pytest.raises(FormatError, match="packet 1 where 0 is due"):
-        list(read_packets(io.BytesIO(swapped).read, 100))
+    mask = build_mask(np.array([[True, False]]))
+    segment = build_segment(SegmentHeader(0, 7, 1, flags=FRESH | MASKS), [mask, b"one"])
+    plain = build_segment(SegmentHeader(0, 9, 1), [b"one"])
+    made = [
+        Packet(SEGMENT, 0, segment),
+        Packet(FRAME, 1, b"", False, implied_by(8, mask)),
+        Packet(SEGMENT, 2, plain),
+        Packet(FRAME, 3, bytes(200), True, implied_by(10, b"")),
+        Packet(END, 4, b""),
+    ]
+    data = [build_packet(packet) for packet in made]
+    assert packets_in(b"".join(data)) == made
+    assert data[3][-4:] == struct.pack(
+        "<I", zlib.crc32(b"\x82\3\xc8\1" + struct.pack("<Q", 10) + bytes(200))
+    )
+    with pytest.raises(FormatError, match="packet 2 where 1 is due"):
+        packets_in(b"".join(data[:1] + data[2:]))
+    with pytest.raises(FormatError, match="none before it"):
+        packets_in(b"".join([build_packet(replace(made[1], sequence=0)), *data[1:]]))
+    for number, other in ((8, b""), (9, mask), (8 + 2**32, mask), (8, mask + mask)):
+        wrong = build_packet(replace(made[1], implied=implied_by(number, other)))
+        with pytest.raises(ChecksumError, match="crc of packet 1 is wrong, or it is not frame 8"):
+            packets_in(b"".join([data[0], wrong, *data[2:]]))
     with pytest.raises(LimitError):
-        list(read_packets(io.BytesIO(data).read, 2))
-
-
-def test_numbered_packets_round_trip() -> None:
-    """As kind 2, byte for byte, but for the first byte and the two checks."""
-    for sequence, number, body in ((0, 0, b""), (1, 2**53, b"one"), (300, 7, bytes(200))):
-        packet = numbered_frame(sequence, number, body, fresh=sequence == 1)
-        data = build_packet(packet)
-        plain = build_packet(Packet(FRAME, sequence, body, sequence == 1))
-        assert len(data) == len(plain)
-        check = zlib.crc32(body + struct.pack("<Q", number)) & 0xFFFF
-        assert data[-2:] == struct.pack("<H", check) == body_check(body, number)
-        before = [Packet(FRAME, n, b"") for n in range(sequence)]
-        whole = b"".join(map(build_packet, [*before, packet, Packet(END, sequence + 1, b"")]))
-        (found,) = list(read_packets(io.BytesIO(whole).read, 300))[sequence:]
-        assert found == packet
-        assert found.kind == NUMBERED
-        check_number(found, number)
-        for other in (number + 1, number + 10, number + 2**32):
-            with pytest.raises(ChecksumError, match=f"{sequence} is not that of frame {other}"):
-                check_number(found, other)
-        with pytest.raises(ChecksumError):
-            check_number(Packet(NUMBERED, sequence, body, True, body_check(body)), number)
-    check_number(Packet(FRAME, 0, b"any"), 5)  # it says nothing of a number
+        packets_in(data[0] + build_packet(Packet(SEGMENT, 1, bytes(64 * 1024 + 1))))
 
 
 def test_open_data_reads_like_closed() -> None:
@@ -264,7 +268,7 @@ def test_open_data_cut_anywhere_salvages_whole_packets() -> None:
     w.finish()
     data = reopened(closed.getvalue())
     with mcz.open(data) as file:
-        ends = [row.stop + 2 for row in file.clips["smooth"].signals[0].rows]
+        ends = [row.stop + CHECK_SIZE for row in file.clips["smooth"].signals[0].rows]
         start = file.clips["smooth"].signals[0].rows[0].offset
     for size in range(start, len(data) - 1, 7):
         with mcz.open(data[:size], salvage=True) as file:

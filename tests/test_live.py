@@ -25,12 +25,12 @@ import mcz
 from mcz import codecs
 from mcz.container.chunks import build_chunk
 from mcz.container.packets import (
+    CHECK_SIZE,
     END,
-    NUMBERED,
+    FRAME,
     SEGMENT,
     Packet,
     build_packet,
-    numbered_frame,
 )
 from mcz.container.scan import scan
 from mcz.container.writer import Writer
@@ -83,8 +83,8 @@ def test_reads_like_any_clip() -> None:
         assert clip.read(joints=[]).shape == (23, 0)
         assert clip.frame_rate == 120
         kinds = [row.packet for row in clip.signals[0].rows]
-        assert [i for i, kind in enumerate(kinds) if kind == SEGMENT] == [0, 7, 10, 20]
-        assert {*kinds} == {SEGMENT, NUMBERED}
+        assert [i for i, kind in enumerate(kinds) if kind == SEGMENT] == [0, 7, 8, 10, 20]
+        assert {*kinds} == {SEGMENT, FRAME}
         assert sum(size for _, size, _ in layout(file)) == len(data)
     use(data)
     use(data, salvage=True)
@@ -170,7 +170,7 @@ def test_each_frame_comes_with_its_last_byte() -> None:
     values = frames()
     data = live(values)
     with mcz.open(data) as file:
-        ends = [row.stop + 2 for row in file.clips["live"].signals[0].rows]
+        ends = [row.stop + CHECK_SIZE for row in file.clips["live"].signals[0].rows]
     stream = Trickle(data)
     assert [stream.at for _ in live_frames(stream)] == ends
 
@@ -318,7 +318,7 @@ def test_every_prefix_is_truncated() -> None:
     values = frames(13)
     data = live(values)
     with mcz.open(data) as file:
-        ends = [row.stop + 2 for row in file.clips["live"].signals[0].rows]
+        ends = [row.stop + CHECK_SIZE for row in file.clips["live"].signals[0].rows]
         start = file.container.directory.clips["live"].clip
     for size in range(len(data)):
         with pytest.raises(mcz.TruncatedError):
@@ -354,13 +354,8 @@ def with_body(data: bytes, frame: int, change: Callable[[bytes], bytes]) -> byte
 
     def changed(packet: Packet) -> Packet:
         nonlocal number
-        number += packet.kind in (SEGMENT, NUMBERED)
-        if number != frame:
-            return packet
-        body = change(packet.body)
-        if packet.kind == NUMBERED:
-            return numbered_frame(packet.sequence, number, body, fresh=packet.fresh)
-        return replace(packet, body=body)
+        number += 1
+        return replace(packet, body=change(packet.body)) if number == frame else packet
 
     return with_packets(data, changed)
 

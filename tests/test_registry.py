@@ -67,9 +67,9 @@ def test_chunk_types() -> None:
 
 def test_kinds_of_packets() -> None:
     names = {row["name"]: id_ for id_, row in by("id", "packet_kinds").items()}
-    ours = packets.END, packets.SEGMENT, packets.FRAME, packets.NUMBERED
+    ours = packets.END, packets.SEGMENT, packets.FRAME
     assert tuple(names.values()) == ours
-    assert list(names) == ["end", "segment", "frame", "numbered frame"]
+    assert list(names) == ["end", "segment", "frame"]
 
 
 def test_profiles() -> None:

@@ -72,9 +72,8 @@ WARN_AFTER = 5.0  # seconds of frames
     "--repeat",
     metavar="N",
     type=click.IntRange(min=0),
-    default=1,
-    show_default=True,
-    help="Repeat skeleton and clip header at every N-th frame at which one can join; 0: never.",
+    help="Repeat skeleton and clip header at every N-th frame at which one can join; 0: never.  "
+    "[default: 1, or less often with a bit rate]",
 )
 @click.option(
     "--heartbeat",

@@ -208,6 +208,7 @@ class LiveEncoder(Protocol):
     models: tuple[Model, ...]
     version: int | None
     preset: int = 0
+    is_reference: bool = False  # of the last frame: it needs not the one before
 
     def push(
         self, values: NDArray[np.float64], valid: NDArray[np.bool_] | None = None

@@ -27,13 +27,14 @@ class SegmentRow:
     """One segment: where its payload lies, and what it covers.
 
     ``packet`` is the kind of its packet, 0 where it is a closed DATA. The payload of a packet of
-    kind 2 or 3 is a stream without a table.
+    kind 2 is a stream without a table; ``told`` is the segment whose mask it has, None without one.
     """
 
     offset: int
     size: int
     header: SegmentHeader
     packet: int = 0
+    told: SegmentRow | None = None
 
     @property
     def stop(self) -> int:

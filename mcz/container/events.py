@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mcz.container.chunks import FOOT, HEADER, Chunk, Foot
 from mcz.container.packets import CHECK_SIZE, Packet, build_packet
-from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError
 
 
@@ -40,8 +40,8 @@ class PacketEvent:
     """A packet of the open DATA ``chunk``, whose body begins at ``body``.
 
     ``number`` is that of the frame in a packet without a segment of its own, ``segment`` the header
-    of the one in another: None in an end packet, and where they are not known.
-    ``is_sound``: whether its body has the check that it states, as far as that needs no number.
+    of the one in another: None in an end packet, and where they are not known. ``is_masked``: it
+    implies the mask of that before.
     """
 
     chunk: Chunk
@@ -50,14 +50,14 @@ class PacketEvent:
     body: int
     number: int | None = None
     segment: SegmentHeader | None = None
-    is_sound: bool = True
+    is_masked: bool = False
 
     @property
     def header(self) -> SegmentHeader | None:
         """The header of its segment, also of one that is not spelled out."""
         if self.number is None:
             return self.segment
-        flags = FRESH if self.packet.fresh else 0
+        flags = self.packet.fresh * FRESH | self.is_masked * MASKS  # PACK-20
         return SegmentHeader(0, self.number, 1, flags=flags)  # PACK-12
 
     @property

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import BinaryIO
 
-from mcz.container.events import Event
+from mcz.container.chunks import Chunk
+from mcz.container.events import Event, Fault, PacketEvent
+from mcz.container.grammar import PACKETS
+from mcz.container.packets import END
 from mcz.container.parser import Parser
 from mcz.container.source import ByteSource
 
@@ -23,6 +26,26 @@ def events(source: ByteSource, parser: Parser) -> Iterator[Event]:
         else:
             at, size = parser.wants
             parser.feed(source.read(at, min(max(size, source.block), source.size - at)))
+
+
+def packets(source: ByteSource, chunk: Chunk) -> Iterator[PacketEvent]:
+    """The packets of the open DATA ``chunk``, its end packet too; raises FormatError."""
+    parser = Parser(source.size, at=chunk.payload_offset, state=PACKETS, chunk=chunk)
+    for event in events(source, parser):
+        if isinstance(event, Fault):
+            raise event.error
+        if isinstance(event, PacketEvent):
+            yield event
+            if event.packet.kind == END:
+                return
+
+
+def end_of(source: ByteSource, chunk: Chunk) -> int:
+    """Where the open DATA ``chunk`` ends; raises FormatError."""
+    end = chunk.payload_offset
+    for event in packets(source, chunk):
+        end = event.end
+    return end
 
 
 class Stream:

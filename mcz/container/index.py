@@ -29,12 +29,13 @@ from mcz.container.index_records import (
     IndexedSegment,
     IndexedSignal,
 )
-from mcz.container.packets import FRAME, NUMBERED, SEGMENT
+from mcz.container.packets import FRAME, SEGMENT
+from mcz.container.segments import FRESH, KNOWN_FLAGS
 from mcz.errors import FormatError
 from mcz.schema import Table, build, deflate
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
-PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
+PACKETS = {SEGMENT: 128, FRAME: 64}
 INDEXES = 4  # of these a writer leaves no more, so that few requests open a file
 GROWTH = 27  # times the bytes of what is new: a smaller INDX is made part of it
 
@@ -205,7 +206,8 @@ def segment_rows(clip: ClipRow) -> Packed:
     rows, end = [], clip.clip.stop
     for row in clip.segments:
         header = row.header
-        flags = header.flags | PACKETS.get(row.packet, 0)
+        flags = header.flags & (FRESH if row.packet == FRAME else KNOWN_FLAGS)
+        flags |= PACKETS.get(row.packet, 0)
         covers = header.signal, header.n_frames, header.lead, header.tail
         rows.append((row.offset - end, row.size, *covers, flags))
         end = row.stop

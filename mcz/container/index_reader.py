@@ -6,7 +6,7 @@ SPEC.md, "INDX", is normative.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -34,8 +34,8 @@ from mcz.container.index_records import (
     IndexedSignal,
 )
 from mcz.container.limits import check
-from mcz.container.packets import SHORT
-from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.packets import FRAME
+from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError
 from mcz.schema import MAX_COUNT, Table, inflate, parse
 from mcz.schema.columns import Numbers
@@ -315,6 +315,7 @@ def _rows(
 def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
     """The segments of a clip."""
     segments: list[SegmentRow] = []
+    told: SegmentRow | None = None  # whose mask packets of kind 2 have
     first, where = [0] * len(clip.signals), f"INDX: clip {clip.name!r}"
     end = clip.clip.stop  # INDX-01
     for gap, size, signal, n_frames, lead, tail, flags in rows:
@@ -323,9 +324,16 @@ def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
         kind = next((kind for kind, bit in PACKETS.items() if flags & bit), 0)
         flags &= ~PACKETS.get(kind, 0)
         header = SegmentHeader(signal, first[signal], n_frames, lead, tail, flags)
-        if kind in SHORT and header != SegmentHeader(0, first[0], 1, flags=flags & FRESH):
-            raise FormatError(f"{where} has {header} as a packet of kind {kind}")
-        segments.append(SegmentRow(end + gap, size, header, kind))
+        row = SegmentRow(end + gap, size, header, kind)
+        if kind == FRAME:
+            if header != SegmentHeader(0, first[0], 1, flags=flags & FRESH):
+                raise FormatError(f"{where} has {header} as a packet of kind {kind}")
+            if told is not None:
+                header = replace(header, flags=header.flags | MASKS)
+                row = replace(row, header=header, told=told)
+        elif signal == 0:
+            told = row if kind and flags & MASKS else None
+        segments.append(row)
         first[signal] += n_frames
         end += gap + size
     return segments

@@ -110,7 +110,7 @@ class IndexedSegment(Record):
     lead: int = field(UVARINT, "as in DATA")
     tail: int = field(UVARINT, "as in DATA")
     flags: int = field(
-        UVARINT, "as in DATA; more where it is a packet: 128 of kind 1, 64 of kind 2, 32 of 3"
+        UVARINT, "as in DATA; more where it is a packet: 128 of kind 1, 64 of kind 2"
     )
 
 

@@ -51,7 +51,7 @@ BASE = Profile(
     signals=2**16,  # LIMIT-18
     rows=2**23,  # LIMIT-19
 )
-LARGE = Profile(1, "large", 2**20, 2**18, 2**34, 2**31, 2**40, MIB, 2**31, 2**20, 2**31)
+LARGE = Profile(1, "large", 2**20, 2**18, 2**34, 2**31, 2**40, 64 * 1024, 2**31, 2**20, 2**31)
 KIB = 2**10
 SMALL = Profile(
     *(2, "small", 256, 256, 2 * MIB, 0, 64 * KIB, 64 * KIB, 64 * KIB, 16, 1024),

@@ -43,23 +43,23 @@ from mcz.container.grammar import (
 )
 from mcz.container.grammar import FOOT as FOOT_THING
 from mcz.container.grammar import SIGNATURE as UNSIGNED
-from mcz.container.limits import BASE, Search, check
+from mcz.container.limits import BASE, Search
 from mcz.container.packets import (
     CHECK_SIZE,
     FRAME,
-    NUMBERED,
+    KIND,
     SEGMENT,
     Packet,
-    body_check,
-    check16,
-    check_number,
+    implied_by,
+    packet_check,
+    parse_packet_head,
 )
 from mcz.container.packets import END as END_KIND
 from mcz.container.packets import FRESH as FRESH_PACKET
-from mcz.container.segments import FRESH
+from mcz.container.segments import FRESH, MASKS, mask_of
 from mcz.container.segments import parse_header as parse_segment
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
-from mcz.schema import MAX_COUNT, read_varint
+from mcz.schema import MAX_COUNT
 
 BLOCK = 2 * 1024 * 1024  # a chunk that is longer, and not wanted, is checked in parts
 ALL = MAX_COUNT  # of a payload, which is checked then
@@ -105,19 +105,23 @@ class Parser:
         *,
         at: int = 0,
         state: str = UNSIGNED,
+        chunk: Chunk | None = None,
         want: Want = everything,
         check: bool = True,
     ) -> None:
         self.size, self.at, self.state = size, at, state
         self.profile = BASE
         self.is_done = False
-        self.number: int | None = None  # of the frame that is due, where a packet has told it
+        self._number, self._is_told = 0, False  # of the frame that is due, once a packet told it
         self._want, self._check, self._name = want, check, "the file"
         self._start, self._data = at, b""  # what was fed and may be needed
         self._stop = at + 1  # bytes up to here are needed
         self._sequence = 0  # of the packet that is due
+        self._told = b""  # the segment of signal 0 that packets of kind 2 go on with
+        self._is_masked = False
+        self._implied: bytes | None = b""  # its mask, None where it has to be taken out
         self._index: Chunk | None = None  # an INDX that waits for its FOOT
-        self._chunk: Chunk | None = None  # what lies at ``at``, or the open DATA around it
+        self._chunk = chunk  # what lies at ``at``, or the open DATA around it
         self._parts: tuple[ChunkEvent, int] | None = None  # a chunk in parts, its crc so far
         self._is_lost = False
         self._vain = Search()
@@ -324,7 +328,7 @@ class Parser:
         rows, state = GRAMMAR[event.thing], self.state
         self.state = rows.get(state) or after_misplaced(event.thing, state)
         self._index = event.chunk if event.thing == "INDX" else None
-        self._sequence, self.number = 0, None
+        self._sequence, self._is_told = 0, False
         if state in rows:  # GRAM-01
             return event
         error = misplaced(event.thing, event.chunk.label, state)
@@ -348,73 +352,61 @@ class Parser:
         at, data = self.at, self._data
         pos = self._position(at, at + 1)
         try:
-            sequence, here = read_varint(data, pos + 1)
-            length, here = read_varint(data, here)
+            head = parse_packet_head(data, pos, self.profile.packet_bytes)
         except TruncatedError:
             self._position(at, self._start + len(data) + 1)
             raise
-        except FormatError:  # CONV-02, CONV-03
-            raise FormatError(
-                f"packet at {at}: a varint beyond 2^53 - 1, or not shortest"
-            ) from None
-        body = self._start + here + CHECK_SIZE
-        if here + CHECK_SIZE > len(data):
-            self._position(at, body)
-        if data[here : here + CHECK_SIZE] != check16(data[pos:here]):  # PACK-03
-            raise ChecksumError(f"head_check of packet {sequence} is wrong")
-        kind = data[pos] & 0x0F
-        if kind > NUMBERED or data[pos] & 0x70:  # PACK-08, PACK-09
-            raise FormatError(f"packet {sequence}: kind {data[pos]:#04x}")
-        if length > self.profile.packet_bytes:
-            check(f"packet {sequence}", length, self.profile.packet_bytes)
-        if kind == END_KIND and length:  # PACK-05, PACK-07
-            raise FormatError(f"end packet with {length} bytes")
-        self._check_sequence(sequence)
-        here, stop = here + CHECK_SIZE, here + CHECK_SIZE + length
-        if stop + CHECK_SIZE > len(data):
-            self._position(at, body + length + CHECK_SIZE)
-        content, stored = data[here:stop], data[stop : stop + CHECK_SIZE]
-        own = stored if kind == NUMBERED else None
-        packet = Packet(kind, sequence, content, bool(data[pos] & FRESH_PACKET), own)
-        assert self._chunk is not None
-        return self._ordered(PacketEvent(self._chunk, packet, at, body), stored)
-
-    def _check_sequence(self, sequence: int) -> None:
+        first, sequence, start, stop = head
         if sequence != self._sequence:  # PACK-02
             raise FormatError(f"packet {sequence} where {self._sequence} is due")
-
-    def _ordered(self, event: PacketEvent, stored: bytes) -> Event:
-        """The packet, its body checked, or the Fault that it is not right."""
-        packet = event.packet
-        self.at, self._sequence = event.end, packet.sequence + 1
-        self.state = GRAMMAR[END_PACKET if packet.kind == END_KIND else PACKET][PACKETS]  # PACK-01
-        if packet.kind != NUMBERED and stored != body_check(packet.body):  # PACK-04, PACK-06
-            is_frame = packet.kind == FRAME
-            self.number = self.number + 1 if is_frame and self.number is not None else None
-            event.is_sound = False
-            error = ChecksumError(f"body_check of packet {packet.sequence} is wrong")
-            return Fault(event.offset, error, event.chunk, event)
+        end = stop + CHECK_SIZE
+        if end > len(data):
+            self._position(at, self._start + end)
+        body, implied, kind = data[start:stop], b"", first & KIND
+        if kind == FRAME:
+            implied = implied_by(self._due(), self._mask())
+        # INDX-03, PACK-04, PACK-15
+        if packet_check(data[pos:start], body, implied) != data[stop:end]:
+            due = f", or it is not frame {self._number}" if implied else ""
+            raise ChecksumError(f"crc of packet {sequence} is wrong{due}")
+        packet = Packet(kind, sequence, body, first >= FRESH_PACKET, implied)
+        assert self._chunk is not None
+        event = PacketEvent(self._chunk, packet, at, self._start + start)
+        self.at, self._sequence = self._start + end, sequence + 1
+        self.state = GRAMMAR[END_PACKET if kind == END_KIND else PACKET][PACKETS]  # PACK-01
         try:
             self._tell(event)
         except FormatError as error:
-            return Fault(event.offset, error, event.chunk, event)
+            return Fault(at, error, event.chunk, event)
         return event
+
+    def _due(self) -> int:
+        if not self._is_told:  # PACK-14
+            raise FormatError(f"packet at {self.at}: none before it in its DATA tells its frame")
+        return self._number
+
+    def _mask(self) -> bytes:
+        """The mask of the segment of signal 0 that was told last in the open DATA."""
+        if self._implied is None:
+            self._implied = mask_of(self._told)  # PACK-20
+        return self._implied
 
     def _tell(self, event: PacketEvent) -> None:
         """Tell which frames are in a packet; raises FormatError."""
-        packet, number = event.packet, self.number
-        if packet.kind == END_KIND:
-            return
-        if packet.kind == SEGMENT:
-            self.number = None
-            event.segment = header = parse_segment(packet.body)[0]
-            self.number = header.stop if header.signal == 0 else number
+        packet = event.packet
+        if packet.kind == FRAME:
+            event.number, event.is_masked = self._number, self._is_masked
+            self._number += 1
+        elif packet.kind == SEGMENT:
+            was_told, self._is_told = self._is_told, False
+            header, _ = parse_segment(packet.body)
+            if header.signal == 0:
+                self._told, self._is_masked = packet.body, bool(header.flags & MASKS)
+                self._implied = None if self._is_masked else b""
+                self._number = header.stop
+            self._is_told = was_told or header.signal == 0
             if packet.fresh != bool(header.flags & FRESH):  # PACK-11
-                event.segment = None
                 raise FormatError(f"packet at {event.body}: its segment differs in starting fresh")
-            return
-        if number is None:  # PACK-14
-            raise FormatError(f"packet at {event.body}: none before it in its DATA tells its frame")
-        self.number = number + 1
-        check_number(packet, number)
-        event.number = number
+            event.segment = header
+        elif packet.kind == END_KIND and packet.body:  # PACK-05, PACK-07
+            raise FormatError(f"end packet with {len(packet.body)} bytes")

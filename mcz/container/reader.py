@@ -41,22 +41,17 @@ from mcz.container.limits import BASE, Profile, check, check_decoded, index_limi
 from mcz.container.metadata import Placed, Record, Remembered, applied, records_in
 from mcz.container.overlay import Overlay
 from mcz.container.packed import parse_skel
-from mcz.container.packets import (
-    CHECK_SIZE,
-    NUMBERED,
-    SHORT,
-    body_check,
-    head_size,
-    is_head,
-)
+from mcz.container.packets import CHECK_SIZE, FRAME, MOST_HEAD, Packet, implied_by, is_packet
 from mcz.container.restoring import is_like, scan_for_salvage
 from mcz.container.runs import Runs
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,
+    MASKS,
     StreamCounts,
     StreamTable,
     frame_table,
+    mask_of,
     parse_table,
 )
 from mcz.container.skeletons import parse_skeleton
@@ -65,7 +60,7 @@ from mcz.container.strict import decoded
 from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.motion import Skeleton
-from mcz.schema import MAX_COUNT, parse, parse_until
+from mcz.schema import parse, parse_until
 from mcz.types import Settings
 
 KEPT_SKELETONS = 8  # parsed ones, of a file
@@ -99,6 +94,7 @@ class Container:
         self.runs = Runs()
         self.index: Foot | None = None
         self._said = Remembered()
+        self._told = 0, b""  # a segment in a packet, and its mask
         self._skeletons: dict[bytes, tuple[payloads.Skel, Skeleton]] = {}
         self.directory = self._salvage() if salvage else self._open()
         self.profile: Profile = parse_head(self.directory.head)
@@ -297,8 +293,8 @@ class Container:
     def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
         """The stream table of a segment, with as little read as will do."""
         self._check_row(row)
-        if row.packet in SHORT:
-            return frame_table(row.header, counts, row.size)
+        if row.packet == FRAME:
+            return frame_table(row.header, counts, row.size, len(self._mask(row)))
         size = min(row.size, TABLE_PEEK + counts.total(row.header.flags) * 7 // 4)
         while True:
             try:
@@ -329,7 +325,7 @@ class Container:
         table = table or self.table(row, counts)
         self.unverified += 1  # CHUNK-07
         got: dict[int, bytes] = {}
-        for run in _runs(table, sorted(wanted), self.source.gap):
+        for run in table.runs(sorted(wanted), self.source.gap):
             start = table.offsets[run[0]]
             stop = table.offsets[run[-1]] + table.lengths[run[-1]]
             data = self.source.read(row.offset + start, stop - start)
@@ -340,17 +336,16 @@ class Container:
 
     def in_part(self, row: SegmentRow) -> bool:
         """Whether less than the whole segment may be read: not where one request gets it all."""
-        return self.reads_parts and row.size > self.source.gap
+        return self.reads_parts and row.packet != FRAME and row.size > self.source.gap
 
     def _all_streams(
         self, row: SegmentRow, counts: StreamCounts
     ) -> tuple[StreamTable, dict[int, bytes]]:
-        if row.packet:
-            payload = self._packet(row)
-        else:
-            payload = self.payload(row.chunk())
-        if row.packet in SHORT:
-            return frame_table(row.header, counts, row.size), {0: payload}
+        payload = self._packet(row) if row.packet else self.payload(row.chunk())
+        if row.packet == FRAME:
+            mask = self._mask(row)
+            streams = [mask, payload] if row.header.flags & MASKS else [payload]
+            return frame_table(row.header, counts, row.size, len(mask)), dict(enumerate(streams))
         try:
             table = parse_table(payload, counts)
         except TruncatedError as error:
@@ -362,19 +357,27 @@ class Container:
         }
 
     def _packet(self, row: SegmentRow) -> bytes:
-        """The checked body of a packet; without a table its head says what the row says."""
-        before = min(row.offset, head_size(MAX_COUNT, row.size)) if row.packet in SHORT else 0
+        """The checked body of a packet, which is what the row says."""
+        before = min(row.offset, MOST_HEAD)
         data = self.source.read(row.offset - before, before + row.size + CHECK_SIZE)
         body = data[before:-CHECK_SIZE]
-        number = row.header.first if row.packet == NUMBERED else None
-        if data[-CHECK_SIZE:] != body_check(body, number):  # INDX-03, PACK-04, PACK-15
-            said = "wrong" if number is None else f"not that of frame {number}"
-            raise ChecksumError(f"body_check of the packet at {row.offset} is {said}")
-        fresh = bool(row.header.flags & FRESH)
-        # INDX-02
-        if row.packet in SHORT and not is_head(data[:before], row.packet, fresh, row.size):
-            raise FormatError(f"the packet at {row.offset} is not what the index says")
+        number, fresh = row.header.first, bool(row.header.flags & FRESH)
+        implied = implied_by(number, self._mask(row)) if row.packet == FRAME else b""
+        # INDX-02, INDX-03, PACK-04, PACK-08, PACK-09, PACK-11, PACK-15
+        if not is_packet(data, Packet(row.packet, 0, body, fresh, implied)):
+            raise ChecksumError(
+                f"crc of the packet at {row.offset} is wrong, or it is not frame {number}"
+            )
         return body
+
+    def _mask(self, row: SegmentRow) -> bytes:
+        """The mask that a packet of kind 2 implies."""
+        if row.told is None:
+            return b""
+        offset, mask = self._told
+        if offset != row.told.offset:
+            offset, mask = self._told = row.told.offset, mask_of(self._packet(row.told))  # PACK-20
+        return mask
 
     def _check_row(self, row: SegmentRow) -> None:
         if row.stop > self.source.size:
@@ -403,16 +406,3 @@ def _check_table(table: StreamTable, row: SegmentRow) -> None:
         raise FormatError(
             f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes"
         )
-
-
-def _runs(table: StreamTable, wanted: Sequence[int], gap: int) -> list[list[int]]:
-    """``wanted`` streams in runs that are read at once; empty streams join any run."""
-    runs: list[list[int]] = []
-    end = 0
-    for index in wanted:
-        if runs and table.offsets[index] - end <= gap:
-            runs[-1].append(index)
-        else:
-            runs.append([index])
-        end = table.offsets[index] + table.lengths[index]
-    return runs

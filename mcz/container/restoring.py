@@ -23,12 +23,13 @@ from mcz.container.chunks import (
 )
 from mcz.container.copies import Copy, parse_copies
 from mcz.container.directory import Directory, Found, parse_head
+from mcz.container.feeding import packets
 from mcz.container.index_reader import Listed, directory_of, read_indexes
 from mcz.container.limits import BASE, index_limit
 from mcz.container.overlay import Overlay
-from mcz.container.packets import read_packets
+from mcz.container.packets import END
 from mcz.container.scan import scan
-from mcz.container.source import ByteSource, Forward
+from mcz.container.source import ByteSource
 from mcz.container.writer import build_head
 from mcz.errors import FormatError, MczError
 from mcz.schema import build
@@ -110,7 +111,7 @@ def _mended_headers(source: ByteSource, found: Found) -> Iterator[tuple[int, byt
 def _check_all(source: ByteSource, chunk: Chunk) -> None:
     """Check all of a chunk, of an open one its first packet; raises FormatError."""
     if chunk.length is None:
-        if next(read_packets(Forward(source, chunk.payload_offset), source.size), None) is None:
+        if next(packets(source, chunk)).packet.kind == END:
             raise FormatError(f"chunk {chunk.label} has no packet")
     else:
         read_payload(source, chunk, chunk.size)

@@ -145,8 +145,6 @@ class Salvager(Scanner):
         self.found.broken.append((event.offset if chunk is None else chunk.offset, chunk))
         if isinstance(inner, FootEvent):
             self._search(inner.offset, inner.offset + 1)
-        elif isinstance(inner, PacketEvent) and not inner.is_sound:
-            self._search(inner.offset, inner.offset)
         elif inner is not None and _is_inside(inner):
             self._is_draining = True  # SALV-04
         elif chunk is not None and chunk.length is None:
@@ -164,7 +162,7 @@ class Salvager(Scanner):
     def _drain(self, event: Event) -> None:
         """Pass over the packets that are whole behind one that is not right."""
         inner = event.event if isinstance(event, Fault) else event
-        if not isinstance(inner, PacketEvent) or not inner.is_sound:
+        if not isinstance(inner, PacketEvent):
             self._search(event.offset, event.offset)
         elif inner.packet.kind == END:
             self._search(inner.end, inner.end)

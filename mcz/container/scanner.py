@@ -6,6 +6,7 @@ SPEC.md, "Grammar" and "Strict reading", are normative.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import HEADER, Chunk, ChunkType
@@ -22,6 +23,7 @@ from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEven
 from mcz.container.grammar import CRITICAL, OTHER
 from mcz.container.index_check import IndexCheck
 from mcz.container.limits import check, index_limit
+from mcz.container.packets import SEGMENT
 from mcz.container.parser import ALL, PASS, Parser
 from mcz.container.plain import check_plain
 from mcz.container.segments import GROUP_NOTES, parse_header
@@ -54,6 +56,7 @@ class Scanner:
         self._indexes = IndexCheck()
         self._templates: dict[bytes, int] = {}  # the source format of each SRCE
         self._model_bytes = 0
+        self._told: SegmentRow | None = None  # whose mask frames of the open DATA have
         self._sourced: set[tuple[int, bytes]] = set()  # what aliases may stand for
         self._handlers: dict[str, Callable[[Chunk, bytes], None]] = {
             "HEAD": self._head,
@@ -194,7 +197,12 @@ class Scanner:
     def _packet(self, event: PacketEvent) -> None:
         packet, header = event.packet, event.header
         if header is not None:
-            self._segment(SegmentRow(event.body, len(packet.body), header, packet.kind))
+            row = SegmentRow(event.body, len(packet.body), header, packet.kind)
+            if event.is_masked:
+                row = replace(row, told=self._told)
+            elif packet.kind == SEGMENT and header.signal == 0:
+                self._told = row
+            self._segment(row)
             return
         self.found.ends[event.chunk.offset] = event.end
         self.found.chunks.append(event.chunk)

@@ -86,6 +86,18 @@ class StreamTable:
         """Index of the codec's stream; resolution 0 is the coarsest here, as stored."""
         return self._codec_start + resolution * self.counts.n_groups + group
 
+    def runs(self, wanted: Sequence[int], gap: int) -> list[list[int]]:
+        """The streams ``wanted``, ascending, in runs to be read at once; empty ones join any."""
+        runs: list[list[int]] = []
+        end = 0
+        for index in wanted:
+            if runs and self.offsets[index] - end <= gap:
+                runs[-1].append(index)
+            else:
+                runs.append([index])
+            end = self.offsets[index] + self.lengths[index]
+        return runs
+
 
 def build_segment(header: SegmentHeader, streams: Sequence[bytes]) -> bytes:
     """The DATA payload; ``streams`` in stored order, absent kinds left out."""
@@ -162,11 +174,30 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
     return StreamTable(header, counts, at + 4, tuple(offsets), tuple(lengths))
 
 
-def frame_table(header: SegmentHeader, counts: StreamCounts, size: int) -> StreamTable:
-    """The table that a packet of kind 2 or 3 has not: its body of ``size`` bytes is one stream."""
+def mask_of(segment: bytes) -> bytes:
+    """The mask that packets of kind 2 behind the packet of a ``segment`` imply."""
+    header, _ = parse_header(segment)
+    if not header.flags & MASKS:
+        return b""
+    if header.n_frames != 1:  # PACK-21
+        raise FormatError(f"a frame implies the masks of {header.n_frames} frames")
+    table = parse_table(segment, StreamCounts(1, 1))
+    index = table.mask(0) or 0
+    return segment[table.offsets[index] : table.offsets[index] + table.lengths[index]]
+
+
+def frame_table(
+    header: SegmentHeader, counts: StreamCounts, size: int, mask_size: int
+) -> StreamTable:
+    """The table of a packet of kind 2: its body of ``size`` bytes is one stream, its mask implied.
+
+    The mask, where it has one, is the first stream.
+    """
     if (counts.n_groups, counts.n_resolutions) != (1, 1):  # PACK-13
         raise FormatError(
             f"frame {header.first} is a packet without a table, of a signal with {counts.n_groups} "
             f"groups and {counts.n_resolutions} resolutions"
         )
+    if header.flags & MASKS:
+        return StreamTable(header, counts, 0, (0, 0), (mask_size, size))
     return StreamTable(header, counts, 0, (0,), (size,))

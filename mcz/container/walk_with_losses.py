@@ -27,10 +27,12 @@ from mcz.container.limits import BASE, MIB, Search, check
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
-    NUMBERED,
+    FRAME,
+    FRESH,
+    KIND,
     Packet,
-    check_number,
-    read_packet,
+    packet_check,
+    parse_packet_head,
 )
 from mcz.container.repeats import chunks_in
 from mcz.container.source import ByteSource
@@ -47,18 +49,22 @@ class PipeSource(ByteSource):
         super().__init__(stream, name=name, size=MAX_COUNT)
         self.block = 0  # nothing is waited for that is not needed yet
         self._start = 0  # offset of the first byte that is kept
-        self._kept = bytearray()
+        self.data = bytearray()  # from ``start`` on
 
     def _request(self, offset: int, size: int) -> bytes:
         stop = offset + size - self._start
-        while len(self._kept) < stop:
-            more = self._more(stop - len(self._kept))
-            if not more:
-                raise TruncatedError(f"the stream ended at {self._start + len(self._kept)}")
-            self._kept += more
+        while len(self.data) < stop:
+            self.take(stop - len(self.data))
         self.n_requests += 1
         self.n_bytes += size
-        return bytes(self._kept[offset - self._start : stop])
+        return bytes(self.data[offset - self._start : stop])
+
+    def take(self, wanted: int) -> None:
+        """Wait for some of the ``wanted`` bytes that come next; raises TruncatedError."""
+        more = self._more(wanted)
+        if not more:
+            raise TruncatedError(f"the stream ended at {self.end}")
+        self.data += more
 
     def _more(self, wanted: int) -> bytes:
         """Some of the bytes that come next, waiting for the first of them alone if possible."""
@@ -76,15 +82,15 @@ class PipeSource(ByteSource):
     @property
     def end(self) -> int:
         """The bytes that have come."""
-        return self._start + len(self._kept)
+        return self._start + len(self.data)
 
     def kept(self, at: int) -> bytes:
         """What has come of the bytes from ``at`` on, which is not before what was let go."""
-        return bytes(self._kept[at - self._start :])
+        return bytes(self.data[at - self._start :])
 
     def forget(self, before: int) -> None:
         """Let go of what lies before an offset."""
-        del self._kept[: max(0, before - self._start)]
+        del self.data[: max(0, before - self._start)]
         self._start = max(self._start, before)
 
     def has_ended(self, at: int) -> bool:
@@ -100,10 +106,12 @@ KNOWN = frozenset(ChunkType)
 WANTED = frozenset((*REPEATED, ChunkType.DATA, ChunkType.CEND, ChunkType.REPT))
 SMALL = MIB  # a chunk that is not wanted is checked up to this length, and skipped beyond
 TRY = 256  # bytes that a try counts as, beside those that it reads
+LEAST_MOST = 256  # bytes that packets have as far as is known before one came
+PATIENCE = 4  # times as long as any before may a packet be without anything else being looked for
 
 _CHUNK = b"(?=" + b"|".join(sorted(kind.value for kind in KNOWN)) + b")"
 _ANY_CHUNK = re.compile(_CHUNK)
-_ANY_PACKET = re.compile(rb"[\x00-\x03\x80-\x83]|" + _CHUNK)
+_ANY_PACKET = re.compile(rb"[\x00-\x02\x80-\x82]|" + _CHUNK)
 _NAME_SIZE = 4
 
 
@@ -135,15 +143,20 @@ class _OtherData(FormatError):
     """
 
 
-class _Misplaced(FormatError):
-    """A packet of kind 3 whose head is right, and whose frame is not the one that is due.
+class _Short(FormatError):
+    """A packet has not come up to ``stop``."""
 
-    It ends at ``end`` unless something is lost in its ``body``.
-    """
+    def __init__(self, stop: int) -> None:
+        super().__init__("it has not come whole")
+        self.stop = stop
 
-    def __init__(self, reason: str, body: int, end: int) -> None:
-        super().__init__(reason)
-        self.body, self.end = body, end
+
+class _Endless(FormatError):
+    """A packet does not end before the next thing that is whole, at ``found``."""
+
+    def __init__(self, found: int) -> None:
+        super().__init__(f"a packet that does not end before {found}")
+        self.found = found
 
 
 def repeated(piece: Piece) -> list[Piece]:
@@ -155,9 +168,8 @@ def repeated(piece: Piece) -> list[Piece]:
 class WalkerWithLosses:
     """A walk along a stream that survives what is lost.
 
-    ``frame_of`` tells, behind the events so far, the number of the frame that a packet with this
-    sequence number of the open DATA holds; None where that is not known, and a packet of kind 3
-    comes unchecked then: where it ends is not sure before what follows it is found to be whole.
+    ``implied_of`` tells, behind the events so far, what a packet of kind 2 with this sequence
+    number of the open DATA implies (``packets.implied_by``); None where that is not known.
 
     ``join``: the stream may begin anywhere. ``profile`` is to be set as HEAD says. ``is_cut`` is
     True where the stream ended before its FOOT, or amid something. Memory is bounded by the
@@ -165,17 +177,16 @@ class WalkerWithLosses:
     """
 
     def __init__(
-        self, stream: BinaryIO, frame_of: Callable[[int], int | None], *, join: bool = False
+        self, stream: BinaryIO, implied_of: Callable[[int], bytes | None], *, join: bool = False
     ) -> None:
         self.pipe = PipeSource(stream)
-        self._frame_of = frame_of
+        self._implied_of = implied_of
         self.profile = BASE
         self.is_cut = True
         self.at = 0  # what lies before was taken, or given up
         self._join = join
         self._due: int | None = None  # the next packet of the open DATA
-        # Where the body of the packet before begins whose check is not known to be right.
-        self._unchecked: int | None = None
+        self._most = LEAST_MOST  # bytes of the largest packet so far
         self._search_budget = Search()
 
     @property
@@ -193,8 +204,7 @@ class WalkerWithLosses:
                 self.is_cut = not (isinstance(event, Piece) and event.type == b"FOOT")  # LIVE-11
                 yield event
                 if isinstance(event, Fault):
-                    if self._unchecked is None:
-                        self._move(self._search(end))  # LIVE-03
+                    self._move(self._search(end))  # LIVE-03
                 elif not self.is_cut and self.pipe.has_ended(end):
                     return
         except TruncatedError:
@@ -216,71 +226,85 @@ class WalkerWithLosses:
 
     def _move(self, at: int) -> None:
         self.at = at
-        self.pipe.forget(at if self._unchecked is None else self._unchecked)
-
-    def _body_unchecked(self, event: Event, end: int) -> int | None:
-        """Where the body of a packet begins that ends at ``end`` and whose frame nobody told."""
-        if not isinstance(event, Packet) or event.kind != NUMBERED:
-            return None
-        told = self._frame_of(event.sequence) is not None
-        return None if told else end - CHECK_SIZE - len(event.body)
+        self.pipe.forget(at)
 
     def _next(self) -> tuple[Event, int]:
-        """What lies at ``at`` and where it ends; of a Fault, where to go on, or to search."""
-        at, due, before = self.at, self._due, self._unchecked
+        """What lies at ``at`` and where it ends; of a Fault, where to search."""
+        at, due = self.at, self._due
         self.pipe.read(at, 1)  # a stream that ends between two things has no fault
-        self._unchecked = None
         try:
-            event, end = self._whole(at)
-            self._unchecked = self._body_unchecked(event, end)
-            return event, end
+            return self._whole(at)
         except UnsupportedError:
             raise
-        except _Misplaced as error:
-            self._unchecked = error.body
-            return Fault(at, str(error)), error.end
+        except _Endless as error:
+            return Fault(at, str(error)), error.found
         except FormatError as error:
             self._due = None if isinstance(error, _OtherData) else due
-            behind = max(self.pipe.start, at + 1 if before is None else before)
-            is_cut = isinstance(error, TruncatedError)
+            behind, is_cut = at + 1, isinstance(error, TruncatedError)
             if is_cut:
                 behind = self._search(behind)  # raises, too, where nothing is whole
             return Fault(at, str(error), is_cut), behind
 
-    def _whole(self, at: int, *, checked: bool = False) -> tuple[Piece | Packet, int]:
+    def _whole(self, at: int, *, searched: bool = False) -> tuple[Piece | Packet, int]:
         """What is whole at ``at``, and where it ends; raises FormatError.
 
-        ``checked``: and is no large chunk, which would be passed over unchecked, nor a packet whose
-        frame nobody told.
+        ``searched``: and is no large chunk, which would be passed over unchecked. A packet is not
+        waited for then.
         """
         if self.pipe.read(at, 1).isalpha():
-            piece, end = self._chunk(at, SMALL if checked else self.profile.chunk_bytes)
+            piece, end = self._chunk(at, SMALL if searched else self.profile.chunk_bytes)
             self._due = 0 if piece.payload is None else None
             return piece, end
         if self._due is None:
             return self._foot(at)
-        reader = _Reader(self.pipe, at)
-        packet = read_packet(reader, self.profile.packet_bytes)
-        if packet.kind == NUMBERED:
-            try:
-                self._check_number(packet, self._due, checked)
-            except FormatError as error:
-                body = reader.at - CHECK_SIZE - len(packet.body)
-                raise _Misplaced(str(error), body, reader.at) from None
-        elif packet.sequence < self._due:  # LIVE-07
-            raise _OtherData(f"packet {packet.sequence} where {self._due} is due")
+        packet, end = self._packet(at) if searched else self._awaited(at)
         self._due = None if packet.kind == END else packet.sequence + 1
-        return packet, reader.at
+        return packet, end
 
-    def _check_number(self, packet: Packet, due: int, checked: bool) -> None:
-        """Raise FormatError for a packet of kind 3 that is not known to be in its place."""
-        if packet.sequence < due:
-            raise FormatError(f"packet {packet.sequence} where {due} is due")
-        number = self._frame_of(packet.sequence)
-        if number is not None:
-            check_number(packet, number)
-        elif checked:
-            raise FormatError(f"packet {packet.sequence}: nobody told which frame it is")
+    def _awaited(self, at: int) -> tuple[Packet, int]:
+        """The packet at ``at``, waited for: no longer than until something else is whole behind
+        it, where it is far longer than those before, as one with a damaged head is."""
+        while True:
+            try:
+                packet, end = self._packet(at)
+            except _Short as short:
+                if self.pipe.end - at > PATIENCE * self._most:
+                    found = self._search(at)
+                    if found != at:
+                        raise _Endless(found) from None
+                else:
+                    self.pipe.take(short.stop - self.pipe.end)
+            else:
+                self._most = max(self._most, end - at)
+                return packet, end
+
+    def _packet(self, at: int) -> tuple[Packet, int]:
+        """The packet at ``at``, and where it ends; raises _Short, or FormatError."""
+        start, data, due = self.pipe.start, self.pipe.data, self._due or 0
+        try:
+            head = parse_packet_head(data, at - start, self.profile.packet_bytes)
+        except TruncatedError:
+            raise _Short(self.pipe.end + 1) from None
+        first, sequence, begin, stop = head
+        kind, implied = first & KIND, b""
+        if kind == FRAME:
+            if sequence < due:
+                raise FormatError(f"packet {sequence} where {due} is due")
+            known = self._implied_of(sequence)
+            if known is None:
+                raise FormatError(f"packet {sequence}: it is not known which frame it is")
+            implied = known
+        end = start + stop + CHECK_SIZE
+        if end > self.pipe.end:
+            raise _Short(end)
+        self.pipe.n_bytes += end - at
+        body = bytes(data[begin:stop])
+        check = packet_check(bytes(data[at - start : begin]), body, implied)
+        if check != data[stop : stop + CHECK_SIZE]:
+            raise FormatError(f"crc of packet {sequence} is wrong, or it is another frame")
+        if sequence < due:  # LIVE-07
+            raise _OtherData(f"packet {sequence} where {due} is due")
+        return Packet(kind, sequence, body, first >= FRESH, implied), end
 
     def _chunk(self, at: int, most: int) -> tuple[Piece, int]:
         header = self.pipe.read(at, HEADER.size)
@@ -320,52 +344,48 @@ class WalkerWithLosses:
         """Where something whole begins, at ``at`` or behind it; raises TruncatedError.
 
         A packet counts in an open DATA alone; behind one of a lower number than is due none does.
-        What is found is not taken: it is read again.
+        What is found is not taken: it is read again. Packets that have not come whole are tried
+        again when they have, unless something behind them is whole before.
         """
+        short: dict[int, int] = {}  # where such packets begin and end
         while True:
+            for begin in [begin for begin, stop in short.items() if stop <= self.pipe.end]:
+                if self._is_whole(begin, short):
+                    return begin
             data = self.pipe.kept(at)
             pattern = _ANY_CHUNK if self._due is None else _ANY_PACKET
             for match in pattern.finditer(data):
                 due = self._due
-                found = self._is_whole(at + match.start())
-                if found is not None:
-                    self._due = due if found else None
+                if self._is_whole(at + match.start(), short):
+                    return at + match.start()
+                if self._due != due:  # a packet of another DATA
                     at += match.start()
+                    short.clear()
                     break
-                self._due = due
             else:
-                found = None
                 at += max(0, len(data) - _NAME_SIZE + 1)  # a name may have begun
-            if found:
-                return at
-            self.pipe.forget(at)
-            self.pipe.read(at, _NAME_SIZE)
+                self.pipe.take(max(1, min(short.values(), default=0) - self.pipe.end))
+            self.pipe.forget(min((at, *short)))
 
-    def _is_whole(self, at: int) -> bool | None:
-        """Whether something is, None where not; False for a packet of another DATA.
+    def _is_whole(self, at: int, short: dict[int, int]) -> bool:
+        """Whether something is; what is ``short`` is noted there.
 
         Counts what is read in vain, which is seldom much.
         """
-        before = self.pipe.n_bytes
+        before, due = self.pipe.n_bytes, self._due
+        short.pop(at, None)
         try:
-            self._whole(at, checked=True)
+            self._whole(at, searched=True)
         except _OtherData:
-            return False
+            due = None
+        except _Short as error:
+            short[at] = error.stop
         except FormatError:
-            return None
+            pass
+        else:
+            return True
         finally:
+            self._due = due
             spent = self.pipe.n_bytes - before + TRY
             self._search_budget.spend(spent, self.size, "a chunk or packet")  # LIVE-04
-        return True
-
-
-class _Reader:
-    """Reads on from an offset."""
-
-    def __init__(self, pipe: PipeSource, at: int) -> None:
-        self.at, self._pipe = at, pipe
-
-    def __call__(self, size: int) -> bytes:
-        data = self._pipe.read(self.at, size)
-        self.at += size
-        return data
+        return False

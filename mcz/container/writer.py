@@ -37,13 +37,14 @@ from mcz.container.packed import smallest
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
+    FRAME,
     SEGMENT,
     Packet,
     build_packet,
-    numbered_frame,
+    implied_by,
 )
 from mcz.container.plain import check_plain
-from mcz.container.segments import FRESH, SegmentHeader, build_segment
+from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
 from mcz.errors import FormatError, MotionError
 from mcz.motion import Skeleton
 from mcz.schema import build
@@ -96,6 +97,7 @@ class Writer:
         self.directory = directory or Directory()
         self._clip: ClipRow | None = None
         self._next_packet: int | None = None  # while a DATA is open
+        self._implying: tuple[SegmentRow, bytes] | None = None  # the segment whose mask frames have
         self.last_skeleton: tuple[Skeleton, bytes] | None = None  # and its id
         self._copies = list(uncopied) if copies and not profile.is_plain else None
         if offset == 0:
@@ -206,27 +208,43 @@ class Writer:
             clip.segments.append(SegmentRow(chunk.payload_offset, len(payload), header))
         else:
             fresh = bool(header.flags & FRESH)
-            self._packet(clip, header, Packet(SEGMENT, self._next_packet, payload, fresh))
+            packet = Packet(SEGMENT, self._next_packet, payload, fresh)
+            row = self._packet(clip, header, packet)
+            if header.signal == 0:
+                self._implying = row, payload
 
     def frame(self, first: int, stream: bytes, *, fresh: bool) -> None:
-        """Write a segment of one frame of signal 0, which has one stream, as a packet of kind 3.
+        """Write a segment of one frame of signal 0, which has one stream, as a packet of kind 2.
 
-        A DATA is open, and in it frame ``first`` - 1 of signal 0 was written.
+        A DATA is open, and in it frame ``first`` - 1 of signal 0 was written. The mask is that of
+        the last segment that was written there by ``segment``.
         """
         clip = self._in_clip("DATA")
-        if self._next_packet is None:
-            raise FormatError("no DATA is open")
-        header = SegmentHeader(0, first, 1, flags=fresh * FRESH)
-        self._packet(clip, header, numbered_frame(self._next_packet, first, stream, fresh=fresh))
+        if self._next_packet is None or self._implying is None:
+            raise FormatError("no DATA is open with a segment of signal 0")
+        told, segment = self._implying
+        masks = told.header.flags & MASKS  # PACK-20
+        header = SegmentHeader(0, first, 1, flags=fresh * FRESH | masks)
+        implied = implied_by(first, mask_of(segment))
+        packet = Packet(FRAME, self._next_packet, stream, fresh, implied)
+        self._packet(clip, header, packet, told if masks else None)
 
-    def _packet(self, clip: ClipRow, header: SegmentHeader, packet: Packet) -> None:
+    def _packet(
+        self,
+        clip: ClipRow,
+        header: SegmentHeader,
+        packet: Packet,
+        told: SegmentRow | None = None,
+    ) -> SegmentRow:
         size = len(packet.body)
         check("packet: bytes", size, self.profile.packet_bytes)
         data = build_packet(packet)
         start = self.offset + len(data) - CHECK_SIZE - size
         self._write(data)
         self._next_packet = packet.sequence + 1
-        clip.segments.append(SegmentRow(start, size, header, packet.kind))
+        row = SegmentRow(start, size, header, packet.kind, told)
+        clip.segments.append(row)
+        return row
 
     def open_data(self) -> None:
         """Begin an open DATA: until ``close_data``, each segment is one packet."""
@@ -234,7 +252,7 @@ class Writer:
         if self._next_packet is not None:
             raise FormatError("a DATA is open already")
         self._write(build_header(ChunkType.DATA, 0, OPEN_LENGTH))
-        self._next_packet = 0
+        self._next_packet, self._implying = 0, None
 
     def close_data(self) -> None:
         if self._next_packet is None:

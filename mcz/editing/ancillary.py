@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mcz.container.chunks import CRC, HEADER, Chunk, read_chunk
+from mcz.container.chunks import CRC, Chunk, read_chunk
 from mcz.container.directory import ClipRow
-from mcz.container.packets import read_packets
+from mcz.container.feeding import end_of
 from mcz.container.reader import Container
-from mcz.container.source import Forward
 from mcz.errors import FormatError
 
 
@@ -28,15 +27,8 @@ def inside(container: Container, row: ClipRow) -> Iterator[Chunk]:
             continue
         chunk = read_chunk(source, at)
         if chunk.length is None:
-            at = _end_of_packets(container, chunk)
+            at = end_of(source, chunk)
             continue
         if chunk.flags:
             yield chunk
         at += chunk.size
-
-
-def _end_of_packets(container: Container, chunk: Chunk) -> int:
-    read = Forward(container.source, chunk.offset + HEADER.size)
-    for _ in read_packets(read, container.profile.packet_bytes):
-        pass
-    return read.at

@@ -21,13 +21,12 @@ from mcz.container.chunks import (
     read_chunk,
 )
 from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
+from mcz.container.feeding import end_of
 from mcz.container.index import segment_rows
 from mcz.container.index_reader import parse_segments
 from mcz.container.metadata import Record, as_one
 from mcz.container.packed import parse_skel
-from mcz.container.packets import read_packets
 from mcz.container.reader import Container
-from mcz.container.source import Forward
 from mcz.container.writer import Writer, payload_id
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import build, parse, parse_until
@@ -193,12 +192,10 @@ class Carrier:
 
     def _open_data(self, chunk: Chunk) -> int:
         """Carry an open DATA over, packets and all; return where it ends."""
-        read = Forward(self.container.source, chunk.payload_offset)
-        for _ in read_packets(read, self.container.profile.packet_bytes):
-            pass
-        for at in range(chunk.offset, read.at, BLOCK):
-            self.writer.raw(self.container.source.read(at, min(BLOCK, read.at - at)))
-        return read.at
+        end = end_of(self.container.source, chunk)
+        for at in range(chunk.offset, end, BLOCK):
+            self.writer.raw(self.container.source.read(at, min(BLOCK, end - at)))
+        return end
 
 
 def said_of(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
@@ -210,7 +207,8 @@ def said_of(container: Container, names: Iterable[tuple[str, str]]) -> list[Reco
 
 def _moved(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:
     less = max((size for start, size in moved if segment.offset >= start), default=0)
-    return replace(segment, offset=segment.offset + shift - less)
+    told = segment.told and _moved(segment.told, shift, moved)
+    return replace(segment, offset=segment.offset + shift - less, told=told)
 
 
 def _renamed(part: bytes, name: str) -> bytes:

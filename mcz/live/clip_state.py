@@ -21,7 +21,7 @@ from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, Chunk, ChunkType, build_foot
 from mcz.container.directory import ClipRow, signal_rows
 from mcz.container.masks import parse_mask
-from mcz.container.packets import SHORT
+from mcz.container.packets import FRAME
 from mcz.container.reader import Container
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, frame_table, parse_table
 from mcz.container.source import ByteSource
@@ -109,6 +109,7 @@ class ClipState:
         check_known_answer(info.codec)
         self.decoder: LiveDecoder = info.codec.follow(info.header, info.layout)
         self._digest = ValueDigest()
+        self._mask: NDArray[np.bool_] | None = None  # that packets of kind 2 imply
 
     def parts(
         self, header: SegmentHeader, packet: int, payload: bytes
@@ -118,9 +119,9 @@ class ClipState:
         ``packet`` is the kind of packet that it came in, 0 for a closed DATA. Raises FormatError,
         UnsupportedError for a segment of several frames.
         """
-        if packet in SHORT:
-            frame_table(header, self.info.counts, len(payload))
-            return payload, None
+        if packet == FRAME:
+            frame_table(header, self.info.counts, len(payload), 0)
+            return payload, self._mask
         where = f"{self._where}, frame {header.first}"
         if header.n_frames != 1 or header.flags & ~(FRESH | MASKS):
             raise UnsupportedError(
@@ -138,9 +139,10 @@ class ClipState:
             payload[at : at + size] for at, size in zip(table.offsets, table.lengths, strict=True)
         ]
         number = table.mask(0)
-        mask = None
+        mask = self._mask = None
         if number is not None and streams[number]:
-            mask = parse_mask(streams[number], 1, self.info.layout.n_channels, self._where)[0]
+            n_channels = self.info.layout.n_channels
+            mask = self._mask = parse_mask(streams[number], 1, n_channels, self._where)[0]
         return streams[table.codec(0, 0)], mask
 
     def digest(self, values: Floats, mask: NDArray[np.bool_] | None) -> None:

@@ -41,7 +41,7 @@ def stream_encode(
     up: str | None = None,
     name: str = "live",
     metadata: Mapping[str, str] = MappingProxyType({}),
-    repeat: int = 1,
+    repeat: int | None = None,
 ) -> Iterator[bytes]:
     """The bytes of a live clip: first what precedes the frames, then those of each as it comes.
 

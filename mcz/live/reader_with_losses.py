@@ -17,8 +17,8 @@ from mcz.container import payloads
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.directory import parse_head
 from mcz.container.limits import check
-from mcz.container.packets import END, SEGMENT, SHORT, Packet
-from mcz.container.segments import FRESH, SegmentHeader, parse_header
+from mcz.container.packets import END, SEGMENT, Packet, implied_by
+from mcz.container.segments import FRESH, SegmentHeader, mask_of, parse_header
 from mcz.container.walk_with_losses import Fault, Piece, WalkerWithLosses, repeated
 from mcz.container.writer import payload_id
 from mcz.errors import (
@@ -73,12 +73,14 @@ class StreamSummary:
 class _Open:
     """An open DATA: the packet and the frame that are due in it.
 
-    ``number`` is None until a packet has told it. No frame of it comes before ``least``.
+    ``number`` is None until a packet has told it, ``mask`` is what packets of kind 2 imply then. No
+    frame of it comes before ``least``.
     """
 
     def __init__(self, least: int | None) -> None:
         self.least = least
         self.number: int | None = None
+        self.mask = b""
         self.sequence = 0
 
 
@@ -86,7 +88,7 @@ class FramesWithLosses:
     """The frames of a stream that survives losses; ``clip`` is the one that the last is of."""
 
     def __init__(self, stream: BinaryIO, lost: Lost, join: bool, summary: StreamSummary) -> None:
-        self._walker = WalkerWithLosses(stream, self._frame_of, join=join)
+        self._walker = WalkerWithLosses(stream, self._implied_of, join=join)
         self._lost, self._summary = lost, summary
         self._joining = join  # until a frame has come whose number is known
         self._head, self._shared = b"", Shared()
@@ -233,46 +235,56 @@ class FramesWithLosses:
         course, data = self._course, self._open
         gap = sequence - data.sequence  # LIVE-05
         # LIVE-06
-        if course is None or data.number is None or (gap and course.followed.n_signals > 1):
+        several = course is None or course.followed.n_signals > 1
+        if data.number is None or (gap and several):
             return None  # of several signals it is not known whose frames the lost packets held
         return data.number + gap
+
+    def _implied_of(self, sequence: int) -> bytes | None:
+        """What the check of that packet of kind 2 covers beside its bytes, where known."""
+        number = self._frame_of(sequence)
+        return None if number is None else implied_by(number, self._open.mask)  # PACK-20
 
     def _packet(self, packet: Packet) -> Iterator[LiveFrame]:
         course, data = self._course, self._open
         number = data.number = self._frame_of(packet.sequence)
         data.sequence = packet.sequence + 1
+        if packet.kind == SEGMENT:
+            yield from self._segment(packet.body, SEGMENT, packet.fresh)
+            return
+        if number is not None and packet.kind != END:
+            data.number = number + 1
         if course is None:
             return
         if course.followed.n_signals > 1:
             data.least = None
-        if packet.kind == SEGMENT:
-            yield from self._segment(packet.body, SEGMENT, packet.fresh)
-            return
         if number is None:
             if data.least is not None:
-                least = data.least + packet.sequence + (packet.kind in SHORT)
-                yield from course.frames.reach(min(least, MAX_COUNT))
+                yield from course.frames.reach(min(data.least + packet.sequence, MAX_COUNT))
         elif number >= MAX_COUNT:
             self._fault(f"packet {packet.sequence}: frame {number}")
         elif packet.kind == END:
             yield from course.frames.reach(number)
         else:
-            data.number = number + 1
             header = SegmentHeader(0, number, 1, flags=FRESH if packet.fresh else 0)
-            yield from self._frame(course, header, packet.kind, packet.body)
+            yield from self._frame(course, header, packet.kind, packet.body)  # PACK-12
 
     def _segment(self, payload: bytes, kind: int, fresh: bool | None) -> Iterator[LiveFrame]:
         course = self._course
-        assert course is not None
+        if course is not None and course.followed.n_signals > 1:
+            self._open.least = None
         try:
             header, _ = parse_header(payload)
+            mask = mask_of(payload) if kind and not header.signal else b""
         except FormatError as error:
             self._open.number = None  # how many frames it had is not known either
             self._fault(str(error))
             return
         if header.signal:
             return
-        self._open.number = header.stop
+        self._open.number, self._open.mask = header.stop, mask
+        if course is None:
+            return
         if fresh in (None, bool(header.flags & FRESH)):
             yield from self._frame(course, header, kind, payload)
         else:

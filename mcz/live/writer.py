@@ -25,12 +25,12 @@ from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
 from mcz.interrupts import held
-from mcz.kinematics import point_names, point_set
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.kinematics.single import FramePositions
+from mcz.live.figures import Figures
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.schema import build
-from mcz.types import Params, Settings
+from mcz.types import Params
 from mcz.writing.clip_writer import begin_open_clip
 from mcz.writing.names import check_metadata
 from mcz.writing.planning import asked, plan_open_clip
@@ -39,6 +39,7 @@ from mcz.writing.quality import CHUNK, texts_of
 from mcz.writing.signal_source import MemorySource
 
 MOST_OVER = 1.05  # of a rate: that it is held
+REPEATED_SHARE = 0.1  # of a rate, for what is repeated to those who join
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -78,9 +79,9 @@ class LiveWriter:
     ``metadata`` are those of the clip, ``first_number`` is the number of its first frame, ``base``
     the skeleton that its own was derived from where that says so. Each frame's bytes are
     written in one call, and flushed. Every ``repeat``-th frame that starts fresh, but the first,
-    is preceded by what a reader needs who joins there (0: none is). Raises OptionError for a codec
-    that cannot, for a bad parameter or one that needs all frames, MotionError for a skeleton
-    without channels.
+    is preceded by what a reader needs who joins there (0: none is; None: each, with a bit rate as
+    many as take a tenth of it). Raises OptionError for a codec that cannot, for a bad parameter or
+    one that needs all frames, MotionError for a skeleton without channels.
 
     ``traffic`` counts what was sent. ``entry`` is where, in the bytes that are being written or
     were last, a reader can join, who has those of the beginning or finds them repeated there; None
@@ -105,13 +106,14 @@ class LiveWriter:
         metadata: Mapping[str, str] = MappingProxyType({}),
         first_number: int = 1,
         base: Skeleton | None = None,
-        repeat: int = 1,
+        repeat: int | None = None,
     ) -> None:
-        if repeat < 0:
+        if repeat is not None and repeat < 0:
             raise OptionError(f"repeat is {repeat}, not 0 or more")
         self.n_frames, self._gaps = 0, ComingGaps(first_number)
         self.entry: int | None = None
         self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
+        self._repeated_at = 0  # frame
         self.codec = by_name(codec)
         self.options = self.codec.options(params)
         self.traffic = LiveTraffic(asked=self.options.get("bitrate"))
@@ -119,6 +121,7 @@ class LiveWriter:
         self._outlet = _Outlet(sink, self.traffic)
         self._writer = Writer(self._outlet)
         self._is_open = self._has_data = self._is_stuck = False
+        self._mask, self._was_masked = b"", False  # of the frame before, and of any in the DATA
         check_metadata(metadata, name)
         self.skeleton, self._n_channels = skeleton, skeleton.n_channels
         self._positions = wants_positions(self.codec, self.options, skeleton)
@@ -141,8 +144,8 @@ class LiveWriter:
         begin_open_clip(self._writer, plan, first_number)
         self._is_open = True
         self._digest = ValueDigest()
-        self._figures = _Figures(coded)
-        self._opening = self._outlet.chunks(REPEATED) if repeat else b""  # REPT-01
+        self._figures = Figures(coded)
+        self._opening = self._outlet.chunks(REPEATED) if repeat != 0 else b""  # REPT-01
         self._outlet.send()
 
     @property
@@ -244,15 +247,18 @@ class LiveWriter:
         if fresh and self._has_data:
             self._writer.close_data()
             self._has_data = False
-        if self._has_data and valid is None:
+        mask = b"" if valid is None else build_mask(valid[None])
+        told_again = self._was_masked and self._encoder.is_reference
+        if self._has_data and mask == self._mask and not told_again:
             self._writer.frame(self.n_frames, stream, fresh=fresh)
-        else:
-            if not self._has_data:
-                self._begin_data(fresh)
-            flags, streams = fresh * FRESH, [stream]
-            if valid is not None:
-                flags, streams = flags | MASKS, [build_mask(valid[None]), stream]
-            self._writer.segment(SegmentHeader(0, self.n_frames, 1, flags=flags), streams)
+            return
+        if not self._has_data:
+            self._begin_data(fresh)
+        flags, streams = fresh * FRESH, [stream]
+        if mask:
+            flags, streams = flags | MASKS, [mask, stream]
+        self._writer.segment(SegmentHeader(0, self.n_frames, 1, flags=flags), streams)
+        self._mask, self._was_masked = mask, self._was_masked or bool(mask)
 
     def _begin_data(self, fresh: bool) -> None:
         """Open a DATA, from time to time behind a copy of what is needed to read it.
@@ -262,10 +268,21 @@ class LiveWriter:
         if fresh:
             self.entry = self._outlet.size
             self._n_fresh += 1
-            if self._repeat and self._n_fresh > 1 and (self._n_fresh - 1) % self._repeat == 0:
-                self._writer.chunk(ChunkType.REPT, self._opening, ChunkFlag.ANCILLARY)  # REPT-02
+            if self._n_fresh > 1 and self._repeats():  # REPT-02
+                self._writer.chunk(ChunkType.REPT, self._opening, ChunkFlag.ANCILLARY)
+                self._repeated_at = self.n_frames
         self._writer.open_data()
-        self._has_data = True
+        self._has_data, self._was_masked = True, False
+
+    def _repeats(self) -> bool:
+        """Whether the fresh frame that is due is preceded by what a reader needs who joins."""
+        asked = self.traffic.asked
+        if self._repeat is not None:
+            return self._repeat > 0 and (self._n_fresh - 1) % self._repeat == 0
+        if asked is None or not self._rate:
+            return True
+        spent = 125 * asked * float((self.n_frames - self._repeated_at) / self._rate)
+        return len(self._opening) <= REPEATED_SHARE * spent
 
     def heartbeat(self) -> None:
         """Write an open DATA without a frame, which readers skip.
@@ -355,62 +372,3 @@ class _Outlet:
         flush = getattr(self._sink, "flush", None)
         if flush is not None:
             flush()
-
-
-class _Figures:
-    """The errors of a quality record, frame by frame: of values and, of markers, of positions."""
-
-    def __init__(self, skeleton: Skeleton) -> None:
-        self.skeleton = skeleton
-        self._positions = bool(skeleton.joints) and point_set(skeleton) == "markers"
-        self._frames = self._values = self._points = 0
-        self._squares = self._sum = 0.0
-        self._most = -1.0
-        self._where: tuple[int, int] | None = None
-
-    def add(self, given: Floats, decoded: Floats) -> None:
-        """Add a frame; NaN in ``given`` does not count."""
-        with np.errstate(all="ignore"):  # what overflows is no figure
-            squares = np.square(decoded - given)
-            self._squares, self._values = _added(self._squares, self._values, squares)
-            if self._positions:
-                distances = np.sqrt(squares.reshape(-1, 3).sum(axis=1))
-                self._sum, self._points = _added(self._sum, self._points, distances)
-                distances[np.isnan(distances)] = -1.0
-                point = int(distances.argmax())
-                if distances[point] > self._most:
-                    self._most, self._where = float(distances[point]), (self._frames, point)
-        self._frames += 1
-
-    def entries(self) -> Settings:
-        """The figures by their metric ids, None where there is none."""
-        unit = self.skeleton.unit_cm
-        found: Settings = {"frames": self._frames, "channels": self.skeleton.n_channels}
-        found["mse_raw"] = self._squares / self._values if self._values else None
-        if self._positions and self._where is not None:
-            mean, (frame, point) = self._sum / self._points, self._where
-            found |= {
-                "point_set": point_set(self.skeleton),
-                "points": self.skeleton.n_joints,
-                "unit_cm": unit,
-                "mean_position_error": mean,
-                "mean_position_error_cm": mean * unit if unit is not None else None,
-                "max_position_error": self._most,
-                "max_position_error_cm": self._most * unit if unit is not None else None,
-                "max_position_error_frame": frame,
-                "max_position_error_point": point_names(self.skeleton)[point],
-            }
-        return {key: value for key, value in found.items() if not _is_absurd(value)}
-
-
-def _added(total: float, count: int, more: Floats) -> tuple[float, int]:
-    """Sum and number with those of ``more`` that are not NaN."""
-    found = float(more.sum())
-    if found == found:
-        return total + found, count + more.size
-    valid = ~np.isnan(more)
-    return total + float(more[valid].sum()), count + int(np.count_nonzero(valid))
-
-
-def _is_absurd(value: object) -> bool:
-    return isinstance(value, float) and not np.isfinite(value)

@@ -105,6 +105,7 @@ def _segment_parts(at: int, segment: _Segment) -> Iterator[tuple[int, int, str]]
             if table.counts.n_resolutions > 1:
                 text += f", stored resolution {resolution}"
             names[table.codec(resolution, group)] = text
+    implied = None if table.size else table.mask(0)  # it lies in a packet before
     for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True)):
-        if length:
+        if length and index != implied:
             yield at + offset, length, names[index]

@@ -16,7 +16,7 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.limits import check
-from mcz.container.packets import SHORT
+from mcz.container.packets import FRAME
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
 from mcz.container.skeletons import parse_channels
@@ -192,8 +192,9 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
     per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
     due = 0
     for row in info.rows:
-        if row.packet in SHORT:
-            frame_table(row.header, info.counts, row.size)  # refuses what cannot be such a packet
+        if row.packet == FRAME:
+            # refuses what cannot be such a packet
+            frame_table(row.header, info.counts, row.size, 0)
         if row.header.flags & FRAME_NOTES and not noted:  # NOTES-01
             raise FormatError("frame notes, but no source that they belong to", where=where)
         if not (row.header.first or row.header.flags & FRESH):  # DATA-12

@@ -13,7 +13,6 @@ from mcz.codecs.contract import Request, Span
 from mcz.codecs.known_answers import check_known_answer
 from mcz.container.limits import check_decoded
 from mcz.container.masks import parse_mask
-from mcz.container.packets import SHORT
 from mcz.container.reader import Container
 from mcz.container.runs import MOST_OF_ONE, Run
 from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
@@ -362,7 +361,7 @@ class SignalReader:
             row = self.info.rows[index]
             shift = (row.header.first - start) * per_frame
             noted.begin(shift)
-            if row.packet in SHORT or not row.header.flags & GROUP_NOTES:
+            if not row.header.flags & GROUP_NOTES:
                 continue  # it has no notes, and the grids of the clip
             for group in self.groups:
                 notes = self._group_notes(index, group)
@@ -389,7 +388,7 @@ class SignalReader:
         mask: NDArray[np.bool_] | None = None
         for index in self.info.covering(start, stop):
             header = self.info.rows[index].header
-            if self.info.rows[index].packet in SHORT or not header.flags & MASKS:
+            if not header.flags & MASKS:
                 continue  # all of it is valid
             table, streams = self._streams(index)
             a, b = max(start, header.first), min(stop, header.stop)

@@ -39,7 +39,7 @@ def take_varint(source: Iterable[int], where: str) -> int:
     raise TruncatedError("a varint runs past the end", where=where)
 
 
-def read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
+def read_varint(data: bytes | bytearray | memoryview, at: int) -> tuple[int, int]:
     """The varint at offset ``at`` of ``data`` and the offset after it."""
     if at + 1 < len(data):  # most have one byte or two
         low, high = data[at], data[at + 1]

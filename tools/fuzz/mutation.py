@@ -12,7 +12,7 @@ from typing import Any
 
 from mcz.codecs import HOMES
 from mcz.container import payloads
-from mcz.container.packets import FRAME, NUMBERED, SEGMENT, Packet
+from mcz.container.packets import FRAME, SEGMENT, Packet
 from mcz.container.segments import parse_header
 from mcz.container.strict import decoded
 from mcz.errors import MczError
@@ -283,7 +283,7 @@ class Mutation:
         elif kind == 3:
             packets[n] = replace(packets[n], fresh=not packets[n].fresh)
         else:
-            packets[n] = replace(packets[n], kind=self.rng.choice((SEGMENT, FRAME, NUMBERED)))
+            packets[n] = replace(packets[n], kind=self.rng.choice((SEGMENT, FRAME)))
         return _with_packets(pieces, which, tuple(packets))
 
 

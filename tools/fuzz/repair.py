@@ -30,21 +30,12 @@ from mcz.container.chunks import (
     read_chunk,
 )
 from mcz.container.directory import Directory
+from mcz.container.feeding import packets
 from mcz.container.index import build_index
-from mcz.container.limits import LARGE
-from mcz.container.packets import (
-    END,
-    NUMBERED,
-    SEGMENT,
-    SHORT,
-    Packet,
-    body_check,
-    build_packet,
-    read_packets,
-)
+from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet, implied_by
 from mcz.container.scan import scan
-from mcz.container.segments import SegmentHeader, parse_header
-from mcz.container.source import Forward, open_source
+from mcz.container.segments import SegmentHeader, mask_of, parse_header
+from mcz.container.source import open_source
 from mcz.container.value_hash import value_hash
 from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
@@ -85,10 +76,10 @@ def pieces_of(data: bytes) -> Pieces:
         chunk = read_chunk(source, at)
         indexed = chunk.type == b"INDX"
         if chunk.length is None:
-            read = Forward(source, chunk.payload_offset)
-            packets = tuple(read_packets(read, LARGE.packet_bytes))
-            pieces.append(Piece(chunk.type, chunk.flags, b"", packets))
-            at = read.at
+            found = list(packets(source, chunk))
+            inner = tuple(event.packet for event in found[:-1])
+            pieces.append(Piece(chunk.type, chunk.flags, b"", inner))
+            at = found[-1].end
         else:
             payload = _payload(data, chunk)
             if not indexed:
@@ -132,14 +123,23 @@ def _open(piece: Piece, due: int) -> tuple[bytes, int]:
     """An open DATA whose packets are numbered anew, and the frame that follows it."""
     out = build_header(piece.type, piece.flags, OPEN_LENGTH)
     assert piece.packets is not None
+    told = b""
     for number, packet in enumerate(piece.packets):
-        check = body_check(packet.body, due) if packet.kind == NUMBERED else None
-        out += build_packet(replace(packet, sequence=number, check=check))
-        if packet.kind in SHORT:
-            due += 1
+        implied = b""
+        if packet.kind == FRAME:
+            implied, due = implied_by(due, _mask(told)), due + 1
         elif packet.kind == SEGMENT:
-            due = _due(packet.body, due)
+            due, told = _due(packet.body, due), packet.body
+        out += build_packet(replace(packet, sequence=number, implied=implied))
     return out + build_packet(Packet(END, len(piece.packets), b"")), due
+
+
+def _mask(segment: bytes) -> bytes:
+    """The mask that frames behind a segment imply, as far as it can be read."""
+    try:
+        return mask_of(segment)
+    except FormatError:
+        return b""
 
 
 def _index_of(data: bytes) -> bytes:

@@ -25,6 +25,7 @@ const NOTHING = new Uint8Array(0);
  * @property {boolean} fresh needs no segment before it
  * @property {Uint8Array} payload of DATA or of its packet
  * @property {number | null} tableAt where `present` begins in it; null where it is all one stream
+ * @property {Uint8Array | null} mask that a packet of kind 2 implies
  * @property {number} offset of its bytes in the file, for INDX
  * @property {number} size of these, for INDX
  * @property {number} indexFlags of INDX: the flags, and the kind of its packet
@@ -41,10 +42,10 @@ const NOTHING = new Uint8Array(0);
  */
 export function readSegment(payload, clip, limits) {
   const reader = new ByteReader(payload, `DATA of ${clip.name}`);
-  const index = reader.varint();
+  const { signal: index, ...fields } = segmentFields(reader);
   if (index >= clip.signals.length) reader.refuse(`signal ${index} of ${clip.signals.length}`);
   const signal = clip.signals[index];
-  const segment = segmentHead(reader, signal);
+  const segment = newSegment(signal, fields);
   if (segment.flags & FLAG_FRAME_NOTES && !(index === 0 && clip.source)) {
     reader.refuse("frame notes, but no source that they could be of");
   }
@@ -59,14 +60,16 @@ export function readSegment(payload, clip, limits) {
   return segment;
 }
 
-function segmentHead(reader, signal) {
+/** The fields of a segment before its table. */
+export function segmentFields(reader) {
+  const signal = reader.varint();
   const firstFrame = reader.varint();
   const nFrames = reader.varint();
   const lead = reader.varint();
   const tail = reader.varint();
   const known = FLAG_FRESH | FLAG_FRAME_NOTES | FLAG_GROUP_NOTES | FLAG_MASKS;
   const flags = reader.flags(known);
-  return newSegment(signal, { firstFrame, nFrames, lead, tail, flags });
+  return { signal, firstFrame, nFrames, lead, tail, flags };
 }
 
 /** A segment without its bytes. */
@@ -82,6 +85,7 @@ export function newSegment(signal, { firstFrame, nFrames, lead, tail, flags }) {
     fresh: (flags & FLAG_FRESH) !== 0,
     payload: NOTHING,
     tableAt: null,
+    mask: null,
     offset: 0,
     size: 0,
     indexFlags: flags,
@@ -89,22 +93,47 @@ export function newSegment(signal, { firstFrame, nFrames, lead, tail, flags }) {
 }
 
 /**
- * The segment that a packet of kind 2 or 3 stands for.
+ * The segment that a packet of kind 2 stands for.
  *
- * @param {Uint8Array} body its one stream
- * @param {boolean} fresh
+ * @param {{body: Uint8Array, fresh: boolean, number: number, mask: Uint8Array | null}} frame
  * @param {import("./clip.js").Signal} signal that 0 of its clip
  * @param {object} limits of the profile
  * @returns {Segment}
  * @throws {Refused}
  */
-export function frameSegment(body, fresh, signal, limits) {
-  const flags = fresh ? FLAG_FRESH : 0;
-  const head = { firstFrame: signal.due, nFrames: 1, lead: 0, tail: 0, flags };
+export function frameSegment({ body, fresh, number, mask }, signal, limits) {
+  if (signal.groupSizes.length !== 1 || signal.nResolutions !== 1) {
+    throw new Refused("a frame of a signal with other than one group and one resolution");
+  }
+  const flags = (fresh ? FLAG_FRESH : 0) | (mask ? FLAG_MASKS : 0);
+  const head = { firstFrame: number, nFrames: 1, lead: 0, tail: 0, flags };
   const segment = newSegment(signal, head);
   checkSegment(segment, signal, limits);
+  segment.indexFlags = flags & FLAG_FRESH;
   segment.payload = body;
+  segment.mask = mask;
   return segment;
+}
+
+/** Whether frames behind a segment in a packet, which has these flags, imply a mask. */
+export function hasMask(flags) {
+  return (flags & FLAG_MASKS) !== 0;
+}
+
+/**
+ * The mask that frames behind a segment in a packet imply.
+ *
+ * @param {Uint8Array} payload the segment
+ * @returns {Uint8Array | null} null: they have none
+ * @throws {Refused} where it has the masks of several frames
+ */
+export function impliedMask(payload) {
+  const reader = new ByteReader(payload, "segment");
+  const { nFrames, flags } = segmentFields(reader);
+  if (!hasMask(flags)) return null;
+  if (nFrames !== 1) reader.refuse("a frame implies the masks of several");
+  const one = { groupSizes: [1], nResolutions: 1 };
+  return takeStreams({ payload, tableAt: reader.at, flags, mask: null }, one).masks[0];
 }
 
 /** What a segment's frames and size have to be. */
@@ -158,9 +187,9 @@ function readTable(reader, n) {
  *   streams: Uint8Array[][]}} notes and masks one a group, or none; the streams of the codec by
  *   resolution, the coarsest first, then by group
  */
-export function takeStreams({ payload, tableAt, flags }, signal) {
+export function takeStreams({ payload, tableAt, flags, mask }, signal) {
   if (tableAt === null) {
-    return { frameNotes: NOTHING, groupNotes: [], masks: [], streams: [[payload]] };
+    return { frameNotes: NOTHING, groupNotes: [], masks: mask ? [mask] : [], streams: [[payload]] };
   }
   const reader = new ByteReader(payload, "DATA", tableAt);
   const lengths = readTable(reader, nStreams(flags, signal));

@@ -3,7 +3,7 @@
 
 import { ByteReader, count, hex, sameBytes, textOf } from "./bytes.js";
 import { CRC_SIZE, FRAMING_SIZE } from "./chunks.js";
-import { newSegment } from "./data.js";
+import { hasMask, newSegment } from "./data.js";
 import { Refused } from "./errors.js";
 import { TABLES, Table, boundsOf } from "./index-tables.js";
 import { inflate } from "./inflate.js";
@@ -306,6 +306,7 @@ class ClipTables {
 
   segmentsOf(i, name, signals) {
     const due = signals.map(() => 0);
+    let told = null; // the segment whose mask frames imply
     let stop = this.offsets[i] + this.clips.length[i] + FRAMING_SIZE;
     return this.rowsOf("segments", this.segmentBounds, i).map((row) => {
       const { gap, size, signal: index, nFrames, lead, tail, indexFlags } = row;
@@ -317,7 +318,10 @@ class ClipTables {
       const offset = stop + gap;
       due[index] += nFrames;
       stop = offset + size;
-      return { ...newSegment(signal, head), offset, size, packet, indexFlags };
+      const segment = { ...newSegment(signal, head), offset, size, packet, indexFlags };
+      if (packet > 1) segment.told = told;
+      else if (index === 0) told = packet && hasMask(flags) ? segment : null;
+      return segment;
     });
   }
 }

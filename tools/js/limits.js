@@ -26,7 +26,7 @@ const PROFILES = [
     segmentBytes: 2 ** 34,
     modelBytes: 2 ** 31,
     payloadBytes: 2 ** 40,
-    packetBytes: MIB,
+    packetBytes: 64 * 1024,
     templateBytes: 2 ** 31,
     signals: 2 ** 20,
     rows: 2 ** 31,

@@ -1,12 +1,11 @@
 // The bytes of segments, fetched by ranges, checked, and compared with what the index says.
 
 import { FRAMING_SIZE, HEADER_SIZE } from "./chunks.js";
-import { frameSegment, readSegment } from "./data.js";
+import { frameSegment, impliedMask, readSegment } from "./data.js";
 import { Refused } from "./errors.js";
-import { MOST_HEAD, indexedBody } from "./packets.js";
+import { CHECK_SIZE, MOST_HEAD, indexedBody } from "./packets.js";
 import { payloadIn } from "./ranges.js";
 
-const CHECK_SIZE = 2; // of a packet
 const LISTED = ["signal", "nFrames", "lead", "tail", "flags"]; // what an index says of a segment
 
 /**
@@ -19,12 +18,19 @@ const LISTED = ["signal", "nFrames", "lead", "tail", "flags"]; // what an index 
  */
 export async function loadSegments({ ranges, limits }, clip, signal, segments) {
   const parts = await ranges.readAll(segments.map(extentOf));
+  const told = [...new Set(segments.map((segment) => segment.told ?? null))].filter(Boolean);
+  const toldParts = await ranges.readAll(told.map(extentOf));
+  const masks = told.map((segment, i) => impliedMask(indexedBody(toldParts[i], segment, null)));
   return segments.map((segment, i) => {
     const { packet, offset, size, firstFrame, fresh } = segment;
     const place = { type: "DATA", offset: offset - HEADER_SIZE, length: size };
-    const payload = packet ? indexedBody(parts[i], segment) : payloadIn(parts[i], place);
+    const mask = segment.told ? masks[told.indexOf(segment.told)] : segment.mask;
+    const payload = packet ? indexedBody(parts[i], segment, mask) : payloadIn(parts[i], place);
     const reading = { ...signal, due: firstFrame };
-    if (packet > 1) return { ...frameSegment(payload, fresh, reading, limits), offset };
+    if (packet > 1) {
+      const frame = { body: payload, fresh, number: firstFrame, mask };
+      return { ...frameSegment(frame, reading, limits), offset };
+    }
     const signals = [...clip.signals];
     signals[signal.index] = reading;
     const found = readSegment(payload, { ...clip, signals }, limits);

@@ -5,7 +5,7 @@ import { CRC_SIZE, FRAMING_SIZE, HEADER_SIZE, buildChunk, readHeader } from "./c
 import { crc32 } from "./crc32.js";
 import { Refused } from "./errors.js";
 import { within } from "./limits.js";
-import { passPacket } from "./packets.js";
+import { Packets } from "./packets.js";
 import { MOST_CHUNK, MOST_OF_PACKET, chunkKey } from "./scan.js";
 
 const MOST_READ = 4; // times the bytes of the file, in search of a bit
@@ -144,7 +144,8 @@ async function isWhole(ranges, offset, header, { file: { limits } }) {
     const { open, length } = readHeader(header, 0);
     if (open) {
       const stop = Math.min(ranges.size, start + limits.packetBytes + MOST_OF_PACKET);
-      return !passPacket(new ByteReader(await ranges.read(start, stop), "packet"), 0, limits);
+      const reader = new ByteReader(await ranges.read(start, stop), "packet");
+      return new Packets(limits).read(reader).kind !== 0;
     }
     within(length, MOST_CHUNK, `bytes of the chunk at ${offset}`);
     const rest = await ranges.read(start, start + length + CRC_SIZE);

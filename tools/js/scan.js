@@ -20,7 +20,7 @@ import { Refused } from "./errors.js";
 import { readNeeds } from "./head.js";
 import { within } from "./limits.js";
 import { supplied } from "./missing.js";
-import { Packets, passPacket } from "./packets.js";
+import { Packets } from "./packets.js";
 import { resynchronize } from "./resynchronize.js";
 import { sha256 } from "./sha256.js";
 import { frameNumbers } from "./time-base.js";
@@ -289,17 +289,21 @@ export class Scan extends Walk {
     if (!this.clip) this.refuse("an open DATA outside a clip");
     const { clip, file } = this;
     const place = (offset, size) => this.checkOwner("packet", offset, size);
-    const packets = new Packets(clip, file.limits, place);
+    const packets = new Packets(file.limits, place);
     this.at = start + HEADER_SIZE;
     for (;;) {
       const most = Math.min(file.size - this.at, file.limits.packetBytes + MOST_OF_PACKET);
       const reader = new ByteReader(await this.view(this.at, most), `open DATA of ${clip.name}`);
+      const { sequence } = packets;
       let segment;
       try {
-        segment = packets.next(reader, this.at);
+        segment = packets.next(reader, this.at, clip);
       } catch (error) {
         if (error instanceof Refused) error.message += ` (from byte ${this.at} on)`;
-        await this.passPackets(packets.sequence);
+        if (packets.sequence > sequence) {
+          this.at += reader.at;
+          await this.passPackets(packets);
+        }
         throw error;
       }
       this.at += reader.at;
@@ -310,15 +314,15 @@ export class Scan extends Walk {
   }
 
   /** Goes behind the packets that are whole, though they cannot be used. */
-  async passPackets(first) {
+  async passPackets(packets) {
     const { file } = this;
     try {
-      for (let sequence = first; ; sequence++) {
+      for (;;) {
         const most = Math.min(file.size - this.at, file.limits.packetBytes + MOST_OF_PACKET);
         const reader = new ByteReader(await this.view(this.at, most), "open DATA");
-        const isEnd = passPacket(reader, sequence, file.limits);
+        const { kind } = packets.read(reader);
         this.at += reader.at;
-        if (isEnd) return;
+        if (kind === 0) return;
       }
     } catch (error) {
       if (!(error instanceof Refused)) throw error;

@@ -172,6 +172,22 @@ def signals(n_signals: int) -> Motion:
 
 
 @base
+def broad(n_channels: int) -> Motion:
+    """One frame of so many channels of one joint."""
+    signal = Signal(np.zeros((1, n_channels)), (motions.HUNDREDTHS,) * n_channels)
+    return replace(wide(n_channels), signals=(signal,), name="broad")
+
+
+@base
+def gapped(n_frames: int) -> Motion:
+    """Frames whose third channel is invalid but in the first."""
+    mask = np.ones((n_frames, 6), np.bool_)
+    mask[1:, 2] = False
+    signal = replace(motions.dance(n_frames).signals[0], mask=mask)
+    return motions.dance(n_frames, signals=(signal,))
+
+
+@base
 def masked() -> Motion:
     """Three frames, the middle one invalid."""
     mask = np.ones((3, 6), np.bool_)

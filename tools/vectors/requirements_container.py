@@ -56,7 +56,8 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "NOTES-06": ("valid/*/grid-changes",),
     "MASK-01": ("valid/*/mask*",),
     "PACK-01": ("uncommon/container/*packets*", "uncommon/container/open-data*"),
-    "PACK-12": ("valid/*/packets-*", "valid/online/live*", "valid/online/numbered*"),
+    "PACK-20": ("uncommon/container/frame-packets-gap*",),
+    "PACK-12": ("valid/*/packets-*", "valid/online/live*"),
     "REPT-03": ("valid/online/repeat-*",),
     "COPY-02": ("valid/container/copies*",),
     "CEND-05": ("invalid/*/another-value", "invalid/*/hash-*"),
@@ -147,8 +148,6 @@ ARGUED: dict[str, str] = {
     "REPT-01": "of writers, and a reader must not look: shown by tests/test_stream.py::"
     "test_what_is_repeated",
     "REPT-04": "of readers that join streams: shown by tests/test_stream.py::test_joining_anywhere",
-    "LIVE-14": "of transports of packets; what comes of one that does not keep to it: "
-    "tests/test_stream.py::test_no_frame_in_the_wrong_place_is_said_to_be_decoded",
     "CUT-01": _REWRITER + "test_extract.py::test_streams_are_copied_byte_for_byte",
     "CUT-02": _REWRITER + "test_extract.py::test_any_cut_shows_what_was_asked_for",
     "CUT-03": "a reader may decode what is stored and not shown, and refuse what is wrong in it: "

@@ -225,7 +225,7 @@ class _LiveEncoder(LiveEncoder):
         writer = self._writer
         unit = writer.code(self._rows.row(values, valid, writer.coder.at))
         self._rows.keep()
-        self._is_intra = unit.kind == INTRA
+        self._is_intra, self.is_reference = unit.kind == INTRA, unit.kind != STR
         return build_units([unit]), self._is_intra
 
     def change(self, options: Params) -> None:

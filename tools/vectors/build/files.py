@@ -40,9 +40,9 @@ from mcz.container.packets import (
     SEGMENT,
     Packet,
     build_packet,
-    numbered_frame,
+    implied_by,
 )
-from mcz.container.segments import FRESH, SegmentHeader, build_segment
+from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
 from mcz.container.value_hash import canonical, value_hash
 from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer, payload_id
@@ -133,10 +133,9 @@ class Crafter(Writer):
     the fields of INDEX, "FOOT" edits its 32 bytes, "row" the ClipRow behind INDX, "segments" the
     list of (header, streams) of a clip. ``packets``: segments go into an open DATA; "packet" and
     "end_packet" edit their bytes. ``frames``: those of signal 0 from this number on that have one
-    stream alone are packets of kind 2, ``numbered`` of kind 3; "number" changes what their checks
-    say. ``anew``: a segment that starts fresh begins an open DATA. ``repeat``: a REPT, which "REPT"
-    edits, precedes the open DATA of these numbers, from 0. ``continued``: each INDX continues the
-    one before.
+    stream beside the mask of those before are packets of kind 2. ``anew``: a segment that starts
+    fresh begins an open DATA. ``repeat``: a REPT, which "REPT" edits, precedes the open DATA of
+    these numbers, from 0. ``continued``: each INDX continues the one before.
     """
 
     def __init__(
@@ -144,7 +143,6 @@ class Crafter(Writer):
         *,
         packets: bool = False,
         frames: int | None = None,
-        numbered: bool = False,
         anew: bool = False,
         repeat: Collection[int] = (),
         profile: Profile = BASE,
@@ -152,7 +150,6 @@ class Crafter(Writer):
     ) -> None:
         self.edits = edits
         self.anew = anew
-        self.numbered = numbered
         self.repeat = repeat
         self.continued = False
         self._n_data = 0
@@ -225,7 +222,7 @@ class Crafter(Writer):
                 self.close_data()
                 self._begin_data(opening)
             if self._is_frame(header, streams):
-                self._frame(header, streams[0])
+                self._frame(header, streams[-1])
                 continue
             payload = self.edited("DATA", build_segment(header, streams))
             self._segment(header, payload)
@@ -252,19 +249,30 @@ class Crafter(Writer):
     def _is_frame(self, header: SegmentHeader, streams: Sequence[bytes]) -> bool:
         number = self._next_packet
         short = self.frames is not None and number is not None and number >= self.frames
-        return short and len(streams) == 1 and header.signal == 0
+        return short and self._implies_rest(header, streams)
+
+    def _implies_rest(self, header: SegmentHeader, streams: Sequence[bytes]) -> bool:
+        """Whether a packet of kind 2 would say the same as this segment."""
+        before, others = self._implying, header.flags & ~(FRESH | MASKS)
+        if header.signal or header.n_frames > 1 or header.lead or header.tail or others:
+            return False
+        if before is None or not before[0].header.flags & MASKS:
+            return len(streams) == 1 and not header.flags & MASKS
+        same = header.flags & MASKS and before[0].header.n_frames == 1 and len(streams) == 2
+        return bool(same) and streams[0] == mask_of(before[1])
 
     def _frame(self, header: SegmentHeader, stream: bytes) -> None:
         clip: ClipRow | None = self._clip
         assert clip is not None
         assert self._next_packet is not None
-        made = Packet(FRAME, self._next_packet, stream, bool(header.flags & 1))
-        if self.numbered:
-            number = self.edited("number", header.first)
-            made = numbered_frame(made.sequence, number, stream, fresh=made.fresh)
+        told, segment = self._implying or (None, b"")
+        mask = mask_of(segment) if segment else b""
+        implied = implied_by(header.first, mask)
+        made = Packet(FRAME, self._next_packet, stream, bool(header.flags & FRESH), implied)
         packet = build_packet(made)
         at = self.offset + len(packet) - CHECK_SIZE - len(stream)
-        clip.segments.append(SegmentRow(at, len(stream), header, made.kind))
+        told = told if header.flags & MASKS else None
+        clip.segments.append(SegmentRow(at, len(stream), header, made.kind, told))
         self._write(self.edited("packet", packet))
         self._next_packet += 1
 
@@ -281,6 +289,8 @@ class Crafter(Writer):
             row = SegmentRow(at, len(payload), header, SEGMENT)
             self._write(self.edited("packet", data))
             self._next_packet += 1
+            if header.signal == 0:
+                self._implying = row, payload
         clip.segments.append(row)
 
     def close_data(self) -> None:
@@ -323,7 +333,6 @@ def file_of(
     index: bool = True,
     packets: bool = False,
     frames: int | None = None,
-    numbered: bool = False,
     anew: bool = False,
     repeat: Collection[int] = (),
     grouping: str = "joint",
@@ -332,7 +341,7 @@ def file_of(
     **edits: Any,
 ) -> bytes:
     """A file of these clips, edited; a segment has all frames unless ``segment_frames`` says it."""
-    live: dict[str, Any] = {"packets": packets, "frames": frames, "numbered": numbered}
+    live: dict[str, Any] = {"packets": packets, "frames": frames}
     crafter = Crafter(**live, anew=anew, repeat=repeat, **edits)
     for motion in motions:
         crafter.clip(motion, grouping=grouping, codec=codec, segment_frames=segment_frames)
@@ -452,7 +461,7 @@ def attached(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
 
 
 def live_file(motion: Motion, **edits: Any) -> bytes:
-    """The clip as a live one: packets of one frame, of kind 2 or 3 where that can be."""
+    """The clip as a live one: packets of one frame, of kind 2 where that can be."""
     given = {"packets": True, "frames": 1, "segment_frames": 1, "grouping": "all"}
     return file_of(motion, **given | edits)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from mcz.container.chunks import Chunk, ChunkFlag
 from mcz.container.index_records import Index
-from mcz.container.packets import body_check
+from mcz.container.packets import implied_by
 from mcz.schema import build, read_varint, varint
 from tools.vectors.engine.fields import SCHEMAS, STREAMS, VIEWS, place_of, swapped
 from tools.vectors.engine.layout import (
@@ -247,8 +247,9 @@ class Editor:
         if target.own == "":
             part.outer.append(lambda data: self._changed(None, data, target, match))
         elif target.own == "number" and part.packet is not None:
-            check = body_check(part.payload, integer(value))
-            part.packet = replace(part.packet, check=check)
+            implied = implied_by(integer(value), part.packet.implied[8:])
+            part.packet = replace(part.packet, implied=implied)
+            part.frame["number"] = implied
         elif target.own in PACKET and part.packet is not None:
             part.packet = replace(part.packet, **{target.own: integer(value)})
         else:

@@ -24,19 +24,23 @@ from mcz.container.chunks import (
     parse_header,
 )
 from mcz.container.directory import ClipRow, Directory, SegmentRow
+from mcz.container.feeding import packets
 from mcz.container.index import Listing, end_of, segment_rows
 from mcz.container.index_reader import ClipTables, directory_of, parse_index
 from mcz.container.index_records import PreviousIndex
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
+    FRAME,
     SEGMENT,
     Packet,
     build_packet,
-    read_packet,
+    implied_by,
+    packet_check,
 )
-from mcz.container.segments import SegmentHeader, build_segment
+from mcz.container.segments import SegmentHeader, build_segment, mask_of
 from mcz.container.segments import parse_header as parse_segment
+from mcz.container.source import open_source
 from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
 from mcz.schema import build, deflate, parse, read_varint
@@ -84,8 +88,8 @@ class Segment:
 class Part:
     """A chunk, a packet of an open DATA or a FOOT; ``place`` is its payload in the base file.
 
-    ``frame`` has fields of the chunk's header that are not repaired; ``outer`` are edits of its
-    bytes as they are written.
+    ``frame`` has fields of the header, and a packet's ``head``, ``number`` and ``check``, that are
+    not repaired; ``outer`` are edits of its bytes as they are written.
     """
 
     type: bytes
@@ -106,7 +110,7 @@ class Part:
 
     def build(self) -> bytes:
         if self.packet is not None:
-            data = build_packet(replace(self.packet, body=self.payload))
+            data = self._packet()
         else:
             data = self.payload if self.type == b"FOOT" else framed(self)
         for edit in self.outer:
@@ -117,8 +121,17 @@ class Part:
     def head_size(self) -> int:
         if self.packet is None:
             return 0 if self.type == b"FOOT" else HEADER.size
-        made = build_packet(replace(self.packet, body=self.payload))
-        return len(made) - CHECK_SIZE - len(self.payload)
+        return len(self._head(self.packet))
+
+    def _head(self, packet: Packet) -> bytes:
+        made = build_packet(replace(packet, body=self.payload))
+        return self.frame.get("head", made[: -CHECK_SIZE - len(self.payload)])
+
+    def _packet(self) -> bytes:
+        assert self.packet is not None
+        head, packet = self._head(self.packet), self.packet
+        check = packet_check(head, self.payload, packet.implied)
+        return head + self.payload + self.frame.get("check", check)
 
 
 def framed(part: Part) -> bytes:
@@ -141,7 +154,7 @@ def framed(part: Part) -> bytes:
 
 def parts_of(data: bytes) -> Iterator[Part]:
     """The parts of a sound file."""
-    at = len(SIGNATURE)
+    at, source = len(SIGNATURE), open_source(data)
     while at < len(data):
         if not data[at : at + 1].isalpha():
             yield Part(b"FOOT", data[at : at + FOOT.size], place=at)
@@ -151,28 +164,13 @@ def parts_of(data: bytes) -> Iterator[Part]:
         if chunk.length is None:
             yield Part(chunk.type, b"", chunk.flags, place=at + HEADER.size, open=True)
             at += HEADER.size
-            number = -1
-            while number != END:
-                packet, at = packet_at(data, at)
-                number = packet.kind
-                place = at - CHECK_SIZE - len(packet.body)
-                yield Part(b"packet", packet.body, place=place, packet=packet)
+            for event in packets(source, chunk):
+                yield Part(b"packet", event.payload, place=event.body, packet=event.packet)
+                at = event.end
             continue
         payload = data[chunk.payload_offset :][: chunk.length]
         yield Part(chunk.type, payload, chunk.flags, place=chunk.payload_offset)
         at += chunk.size
-
-
-def packet_at(data: bytes, at: int) -> tuple[Packet, int]:
-    """The packet at ``at``, and where it ends."""
-    stop = at
-
-    def read(size: int) -> bytes:
-        nonlocal stop
-        stop += size
-        return data[stop - size : stop]
-
-    return read_packet(read, LIMIT), stop
 
 
 class Layout:
@@ -209,6 +207,24 @@ class Layout:
                 if new != self.ids[part]:
                     renamed[self.ids[part]] = new
         self.renamed = renamed
+        self._imply()
+
+    def _imply(self) -> None:
+        """Let packets of kind 2 imply the frame and the mask that those before them tell."""
+        due, told = 0, b""
+        for part in self.parts:
+            packet = part.packet
+            if packet is None or "number" in part.frame:
+                continue
+            if packet.kind == FRAME:
+                with suppress(MczError):
+                    part.packet = replace(packet, implied=implied_by(due, mask_of(told)))
+                due += 1
+            elif packet.kind == SEGMENT:
+                with suppress(MczError):
+                    header, _ = parse_segment(part.payload)
+                    if header.signal == 0:
+                        due, told = header.stop, part.payload
 
     def place(self) -> None:
         """Offsets of all parts."""

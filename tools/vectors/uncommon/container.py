@@ -324,6 +324,9 @@ def _frames(shelf: Whole) -> None:
     mask = np.ones(long.signals[0].values.shape, np.bool_)
     mask[4, 1:] = False
     masked = replace(long, signals=(replace(long.signals[0], mask=mask),))
+    gap = np.ones(mask.shape, np.bool_)
+    gap[2:6, 1] = gap[4:7, 3:] = False
+    gapped = replace(long, signals=(replace(long.signals[0], mask=gap),))
     cases = (
         ("frame-packets", "Packets of kind 2 behind one of kind 1.", long, True),
         ("frame-packets-no-index", "Packets of kind 2 are found without INDX too.", long, False),
@@ -333,6 +336,8 @@ def _frames(shelf: Whole) -> None:
             masked,
             True,
         ),
+        ("frame-packets-gap", "Frames that imply the mask of that before.", gapped, True),
+        ("frame-packets-gap-no-index", "The same without INDX.", gapped, False),
         (
             "frame-packets-grid",
             "A frame on another grid, of kind 1, among those of kind 2.",
@@ -341,26 +346,20 @@ def _frames(shelf: Whole) -> None:
         ),
     )
     for name, purpose, motion, index in cases:
-        for kind in (2, 3):
-            named = name if kind == 2 else name.replace("frame", "numbered")
-            data = live_file(motion, index=index, numbered=kind == 3)
-            said = purpose.replace("kind 2", f"kind {kind}")
-            shelf.hold(named, "Open DATA and packets; INDX", said, data, motion)
+        data = live_file(motion, index=index)
+        shelf.hold(name, "Open DATA and packets; INDX", purpose, data, motion)
     samples = np.arange(8).reshape(8, 1) * 3 - 9
     channels = (Channel("", "emg", "V"),)
     analog = Signal(
         samples, (Grid(GridKind.INTEGER),), "analog", samples_per_frame=2, channels=channels
     )
     both_signals = replace(dance(), signals=(*dance().signals, analog))
-    for name, kind in (("frame", 2), ("numbered", 3)):
-        data = live_file(
-            both_signals,
-            segments=lambda made: sorted(made, key=lambda part: part[0].first),
-            numbered=kind == 3,
-        )
-        purpose = f"Packets of kind {kind} among those of another signal."
-        spec = "Open DATA and packets; INDX"
-        shelf.hold(f"{name}-packets-signals", spec, purpose, data, both_signals)
+    data = live_file(
+        both_signals, segments=lambda made: sorted(made, key=lambda part: part[0].first)
+    )
+    purpose = "Packets of kind 2 among those of another signal."
+    spec = "Open DATA and packets; INDX"
+    shelf.hold("frame-packets-signals", spec, purpose, data, both_signals)
 
 
 def _on_two_grids(motion: Motion) -> Motion:

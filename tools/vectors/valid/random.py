@@ -18,7 +18,7 @@ import numpy as np
 from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, ChunkType
 from mcz.container.limits import BASE, LARGE
-from mcz.container.packets import END, SEGMENT, Packet, build_packet
+from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet
 from mcz.container.segments import FRESH, SegmentHeader
 from mcz.container.time_base import missing_runs
 from mcz.container.value_hash import value_hash
@@ -355,7 +355,6 @@ class _Odd(Crafter):
     def _begin(self) -> None:
         self.open_data()
         self._closed = False
-        self._told = False
 
     def _end(self) -> None:
         """An end packet, bit 7 of whose kind has no meaning."""
@@ -369,15 +368,12 @@ class _Odd(Crafter):
 
         plain = (header.signal, header.n_frames, header.lead, header.tail) == (0, 1, 0, 0)
         short = plain and len(streams) == 1 and not header.flags & ~FRESH
-        if self._next_packet is not None and self._told and short:
-            kind = self.maker.chance.choice((1, 2, 3, 3))
-            if kind != SEGMENT:
-                self.maker.traits.append(f"packets of kind {kind}")
-                self.numbered = kind == 3
-                self._frame(header, streams[0])
-                return
-        if self._next_packet is not None:
-            self._told = self._told or header.signal == 0
+        told = self._next_packet is not None and self._implying is not None
+        kind = self.maker.chance.choice((1, 2, 3, 3)) if told and short else FRAME
+        if told and kind != SEGMENT and self._implies_rest(header, streams):
+            self.maker.traits.append("packets of kind 2")
+            self._frame(header, streams[-1])
+            return
         self._segment(header, build_segment(header, streams))
 
 

@@ -244,8 +244,8 @@ def _packets(shelf: Whole, spec: str, name: str) -> None:
     data = made.file(**live)
     shelf.hold("packets-frames", f"{spec}; INDX", purpose, data, made.motion, parts=parts)
     repeat = {"anew": name in (FRAME, "online"), "repeat": range(9)}
-    data = made.file(**live, numbered=True, **repeat, CLIP=OPENED, index=False)
-    purpose = "Packets of kind 3 behind a REPT, of a clip that did not know its frames; no INDX."
+    data = made.file(**live, **repeat, CLIP=OPENED, index=False)
+    purpose = "Packets of kind 2 behind a REPT, of a clip that did not know its frames; no INDX."
     shelf.hold("packets-numbered", f"{spec}; REPT; CEND", purpose, data, made.motion, parts=parts)
 
 

@@ -137,7 +137,7 @@ def _live(shelf: Groups) -> None:
     mask = np.ones((13, 6), np.bool_)
     mask[5:7, :3] = mask[8, 4] = False
     motion = motion_of(plan, skeleton=markers(2), mask=mask)
-    purpose = "Frames with a mask, of kind 1, among those of kind 2."
+    purpose = "Frames with a mask: the first of kind 1, the next of kind 2, which imply it."
     shelf.plan("live-masks", purpose, plan, requests, motion=motion, **about, **live)
     steady = replace(plan, fill=lambda number, n_rows, n: np.zeros((n_rows, n), np.int64))
     purpose = "Packets of frames in which nothing is here."
@@ -145,30 +145,13 @@ def _live(shelf: Groups) -> None:
     mixed = Plan(("I2 L3", "S1", "S1", "L1", "S1", "I4", "S1"), 6, GOLOMB, REORDERED)
     purpose = "Packets of kind 1 with segments of some frames, and of kind 2, reordered."
     shelf.plan("live-mixed", purpose, mixed, [(5, 8), (9, 14)], **about, **live)
-    _numbered(shelf, plan, opened, requests)
+    _repeats(shelf, plan, opened, requests)
 
 
-def _numbered(shelf: Groups, plan: Plan, opened: Any, requests: list[tuple[int, int]]) -> None:
-    """As live clips are written: frames in packets of kind 3, what a reader needs repeated."""
-    about: dict[str, Any] = {"spec": "Open DATA and packets; INDX"}
-    live: dict[str, Any] = {"packets": True, "frames": 1, "anew": True, "numbered": True}
-    purpose = "Each fresh frame begins an open DATA, of kind 1, others are of kind 3"
-    for name, said, made in both("numbered", purpose, plan):
-        shelf.plan(name, said, made, requests, **about, **live)
-    purpose = "Packets of kind 3 in a clip that did not know its frames, without INDX."
-    shelf.plan("numbered-open", purpose, plan, requests, **about, **live, CLIP=opened, index=False)
-    once = live | {"anew": False}
-    purpose = "Fresh frames, too, are packets of kind 3 of the only open DATA."
-    shelf.plan("numbered-once", purpose, plan, requests, **about, **once)
-    mask = np.ones((13, 6), np.bool_)
-    mask[5:7, :3] = mask[8, 4] = False
-    masked = motion_of(plan, skeleton=markers(2), mask=mask)
-    purpose = "Frames with a mask, of kind 1, among those of kind 3."
-    shelf.plan("numbered-masks", purpose, plan, requests, motion=masked, **about, **live)
-    steady = replace(plan, fill=lambda number, n_rows, n: np.zeros((n_rows, n), np.int64))
-    purpose = "Packets of kind 3 without a body: their checks are those of their numbers."
-    shelf.plan("numbered-quiet", purpose, steady, [(5, 8)], **about, **live)
-    about = {"spec": "REPT; Open DATA and packets; INDX", "CLIP": opened}
+def _repeats(shelf: Groups, plan: Plan, opened: Any, requests: list[tuple[int, int]]) -> None:
+    """As live clips are written: what a reader needs is repeated."""
+    live: dict[str, Any] = {"packets": True, "frames": 1, "anew": True}
+    about: dict[str, Any] = {"spec": "REPT; Open DATA and packets; INDX", "CLIP": opened}
     for name, purpose, changes in (
         ("once", "A REPT before the third open DATA.", {"repeat": (2,)}),
         ("each", "A REPT before each open DATA, the first, too.", {"repeat": range(9)}),
