@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import tracemalloc
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -765,7 +766,7 @@ def test_behind_a_gap_among_several_signals_numbers_are_not_known() -> None:
     opening = pieces(n=1)[0]
     clip = chunks_in(opening.removeprefix(SIGNATURE), 0)[-1]
     fields = parse(payloads.Clip, clip.payload, "CLIP")
-    fields.signals.append(fields.signals[0])
+    fields.signals.append(replace(fields.signals[0], role=0))
     two = build_chunk(b"CLIP", built(payloads.Clip, fields, "CLIP"))
     other = build_segment(SegmentHeader(1, 0, 1), [bytes([2] * 9)])
     chunk = [
