@@ -38,6 +38,7 @@ def _unpacked(stream, n_frames, n_channels):
 class Encoder(LiveEncoder):
     models = ()
     version: int | None = None
+    preset = 0
     header = HEADER
 
     def __init__(self, layout, options):

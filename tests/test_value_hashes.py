@@ -21,7 +21,7 @@ from tools.vectors.engine.edits import edited
 
 WRONG = 'CEND.value_sha256.0 = "vvvvvvvvvvvvvvvvvvvvvvvvvvvvvvvv"'
 OPTIONAL = {"raw", "fast", "lossless"}
-NAMES = sorted(CODECS.names())
+NAMES = sorted(CODECS)
 
 
 def mishashed(codec: str) -> bytes:
@@ -103,7 +103,7 @@ def test_a_faulty_encoder_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
         return dataclasses.replace(good, segments=segments())
 
     faulty = dataclasses.replace(raw, id=250, name="faulty", encode=encode)
-    monkeypatch.setitem(CODECS, 250, faulty)
+    monkeypatch.setitem(CODECS, "faulty", faulty)
     out = BytesIO()
     with pytest.raises(ChecksumError, match="decodes other values than it was given"):
         mcz.write(smooth(12), out, "faulty")
@@ -122,7 +122,7 @@ def test_the_first_decode_runs_a_known_answer(name: str, monkeypatch: pytest.Mon
         return found
 
     monkeypatch.setattr(known_answers, "_proved", set())
-    monkeypatch.setitem(CODECS, codec.id, dataclasses.replace(codec, decode=off, earlier={}))
+    monkeypatch.setitem(CODECS, name, dataclasses.replace(codec, decode=off, earlier={}))
     with mcz.open(data.getvalue()) as file, pytest.raises(UnsupportedError, match="known answer"):
         file.only_clip().read((0, 1))
 

@@ -148,7 +148,7 @@ def test_facts_are_those_of_the_files() -> None:
 
     for name, codecs in (
         ("valid/container/minimal", []),
-        ("valid/mrdwt/signals", ["lossless", "mrdwt"]),
+        ("valid/mrdwt/signals", ["lossless", "wavelet"]),
         ("valid/pca-rdo/clips", ["pca-rdo", "raw"]),
         ("invalid/numbers/kind-12", []),
         ("invalid/lossless/kind-3", ["lossless"]),

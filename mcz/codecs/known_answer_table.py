@@ -57,34 +57,68 @@ ANSWERS = {
         ),
         "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
     ),
-    "lossless": KnownAnswer(
+    "fast": KnownAnswer(
         0, "joint",
         "",
         (
             (
-                "140080013f142e80013f142a80013f140080013f0c3240142a80013fcb580f7f14a1fd17474e"
-                "a08d99b7e8bd5f68e300b199063cd7beaa5a5daada64ab1cd53cc05a354d48cac2aacf2cc929"
-                "ad14d79b5413e0aaec915e579fba675b4b194bcea0ff9d895fd676b3b99487c27ed3b7d4e0d6"
-                "f29817f7677eeee06c79a250835cacc7c3be1f1cee7fb5d133692bbea2434a7cda2185ef24b9"
-                "d95c0e60caf4"
+                "142580013f142c80013f142d80013f142c80013f0c2f40142d80013f4f9f0d00648e7ab033f0"
+                "8210e97551848b4b6c3b1c0eb912365545fb4dc801426ef034813f8a9ff708ea1c1b3c175a8e"
+                "57105cc0a5a700012b282a00012b28ca800000011d13561a81e4cba132e84cba7809974265d2"
+                "4c5d24c8595e0079494ca000000000000000000e50fa3aefd2074a804a944aca944a8032b28c"
+                "a8007a85d44c038a4a0a65250a65250a7299494ca0425e5140c000000000000000000370dc00"
             ),
             (
-                "142a80013f042d140080013f0b901ee641ee62bd2a6505901e76be9e9c144c70a9343e0ddc04"
-                "50e022f13ee7aa01c7c33695a14ac999440a951c3c4083bc9b76b0d5cbd77aeda48533d796bd"
-                "3d05c30ab7"
+                "0c2a4004290c264014af7e005af65ca771f95b91f12a8431f66c81dd32b3ce15fd8d121710a1"
+                "42850f45aa142850a121211324013b74fa0d1a8e96868511a339ab306cc9726481cc1987a303"
+                "03030661e8c0c0c0c1cca7aa300f"
             ),
             (
-                "0c2b400c2e40140080013f0c0fb3aa6f8e4869d9fba7b567a750139a08b1b51021042b5ec1b3"
-                "85df2c05a4316cd2c4086f3de5cd313825e30369e6a343579324f91c9ea6054b104da3d2b495"
-                "8c95e767f139cc8cd08c"
+                "0c2d400c3040143280013f611f28001c65d9c81c6ce1dcca62d25761d495fa79bf6fb02e3075"
+                "100000000000000000000000000000000de697b12b714a841b3506cd7420d9a8366bd081b9af"
+                "4376886a0a2c27ae6b0b09eb9ac3617af36c3613d5591eec50"
             ),
             (
-                "142a80013f142a80013f140080013f0afad47d37423b3018e4f39381ebf0a400722ae6c335e4"
-                "bb23d57655dd2a0d3d2c06479afdbf5b0cb42d2b6d87a72346f86197c89feb3f84a66797e5c2"
-                "76bbf270c83d6ef9f8a392f1219089d8864da9885b"
+                "0c34400c3540143780013f951f1400820363a59216e155de0268e3e266e6a7727f3450aa30a1"
+                "200000000000000000000000000000000f296f555d078d414e61b35f5986cd7d661b34faa615"
+                "9a7d49849870086b1629885da91a10f6a46843da91a10bb591b084ed4884fa4052"
             ),
         ),
         "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
+    ),
+    "best": KnownAnswer(
+        0, "all",
+        "",
+        (
+            (
+                "00140080013f142e80013f142a80013f140080013f0c3240142a80013f142a80013f042d1400"
+                "80013f0c2b400c2e40140080013f142a80013f142a80013f140080013fcb580f7f14a1fd1747"
+                "4ea08dc8014e12a9561783cb623bcf4b8e5f10f2ee422baec8c4b5c2469766ea58f8b7bc4613"
+                "a7466c4b967f920a3120f11bf17e34175b5d8757a89194156ba8b642abc513a2cdcae3e267fd"
+                "b7323d566496cc7ad05d62e6220fef2a77a8bdcd33fc2f0b4e398e6c40fb077f6246a4e6e299"
+                "d6195aa1a9a18a731d915f5d31c376c87ff1f248719a28eea9a6903b32596c84495ec53ef2ef"
+                "3af30f643e240b4a4d85e64ed62bf2f78f4d7f409ac035b4b2b4bc2ef334a1827a56537db0a6"
+                "518c9cd98e722d1fa92710be462331ec686a0f8a6498d70ba101069c883219a9ce4bef273af6"
+                "d425db0fe4bccf2d1ba2901ffaaf3c5f9c25c52791c953beb02f194661f89a004769d21d3dc7"
+                "3ee20a96bc3954cf66e4929175d72a19f1a5079e52a74e46b278dfbcb1a4f8a09e00cebd9007"
+                "f7d8193cc7bb2bbccd73d0d9cda41e701b68ba7f7323cebc"
+            ),
+        ),
+        "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
+    ),
+    "posewave": KnownAnswer(
+        0, "all",
+        "03010000cdcc4c3d000040400888910209000004000306020000",
+        (
+            (
+                "00ff7775f1dcd878f9da143a75ccf7a0f33b144f6fe3f550cbb74f5463e9c0bbb165f88117c3"
+                "cf75f887"
+            ),
+            "08014ffe61fdc0471a001e6e27231391998b25e93f35ddb5c8f11e669b",
+            "904876623047fce0fa9ac7e8c4dd24cbeebd7601000aca012b636057a8",
+            "16b37577d2972f69e96cb352559aba97b3c75b",
+        ),
+        "7aa0e2a7e1752e17771eeaba367dc71bf7c1ff4c4cce8e2b09f76adb2bb20ddc",
     ),
     "mrdwt": KnownAnswer(
         0, "channel",
@@ -107,45 +141,6 @@ ANSWERS = {
             "84809703021dc248b10790d7",
         ),
         "d3f8addc242a5633957b199faef3c49af0f2bd64fa7dfa0a43efb51a906ce612",
-    ),
-    "qbc": KnownAnswer(
-        0, "joint",
-        "2810ff000000000000e83fd2b6514ca8b7e83f",
-        (
-            "0bffffbefebea6ea0bbd9d3b",
-            "02f5fbec6a18",
-            "07f1769d43286a",
-            "0ce78e5ae3b554a020",
-            "000a15c7d8a28e37",
-            "00050aba6f",
-            "0008292738",
-            "000b27ac09",
-        ),
-        "6cde9cb995ddb2f74677c732a833f20af0b2208fc86c74e6a4243052ad30c602",
-    ),
-    "pca": KnownAnswer(
-        0, "all",
-        "ff",
-        (
-            (
-                "551f0e121109080808080807070707060395970e0d0d0c0c0c0a0a0a0a0803275231cf63e760"
-                "85e53c437e215b40f7d2cc780d54a9a4adf9223126a2f2039ba8f77dc4470b6ac04a85850b79"
-                "85be2fdcafa719a6ad46601ae661a94798eeb90e0af84180afe30218e93b84fc8d309bfed839"
-                "ec5c48767601a8769c82196dc5d991c9ac13a7a265f9609a796fb07dac8454ca2793096a630a"
-                "10f4e314db7ce0c5cf5ce6854baee8ee0231530c423e082bba3762a57bbd51b35224c1c9835f"
-                "6dc4e8d8a7ec277dfe8e226aa4e24949f11093bee0df4d705a23ea8fd788606a6b5843671d5e"
-                "5a51b75503c9d00582835ebc979092a1ea5e6faa0a35b900afa494d6936d63bc3b036b336ce1"
-                "bd529c7f64e49de941ffe0117eac6b20af4d4a912ec8b97d95157a9fefffb16d4fa6cbb2e174"
-                "10826e2b36a8d5ac9a268ff0e9e2c8cdbdd9e77c837e59a9606bc13f6cc3c4469fde16718aff"
-                "188634a7a5c68a07c4779bb55a754ce0483843ecb2995a0735a4f8d353112a9c2c14d186925c"
-                "e2208decf3b9ca50a16cb69c770dce17f4f855ea388ca3b0b2a771cbed21888b1bc5b18c56a4"
-                "a393abad8ed1a3d1be9ac816a7fea777f4d7af06dc3c44e9ce21f1d5fdff89edb18f7ab512ab"
-                "a06653d1713894db1ad47d3310078d2d70751d94cf4268bcaa82f49f978fdb876a385241f9e7"
-                "6351c3910b50fe27e307c0b5f588f881807c43df2f78546f4389a052000d06d926d5bc62e22e"
-                "f321128df79904"
-            ),
-        ),
-        "c93a43f076c371d9f2ca16cf76af35367bffeccf980a27da9235ca5d0db479fb",
     ),
     "dwt": KnownAnswer(
         0, "channel",
@@ -190,6 +185,45 @@ ANSWERS = {
             "008101f304",
         ),
         "2030a2f27596de0fc9d8e7a3da6577570011cafa5c63bfcb0ca64123ddd32387",
+    ),
+    "qbc": KnownAnswer(
+        0, "joint",
+        "2810ff000000000000e83fd2b6514ca8b7e83f",
+        (
+            "0bffffbefebea6ea0bbd9d3b",
+            "02f5fbec6a18",
+            "07f1769d43286a",
+            "0ce78e5ae3b554a020",
+            "000a15c7d8a28e37",
+            "00050aba6f",
+            "0008292738",
+            "000b27ac09",
+        ),
+        "6cde9cb995ddb2f74677c732a833f20af0b2208fc86c74e6a4243052ad30c602",
+    ),
+    "pca": KnownAnswer(
+        0, "all",
+        "ff",
+        (
+            (
+                "551f0e121109080808080807070707060395970e0d0d0c0c0c0a0a0a0a0803275231cf63e760"
+                "85e53c437e215b40f7d2cc780d54a9a4adf9223126a2f2039ba8f77dc4470b6ac04a85850b79"
+                "85be2fdcafa719a6ad46601ae661a94798eeb90e0af84180afe30218e93b84fc8d309bfed839"
+                "ec5c48767601a8769c82196dc5d991c9ac13a7a265f9609a796fb07dac8454ca2793096a630a"
+                "10f4e314db7ce0c5cf5ce6854baee8ee0231530c423e082bba3762a57bbd51b35224c1c9835f"
+                "6dc4e8d8a7ec277dfe8e226aa4e24949f11093bee0df4d705a23ea8fd788606a6b5843671d5e"
+                "5a51b75503c9d00582835ebc979092a1ea5e6faa0a35b900afa494d6936d63bc3b036b336ce1"
+                "bd529c7f64e49de941ffe0117eac6b20af4d4a912ec8b97d95157a9fefffb16d4fa6cbb2e174"
+                "10826e2b36a8d5ac9a268ff0e9e2c8cdbdd9e77c837e59a9606bc13f6cc3c4469fde16718aff"
+                "188634a7a5c68a07c4779bb55a754ce0483843ecb2995a0735a4f8d353112a9c2c14d186925c"
+                "e2208decf3b9ca50a16cb69c770dce17f4f855ea388ca3b0b2a771cbed21888b1bc5b18c56a4"
+                "a393abad8ed1a3d1be9ac816a7fea777f4d7af06dc3c44e9ce21f1d5fdff89edb18f7ab512ab"
+                "a06653d1713894db1ad47d3310078d2d70751d94cf4268bcaa82f49f978fdb876a385241f9e7"
+                "6351c3910b50fe27e307c0b5f588f881807c43df2f78546f4389a052000d06d926d5bc62e22e"
+                "f321128df79904"
+            ),
+        ),
+        "c93a43f076c371d9f2ca16cf76af35367bffeccf980a27da9235ca5d0db479fb",
     ),
     "lsdt-frame": KnownAnswer(
         0, "all",
@@ -264,65 +298,31 @@ ANSWERS = {
         ),
         "5f63a826fdbb5e06ba634896efbedc2911c51630fcca8a26907ba737c52a160d",
     ),
-    "best": KnownAnswer(
-        0, "all",
-        "",
-        (
-            (
-                "00140080013f142e80013f142a80013f140080013f0c3240142a80013f142a80013f042d1400"
-                "80013f0c2b400c2e40140080013f142a80013f142a80013f140080013fcb580f7f14a1fd1747"
-                "4ea08dc8014e12a9561783cb623bcf4b8e5f10f2ee422baec8c4b5c2469766ea58f8b7bc4613"
-                "a7466c4b967f920a3120f11bf17e34175b5d8757a89194156ba8b642abc513a2cdcae3e267fd"
-                "b7323d566496cc7ad05d62e6220fef2a77a8bdcd33fc2f0b4e398e6c40fb077f6246a4e6e299"
-                "d6195aa1a9a18a731d915f5d31c376c87ff1f248719a28eea9a6903b32596c84495ec53ef2ef"
-                "3af30f643e240b4a4d85e64ed62bf2f78f4d7f409ac035b4b2b4bc2ef334a1827a56537db0a6"
-                "518c9cd98e722d1fa92710be462331ec686a0f8a6498d70ba101069c883219a9ce4bef273af6"
-                "d425db0fe4bccf2d1ba2901ffaaf3c5f9c25c52791c953beb02f194661f89a004769d21d3dc7"
-                "3ee20a96bc3954cf66e4929175d72a19f1a5079e52a74e46b278dfbcb1a4f8a09e00cebd9007"
-                "f7d8193cc7bb2bbccd73d0d9cda41e701b68ba7f7323cebc"
-            ),
-        ),
-        "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",
-    ),
-    "posewave": KnownAnswer(
-        0, "all",
-        "03010000cdcc4c3d000040400888910209000004000306020000",
-        (
-            (
-                "00ff7775f1dcd878f9da143a75ccf7a0f33b144f6fe3f550cbb74f5463e9c0bbb165f88117c3"
-                "cf75f887"
-            ),
-            "08014ffe61fdc0471a001e6e27231391998b25e93f35ddb5c8f11e669b",
-            "904876623047fce0fa9ac7e8c4dd24cbeebd7601000aca012b636057a8",
-            "16b37577d2972f69e96cb352559aba97b3c75b",
-        ),
-        "7aa0e2a7e1752e17771eeaba367dc71bf7c1ff4c4cce8e2b09f76adb2bb20ddc",
-    ),
-    "fast": KnownAnswer(
+    "lossless": KnownAnswer(
         0, "joint",
         "",
         (
             (
-                "142580013f142c80013f142d80013f142c80013f0c2f40142d80013f4f9f0d00648e7ab033f0"
-                "8210e97551848b4b6c3b1c0eb912365545fb4dc801426ef034813f8a9ff708ea1c1b3c175a8e"
-                "57105cc0a5a700012b282a00012b28ca800000011d13561a81e4cba132e84cba7809974265d2"
-                "4c5d24c8595e0079494ca000000000000000000e50fa3aefd2074a804a944aca944a8032b28c"
-                "a8007a85d44c038a4a0a65250a65250a7299494ca0425e5140c000000000000000000370dc00"
+                "140080013f142e80013f142a80013f140080013f0c3240142a80013fcb580f7f14a1fd17474e"
+                "a08d99b7e8bd5f68e300b199063cd7beaa5a5daada64ab1cd53cc05a354d48cac2aacf2cc929"
+                "ad14d79b5413e0aaec915e579fba675b4b194bcea0ff9d895fd676b3b99487c27ed3b7d4e0d6"
+                "f29817f7677eeee06c79a250835cacc7c3be1f1cee7fb5d133692bbea2434a7cda2185ef24b9"
+                "d95c0e60caf4"
             ),
             (
-                "0c2a4004290c264014af7e005af65ca771f95b91f12a8431f66c81dd32b3ce15fd8d121710a1"
-                "42850f45aa142850a121211324013b74fa0d1a8e96868511a339ab306cc9726481cc1987a303"
-                "03030661e8c0c0c0c1cca7aa300f"
+                "142a80013f042d140080013f0b901ee641ee62bd2a6505901e76be9e9c144c70a9343e0ddc04"
+                "50e022f13ee7aa01c7c33695a14ac999440a951c3c4083bc9b76b0d5cbd77aeda48533d796bd"
+                "3d05c30ab7"
             ),
             (
-                "0c2d400c3040143280013f611f28001c65d9c81c6ce1dcca62d25761d495fa79bf6fb02e3075"
-                "100000000000000000000000000000000de697b12b714a841b3506cd7420d9a8366bd081b9af"
-                "4376886a0a2c27ae6b0b09eb9ac3617af36c3613d5591eec50"
+                "0c2b400c2e40140080013f0c0fb3aa6f8e4869d9fba7b567a750139a08b1b51021042b5ec1b3"
+                "85df2c05a4316cd2c4086f3de5cd313825e30369e6a343579324f91c9ea6054b104da3d2b495"
+                "8c95e767f139cc8cd08c"
             ),
             (
-                "0c34400c3540143780013f951f1400820363a59216e155de0268e3e266e6a7727f3450aa30a1"
-                "200000000000000000000000000000000f296f555d078d414e61b35f5986cd7d661b34faa615"
-                "9a7d49849870086b1629885da91a10f6a46843da91a10bb591b084ed4884fa4052"
+                "142a80013f142a80013f140080013f0afad47d37423b3018e4f39381ebf0a400722ae6c335e4"
+                "bb23d57655dd2a0d3d2c06479afdbf5b0cb42d2b6d87a72346f86197c89feb3f84a66797e5c2"
+                "76bbf270c83d6ef9f8a392f1219089d8864da9885b"
             ),
         ),
         "b56c0398be5f18ecf59ce7adf2b1b9932ad088a21d75451f804513bf46b91893",

@@ -73,18 +73,19 @@ def digest(codec: Codec, answer: KnownAnswer) -> str:
 
 def check_known_answer(codec: Codec) -> None:
     """Decode the known answer of a codec of the table, once a process; raises UnsupportedError."""
-    answer = ANSWERS.get(codec.name)
-    if codec.name in _proved or answer is None:
+    name = CODECS.find(codec.id, codec.preset) or codec.name
+    answer = ANSWERS.get(name)
+    if name in _proved or answer is None:
         return
-    listed = CODECS.get(codec.name)
+    listed = CODECS.get(name)
     if listed is None or codec.decode not in (listed.decode, *listed.earlier.values()):
         return
     with _LOCK:
-        if codec.name in _proved:
+        if name in _proved:
             return
         if digest(codec, answer) != answer.sha256:
             raise UnsupportedError(
                 f"codec {codec.name}: this installation decodes its known answer wrongly; "
                 "MCZ_LOOPS=interpreted decodes without compiled code"
             )
-        _proved.add(codec.name)
+        _proved.add(name)

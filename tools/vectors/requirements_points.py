@@ -29,7 +29,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "SPACE-13": ("invalid/*/*-length-16", "invalid/*/*-length-255"),
     "SPACE-14": ("invalid/*/*-lengths-91",),
     "WIND-07": ("invalid/lsdt-clip/window*",),
-    "WIND-11": ("valid/lsdt-clip/*", "valid/*/longer*"),
+    "WIND-11": ("valid/lsdt-clip/*", "valid/mdtt/*", "valid/pca-rdo/*", "valid/*/longer*"),
     "WIND-13": ("invalid/lsdt-clip/hash-*",),
     "WIND-14": ("valid/pca-rdo/courses-*",),
     "FRAME-04": ("valid/lsdt-frame/segments-*", "valid/lsdt-frame/cut-*"),
