@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,13 @@ FORMATS = ("asf", "amc", "bvh", "c3d", "c3d-outputs", "trc", "mot", "sto", "moti
 FORMATS += ("npy", "npz")
 MAX_LINE = 2**20  # bytes of the JSON line
 SPARE_OUTPUT = 2**25  # bytes that an answer may have beyond what is expected
+# Classes of SPEC.md, "Classes of conformance": the codecs of each, None for all.
+CLASSES: dict[str, frozenset[str] | None] = {
+    "core": frozenset({"raw", "fast"}),
+    "archival": frozenset({"raw", "fast", "best", "lossless"}),
+    "lossy": frozenset({"raw", "fast", "best", "lossless", "posewave"}),
+    "research": None,
+}
 SIZES = {"<f8": 8, "<i8": 8, "u1": 1}  # bytes of a value
 
 Vector = dict[str, Any]
@@ -106,12 +113,22 @@ class Capabilities:
         sources = _words(document, "sources")
         if sources is not None and not sources <= set(FORMATS):
             raise ValueError(f"sources are {', '.join(sorted(sources))}; known: {FORMATS}")
-        return cls(
+        told = cls(
             options=_words(document, "options") or frozenset(),
             codecs=_words(document, "codecs"),
             sources=sources,
             version=version,
         )
+        return told.within(document["class"]) if "class" in document else told
+
+    def within(self, name: str) -> Capabilities:
+        """These without what a class lacks; ValueError where there is no such class."""
+        if name not in CLASSES:
+            raise ValueError(f"class is {name!r}; known: {', '.join(CLASSES)}")
+        own = CLASSES[name]
+        codecs = self.codecs if own is None else own & (own if self.codecs is None else self.codecs)
+        sources: frozenset[str] | None = frozenset() if name == "core" else self.sources
+        return replace(self, codecs=codecs, sources=sources)
 
     def lacks(self, request: Request) -> list[str]:
         """What ``request`` needs and this decoder does not have, in words."""

@@ -25,6 +25,7 @@ from conformance.child import Limits
 from conformance.encode import Result, try_encoder
 from conformance.judge import judge
 from conformance.manifest import (
+    CLASSES,
     HERE,
     VECTORS,
     Capabilities,
@@ -67,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     what = "a group, codec, requirement, glob or part of a path; may be given again"
     add("--only", action="append", default=[], metavar="WHAT", help=what)
     add("--every", type=int, default=1, metavar="N", help="of these only every so many")
+    add("--class", dest="class_", choices=tuple(CLASSES), help="ask for what this class has")
     add("--arrays-only", action="store_true", help="ask for no sources")
     add("--serve", action="store_true", help="many requests a process, where the decoder has it")
     add("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes at once")
@@ -88,6 +90,8 @@ def _run(given: argparse.Namespace) -> Report:
     manifest = load()
     vectors = select(manifest["vectors"], given.only)[:: max(1, given.every)]
     can = capabilities(command, limits)
+    if given.class_ is not None:
+        can = can.within(given.class_)
     if given.arrays_only:
         can = replace(can, sources=frozenset())
     if given.serve and "--serve" not in can.options:

@@ -553,3 +553,15 @@ def test_an_encoder_with_dice(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert shown.count("other bytes the second time") == 3
     names = [suite.get("name") for suite in Xml.parse(junit).getroot()]
     assert names[-1] == "conformance.encoder"
+
+
+def test_classes_are_those_of_the_text() -> None:
+    """Each has the codecs of the one before, and core restores no source."""
+    assert list(manifest.CLASSES) == ["core", "archival", "lossy", "research"]
+    can = manifest.Capabilities.parse(b'{"class": "core", "options": ["--clip"]}')
+    assert (can.codecs, can.sources) == ({"raw", "fast"}, frozenset())
+    can = manifest.Capabilities.parse(b'{"codecs": ["raw", "pca"]}')
+    assert can.within("archival").codecs == {"raw"}
+    assert can.within("research").codecs == {"raw", "pca"}
+    with pytest.raises(ValueError, match="class is 'full'"):
+        can.within("full")
