@@ -271,10 +271,10 @@ class Motion:
 
         With a source, which may print the frame numbers, they are kept.
         """
-        motion, timeline = replace(self, number_step=1), self.timeline
-        if self.number_step == 1 or self.signals_of(TIMES):
-            return motion if self.number_step > 1 else self
-        return motion.at_times(timeline)
+        if self.number_step == 1:
+            return self
+        motion = replace(self, number_step=1)
+        return motion if self.signals_of(TIMES) else motion.at_times(self.timeline)
 
     def at_times(self, timeline: Timeline | None) -> Motion:
         """This motion at these times; None: at unknown ones.

@@ -12,6 +12,8 @@ from mcz.types import Values
 def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
     """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
 
+    All are as they are stored: a cut leaves each joint its index.
+
     Where these say of a former cut what cannot be, it is taken for none.
     """
     now = _keys(cut, old)
@@ -40,8 +42,8 @@ def _keys(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
     if not cut.has_all_frames:
         start = _first_number(old.get("cut-frames", ""), 2)
         now["cut-frames"] = f"{start + cut.start}:{start + cut.stop}"
-    if cut.names is not None:
-        now["cut-joints"] = ",".join(cut.names)
+    if cut.joints is not None:
+        now["cut-joints"] = ",".join(map(str, sorted(cut.joints)))
     return now
 
 

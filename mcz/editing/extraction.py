@@ -255,7 +255,7 @@ class Copier:
 
     def _anew(self, cut: ClipCut) -> None:
         """Write what is left of a clip, decoded and coded anew."""
-        clip, old = cut.clip, cut.clip.quality or {}
+        clip, old = cut.clip, cut.clip.stored_quality or {}
         motion = replace(joints_alone(cut), name=self.name_of(cut))
         settings = settings_of(clip) if cut.joints is None else settings_of_joints(clip)
         record = self.recode(clip, motion, settings, partial(recoded_quality, cut, old))

@@ -38,6 +38,7 @@ from mcz.errors import (
 )
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
+from mcz.reading.quality_joints import with_indices
 from mcz.schema import build, parse
 from mcz.types import Progress, Target, Values
 from mcz.writing.atomic import replacing_file
@@ -295,8 +296,8 @@ class _Editor(Copier):
     def _entries(self, old: dict[str, str]) -> dict[str, str]:
         edit, codec = self.recoded, self.recoded.info.codec
         found = {} if codec.lossless else texts_of(figures(edit.given, edit.decoded))
-        address = edit.given.skeleton.addresses()[edit.joint]
-        return edited_quality(old, codec.name, address, found)
+        stored = with_indices(found, edit.given.skeleton)
+        return edited_quality(old, codec.name, edit.joint, stored)
 
 
 class _AnewEditor(Copier):
@@ -335,8 +336,8 @@ class _AnewEditor(Copier):
         self.others_error = float(np.nanmax(difference[:, ~own], initial=0.0))
         settings = {key: value for key, value in now.items() if key.startswith("param.")}
         found = {k: v for k, v in now.items() if k != "codec" and k not in settings}
-        old = self.edited_clip.quality or {}
-        record = edited_quality(old, now["codec"], self.address, found)
+        old = self.edited_clip.stored_quality or {}
+        record = edited_quality(old, now["codec"], self.edited.joint, found)
         record = {k: v for k, v in record.items() if not k.startswith("param.")}
         return record | settings | {RECODED: "yes"}
 
@@ -365,9 +366,9 @@ def _write_anew(clip: Clip, writer: _AnewEditor) -> Replacement:
 
 
 def edited_quality(
-    old: Mapping[str, str], codec: str, address: str, found: Mapping[str, str]
+    old: Mapping[str, str], codec: str, joint: int, found: Mapping[str, str]
 ) -> dict[str, str]:
-    """The entries of the quality record of a clip in which the joint ``address`` was edited.
+    """The entries of the quality record of a clip in which a ``joint`` was edited, as stored.
 
     ``old`` are those of before, ``found`` the figures of this edit.
     """
@@ -378,7 +379,7 @@ def edited_quality(
         elif not key.startswith(("edit-", "edit_")):
             now[f"unedited_{key}"] = value
     edited = [name for name in old.get("edit-joints", "").split(",") if name]
-    now["edit-joints"] = ",".join(dict.fromkeys([*edited, address]))
+    now["edit-joints"] = ",".join(dict.fromkeys([*edited, str(joint)]))
     if RECODED in old:
         now[RECODED] = old[RECODED]
     return now | {f"edit_{key}": value for key, value in found.items()}

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from mcz.brief import brief
 from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
-from mcz.container import payloads
 from mcz.container.chunks import REPEATED, ChunkFlag, ChunkType
 from mcz.container.masks import build_mask
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
@@ -29,13 +28,13 @@ from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.kinematics.single import FramePositions
 from mcz.live.figures import Figures
 from mcz.motion import Motion, Signal, Skeleton
-from mcz.schema import build
+from mcz.reading.quality_joints import with_indices
 from mcz.types import Params
 from mcz.writing.clip_writer import begin_open_clip
 from mcz.writing.names import check_metadata
 from mcz.writing.planning import asked, plan_open_clip
 from mcz.writing.prepare import Prepared, StoredSkeleton, read_with, wants_positions
-from mcz.writing.quality import CHUNK, texts_of
+from mcz.writing.quality import CHUNK, quality_payload, texts_of
 from mcz.writing.signal_source import MemorySource
 
 MOST_OVER = 1.05  # of a rate: that it is held
@@ -321,9 +320,8 @@ class LiveWriter:
             fixed = {k: v for k, v in self.options.items() if k not in self._changed}
             settings = {f"param.{name}": value for name, value in fixed.items()}
             found = {"codec": self.codec.name, **settings, **self._figures.entries()}
-            record = payloads.Qual(entries=payloads.metadata_records(texts_of(found)))
-            payload = build(record, "quality record")
-            self._writer.ancillary(CHUNK, payload)
+            stored = with_indices(texts_of(found), self._figures.skeleton)
+            self._writer.ancillary(CHUNK, quality_payload(stored))
         self._writer.finish()
         self._outlet.send()
 

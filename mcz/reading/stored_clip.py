@@ -21,6 +21,7 @@ from mcz.errors import FormatError, OptionError, UnsupportedError
 from mcz.formats.c3d_recording import Recording
 from mcz.motion import Skeleton
 from mcz.numbers.scaling import Scaling
+from mcz.reading.quality_joints import with_names
 from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, check_roles, read_signal
 from mcz.reading.source_info import SourceInfo, source_info, sourced_skeleton
@@ -173,7 +174,13 @@ class StoredClip:
 
     @property
     def quality(self) -> dict[str, str] | None:
-        """The quality record, None where the clip has none."""
+        """The quality record, with joints by name; None where the clip has none."""
+        stored = self.stored_quality
+        return None if stored is None else with_names(stored, self.skeleton)
+
+    @property
+    def stored_quality(self) -> dict[str, str] | None:
+        """The quality record as it is stored, with joints by index."""
         for chunk in self._row.ancillary:
             if chunk.type == ChunkType.QUAL:
                 fields = parse(payloads.Qual, self.container.payload(chunk), chunk.label)

@@ -21,6 +21,7 @@ from mcz.container.writer import Writer
 from mcz.errors import LimitError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Skeleton
+from mcz.reading.quality_joints import with_indices, with_names
 from mcz.types import Params, Progress, Values
 from mcz.writing.clip_check import ClipCopy
 from mcz.writing.names import alias_once
@@ -29,7 +30,7 @@ from mcz.writing.prepare import Prepared, StoredSkeleton
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource
 
-# (entries of a quality record, decoded values of each signal) -> its entries
+# (entries of a quality record as stored, decoded values of each signal) -> its entries
 Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
 
 
@@ -123,10 +124,11 @@ def write_plan(
     if not quality or codec.lossless:
         return None
     settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
-    entries = quality_record(motion, values, codec.name, settings, remarks)
-    entries = amend(entries, values) if amend else entries
-    writer.ancillary(CHUNK, quality_payload(entries))
-    return entries
+    named = quality_record(motion, values, codec.name, settings, remarks)
+    stored = with_indices(named, motion.skeleton)
+    stored = amend(stored, values) if amend else stored
+    writer.ancillary(CHUNK, quality_payload(stored))
+    return with_names(stored, motion.skeleton)
 
 
 def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> None:

@@ -129,6 +129,7 @@ ARGUED: dict[str, str] = {
     "SALV-10": _SALVAGE + "test_repair.py::test_no_clip_gets_frames_of_the_next_one",
     "LIMIT-16": "copies of chunks that are there, each once, are shorter than the file: whatever "
     "states more is refused by LIMIT-14, COPY-02 or COPY-03",
+    "QUAL-03": _REWRITER + "test_quality_joints.py::test_joints_stay_themselves_in_a_cut",
     "META-05": _REWRITER + "test_metadata.py::test_it_goes_along",
     "META-06": _REWRITER + "test_metadata.py::test_what_is_said_of_a_deleted_clip_is_gone",
     "META-09": _REWRITER + "test_metadata.py::test_nothing_of_what_was_withdrawn_is_left",

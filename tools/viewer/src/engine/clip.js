@@ -5,6 +5,7 @@ import { leadOf } from "./anatomy.js";
 import { figureOf } from "./figure.js";
 import { Lru } from "./lru.js";
 import { Places } from "./places.js";
+import { namedQuality } from "./quality.js";
 import { guessedUp } from "./up.js";
 import { clockFacts } from "../ui/times.js";
 
@@ -181,7 +182,7 @@ function factsOf(reader, drawn, ids) {
     bytes: signals.reduce((sum, { bytes }) => sum + (bytes ?? 0), 0),
     source: reader.source,
     metadata: reader.metadata,
-    quality: reader.quality,
+    quality: namedQuality(reader.quality, { joints: skeleton.joints, points: figure.points }),
     lost: reader.lost,
     firstFrame: reader.firstFrame,
     numbers: reader.numbers?.length > 1 ? reader.numbers : null,
