@@ -91,7 +91,7 @@ def implying(packets: Iterable[Packet]) -> list[Packet]:
 
 def use(data: bytes, *, salvage: bool = False) -> None:
     """Do with a file all that a reader can do; raises only MczError, whatever the bytes."""
-    with mcz.open(data, salvage=salvage) as file:
+    with mcz.open(data, salvage=salvage, verify=True) as file:
         _ = file.header, file.skeletons
         for attachment in file.attachments.values():
             attachment.read()

@@ -46,7 +46,7 @@ def check_file(data: bytes) -> bool:
     if rng.random() < 0.6:
         _live(data, found)
     if rng.random() < 0.3:
-        with mcz.open(data, max_decoded=most) as file:
+        with mcz.open(data, max_decoded=most, verify=True) as file:
             info(file)
             hold(not validate(file), "what decodes has faults")
     return True
@@ -68,7 +68,7 @@ def check_decoder(data: bytes) -> bool:
 def _strict(data: bytes, most: int | None, rng: random.Random) -> dict[tuple[str, int], Arrays]:
     """The arrays of every signal of every clip; all else is read, too."""
     found: dict[tuple[str, int], Arrays] = {}
-    with mcz.open(data, max_decoded=most) as file:
+    with mcz.open(data, max_decoded=most, verify=True) as file:
         _ = file.header, file.skeletons
         for clip in file.clips.values():
             found |= _clip(clip, rng)
