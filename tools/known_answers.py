@@ -79,7 +79,7 @@ def _lines(codec: Codec) -> Iterator[str]:
 def table() -> str:
     """The text of the module."""
     head = HOME.read_text("utf-8").partition("ANSWERS = {\n")
-    lines = [line for id_ in CODECS for line in _lines(CODECS[id_])]
+    lines = [line for codec in CODECS.values() for line in _lines(codec)]
     return "".join([head[0], head[1], *(f"{line}\n" for line in lines), "}\n"])
 
 
