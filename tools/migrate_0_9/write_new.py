@@ -17,6 +17,7 @@ import mcz
 from mcz.clock import EXACT, Timeline, numbers_or_rows
 from mcz.codecs import by_name
 from mcz.container import payloads
+from mcz.container.limits import BASE, LARGE
 from mcz.container.metadata import Record
 from mcz.container.value_hash import value_hash
 from mcz.container.writer import Writer
@@ -24,7 +25,6 @@ from mcz.editing.unpacking import named_files
 from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from mcz.writing.clip_writer import write_clip, write_skeleton
-from mcz.writing.file import profile_of
 from mcz.writing.quality import CHUNK, quality_payload
 
 START = "start-time"  # a key of 0.9: the time base of a clip says it now
@@ -140,7 +140,9 @@ class Migration:
     def __init__(self, old: Old, stream: BinaryIO, codec: str | None = None) -> None:
         self.old, self.codec, self.notes = old, codec, list[str]()
         large = old.content["header"]["profile"] != "base"
-        self.writer = Writer(stream, profile=profile_of(large), copies=old.content["has_copies"])
+        self.writer = Writer(
+            stream, profile=LARGE if large else BASE, copies=old.content["has_copies"]
+        )
         self._skeletons: dict[str, tuple[bytes, Skeleton]] = {}  # by their old ids
         self.split = set[str]()  # clips whose column of times is a signal of its own now
         self.untimed = set[str]()  # clips whose times were not those of their frame numbers
