@@ -70,7 +70,8 @@ TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a
 class Container:
     """An open file. ``unverified`` counts the segments of which only a part was read.
 
-    That happens where ``reads_parts`` allows it, and never otherwise.
+    That happens where ``reads_parts`` allows it, and never otherwise. ``directory``: that of a file
+    which is not finished, as its writer has it.
     """
 
     def __init__(
@@ -82,6 +83,7 @@ class Container:
         reads_parts: bool = False,
         threads: int | None = None,
         verify: bool = False,
+        directory: Directory | None = None,
     ) -> None:
         self.source, self.salvage, self.verify = source, salvage, verify
         self.reads_parts = reads_parts and not salvage
@@ -96,7 +98,7 @@ class Container:
         self._said = Remembered()
         self._told = 0, b""  # a segment in a packet, and its mask
         self._skeletons: dict[bytes, tuple[payloads.Skel, Skeleton]] = {}
-        self.directory = self._salvage() if salvage else self._open()
+        self.directory = directory or (self._salvage() if salvage else self._open())
         self.profile: Profile = parse_head(self.directory.head)
 
     def __reduce__(self) -> tuple[object, ...]:

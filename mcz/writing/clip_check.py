@@ -55,9 +55,9 @@ class ClipCopy:
     def decoded(self, motion: Motion, coded: Sequence[SignalPlan]) -> list[Decoded]:
         """The signals; raises ChecksumError where a channel differs that may not."""
         self.writer.end_clip(motion.n_frames, NO_HASH, [NO_HASH] * len(motion.signals))
-        self.writer.finish()
-        container = Container(open_source(self._out.getvalue()), max_decoded=2**53)
-        row = container.directory.clips[motion.name]
+        directory, data = self.writer.directory, open_source(self._out.getvalue())
+        container = Container(data, max_decoded=2**53, directory=directory)
+        row = directory.clips[motion.name]
         record = container.clip(row)
         found = []
         for index, part in enumerate(coded):
