@@ -17,6 +17,7 @@ from mcz.codecs.online import kernels as online_kernels
 from mcz.codecs.posewave import header as posewave
 from mcz.coding import logistic, mixing, residuals, space_kernels
 from mcz.coding.ordinals import kernels as lossless_kernels
+from mcz.container.grammar import GRAMMAR
 from mcz.formats import FORMATS, amc, c3d_restore, trc
 from mcz.formats.c3d_layout import Kind
 from mcz.formats.layout import Template
@@ -41,6 +42,17 @@ def words_of(heading: str) -> str:
 def table_after(text: str, head: str) -> list[list[str]]:
     rows = list(takewhile(bool, text.split(head, 1)[1].splitlines()[2:]))
     return [[c.strip() for c in row.strip("|").split("|")] for row in rows]
+
+
+def test_states_of_the_grammar() -> None:
+    head = "| thing | start | body | clip | packets | index | file |"
+    states = [state.strip() for state in head.strip("|").split("|")][1:]
+    found = {
+        thing: {state: after for state, after in zip(states, row[1:], strict=True) if after}
+        for row in table_after(section("Grammar"), head)
+        for thing in row[0].split(", ")
+    }
+    assert found == GRAMMAR
 
 
 def test_groups_and_resolutions_of_codecs() -> None:

@@ -32,12 +32,12 @@ GRAMMAR: dict[str, dict[str, str]] = {
     FOOT: {BODY: FILE, INDEX: FILE, FILE: FILE},
     END: {FILE: END},
 }
-CRITICAL: dict[bytes, str] = {kind: kind.name for kind in ChunkType if kind.name in GRAMMAR}
+NAMED: dict[bytes, str] = {kind: kind.name for kind in ChunkType if kind.name in GRAMMAR}
 
 
 def thing_of(chunk: Chunk) -> str:
     """The row of the grammar that a closed chunk belongs to; raises FormatError for wrong flags."""
-    thing = CRITICAL.get(chunk.type)
+    thing = NAMED.get(chunk.type)
     if chunk.flags != FLAGS_OF.get(chunk.type, 0 if thing else chunk.flags):  # CHUNK-15
         raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, not those of its type")
     if thing is not None:

@@ -27,11 +27,11 @@ from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEven
 from mcz.container.grammar import (
     BODY,
     CLIP,
-    CRITICAL,
     END,
     END_PACKET,
     GRAMMAR,
     INDEX,
+    NAMED,
     OPEN_DATA,
     OTHER,
     PACKET,
@@ -217,7 +217,7 @@ class Parser:
         if self.rescans or self._is_lost:
             return
         self._go_to(chunk.offset + chunk.size)  # SALV-01
-        rows = GRAMMAR[CRITICAL.get(chunk.type, OTHER)]
+        rows = GRAMMAR[NAMED.get(chunk.type, OTHER)]
         if rows.get(self.state) in (BODY, CLIP):
             self.state = rows[self.state]
 

@@ -13,7 +13,7 @@ from mcz.container.chunks import FOOT, REPEATED, Chunk, ChunkType, read_payload
 from mcz.container.directory import Found, SegmentRow
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.feeding import events
-from mcz.container.grammar import BODY, CLIP, CRITICAL, GRAMMAR, INDEX, OTHER, START
+from mcz.container.grammar import BODY, CLIP, GRAMMAR, INDEX, NAMED, OTHER, START
 from mcz.container.packets import END
 from mcz.container.repeats import chunks_in
 from mcz.container.scanner import Scanner
@@ -108,7 +108,7 @@ class Salvager(Scanner):
                 self._take(event)
                 return
         elif event is None and chunk is not None and not fault.is_lost:
-            thing = CRITICAL.get(chunk.type, OTHER)
+            thing = NAMED.get(chunk.type, OTHER)
             if (
                 chunk.type not in REPEATED
                 and CLIP not in GRAMMAR[thing]

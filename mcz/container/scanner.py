@@ -20,7 +20,7 @@ from mcz.container.directory import (
     signal_rows,
 )
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
-from mcz.container.grammar import CRITICAL, OTHER
+from mcz.container.grammar import NAMED, OTHER
 from mcz.container.index_check import IndexCheck
 from mcz.container.limits import check, index_limit
 from mcz.container.packets import SEGMENT
@@ -77,7 +77,7 @@ class Scanner:
             return ALL
         if chunk.type == ChunkType.DATA:
             return PEEK
-        return ALL if chunk.type in CRITICAL else PASS
+        return ALL if chunk.type in NAMED else PASS
 
     def take(self, event: Event) -> None:
         """Take an event in; raises FormatError for a Fault, and for what breaks another rule."""
