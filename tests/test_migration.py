@@ -166,6 +166,31 @@ def test_motions_without_a_source(tmp_path: Path) -> None:
         assert file.only_clip().codec == "raw" and file.header["profile"] != "base"
 
 
+@pytest.mark.parametrize(
+    ("was", "now"),
+    [([2, 5, 3], [2, 3, 4]), ([2**52, 2**52 + 1, 2**53], [1, 2, 3]), ([-1, 0, 4], [-1, 0, 4])],
+)
+def test_frame_numbers_that_a_clip_cannot_have_are_kept_as_text(
+    was: list[int], now: list[int], tmp_path: Path
+) -> None:
+    old, folder = tmp_path / "old.mcz", tmp_path / "read"
+    mcz.write(replace(smooth(3), metadata={"subject": "x"}), old)
+    folder.mkdir()
+    migration.read(sys.executable, str(ROOT), str(old), str(folder))
+    content = json.loads((folder / "content.json").read_text())
+    clip, text = content["clips"][0], " ".join(map(str, was))
+    (folder / clip["frame_numbers"]).write_bytes(np.array(was, "<i8").tobytes())
+    clip |= {"times": None, "numbers_text": text}
+    (folder / "content.json").write_text(json.dumps(content))
+    notes = migration.migrate(folder, str(tmp_path / "new.mcz"))
+    kept = {} if was == now else {"x-frame-numbers-0-9": text}
+    assert [note.endswith("are its x-frame-numbers-0-9") for note in notes] == [True] * len(kept)
+    with mcz.open(tmp_path / "new.mcz") as file:
+        clip = file.only_clip()
+        assert clip.frame_numbers.tolist() == now
+        assert dict(clip.metadata) == {"subject": "x"} | kept
+
+
 @pytest.mark.parametrize("what", ["values", "mask", "file", "rate"])
 def test_what_differs_is_not_written(what: str, tmp_path: Path, samples: Path) -> None:
     old, folder = tmp_path / "old.mcz", tmp_path / "read"

@@ -103,6 +103,7 @@ def clip(found: Any, folder: Folder) -> dict[str, Any]:
         "rate": None if rate is None else [rate.numerator, rate.denominator],
         "is_rate_exact": found.frame_rate_exact,
         "metadata": {k: v for k, v in found.metadata.items() if k != "frame-numbers"},
+        "numbers_text": found.metadata.get("frame-numbers"),
         "frame_numbers": folder.keep(found.frame_numbers.astype("<i8").tobytes()),
         "times": None if line is None else folder.keep(line.times.astype("<f8").tobytes()),
         "rounding": 0.0 if line is None else line.rounding,

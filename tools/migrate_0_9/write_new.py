@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 import mcz
-from mcz.clock import EXACT, Timeline, numbers_or_rows
+from mcz.clock import EXACT, Timeline, check_numbers, numbers_or_rows
 from mcz.codecs import by_name
 from mcz.container import payloads
 from mcz.container.limits import BASE, LARGE
@@ -28,6 +28,7 @@ from mcz.writing.clip_writer import write_clip, write_skeleton
 from mcz.writing.quality import CHUNK, quality_payload
 
 START = "start-time"  # a key of 0.9: the time base of a clip says it now
+NUMBERS = "x-frame-numbers-0-9"  # what `frame-numbers` of 0.9 said, where no clip can have such now
 KEPT = ("raw", "fast", "best")  # codecs of 0.9 that clips keep; all others become fast
 Content = dict[str, Any]
 
@@ -89,11 +90,18 @@ class Old:
         )
 
     def frame_numbers(self, clip: Content) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Those of the clip; where they do not ascend, they count from the first on."""
+        """Those of the clip; where it cannot have them, they count from the first one, or from 1."""
         numbers = np.frombuffer(self.data(clip["frame_numbers"]), "<i8")
-        if (numbers[1:] > numbers[:-1]).all():
-            return numbers
-        return numbers[0] + np.arange(len(numbers))
+        rows = np.arange(len(numbers))
+        possible = (known for known in (numbers, numbers[:1] + rows) if not _numbers_fault(known))
+        return next(possible, 1 + rows)
+
+    def metadata(self, clip: Content) -> dict[str, str]:
+        """That of the clip, with the frame numbers that it cannot have."""
+        kept = {key: value for key, value in clip["metadata"].items() if key != START}
+        if _numbers_fault(np.frombuffer(self.data(clip["frame_numbers"]), "<i8")):
+            kept[NUMBERS] = clip["numbers_text"]
+        return kept
 
     def times(self, clip: Content) -> Timeline | None:
         if clip["times"] is None:
@@ -117,9 +125,18 @@ class Old:
             None if rate is None else Fraction(*rate),
             clip["is_rate_exact"],
             clip["name"],
-            {key: value for key, value in clip["metadata"].items() if key != START},
+            self.metadata(clip),
             frame_numbers=None if counted else numbers,
         )
+
+
+def _numbers_fault(numbers: np.ndarray[Any, np.dtype[np.int64]]) -> str:
+    """Why no clip can have these frame numbers, "" where one can."""
+    try:
+        check_numbers(numbers, "")
+    except mcz.MotionError as error:
+        return str(error)
+    return ""
 
 
 def _tuples(value: Any) -> Any:
@@ -139,10 +156,8 @@ class Migration:
 
     def __init__(self, old: Old, stream: BinaryIO, codec: str | None = None) -> None:
         self.old, self.codec, self.notes = old, codec, list[str]()
-        large = old.content["header"]["profile"] != "base"
-        self.writer = Writer(
-            stream, profile=LARGE if large else BASE, copies=old.content["has_copies"]
-        )
+        profile = BASE if old.content["header"]["profile"] == "base" else LARGE
+        self.writer = Writer(stream, profile=profile, copies=old.content["has_copies"])
         self._skeletons: dict[str, tuple[bytes, Skeleton]] = {}  # by their old ids
         self.split = set[str]()  # clips whose column of times is a signal of its own now
         self.untimed = set[str]()  # clips whose times were not those of their frame numbers
@@ -171,6 +186,8 @@ class Migration:
     def _clip(self, clip: Content) -> None:
         skeleton = self._skeletons[clip["skeleton"]][1]
         motion = self.old.motion(clip, skeleton)
+        if NUMBERS in motion.metadata:
+            self.notes.append(f"clip {clip['name']}: frame numbers of 0.9 are its {NUMBERS}")
         if clip["file"] is not None:
             motion = self._sourced(clip, motion)
         if not motion.signals_of("times"):
@@ -321,7 +338,7 @@ def _of_clip(old: Old, clip: mcz.Clip, was: Content, moved: bool) -> Iterator[st
         yield "frame rate"
     if not np.array_equal(clip.frame_numbers, old.frame_numbers(was)):
         yield "frame numbers"
-    if dict(clip.metadata) != {k: v for k, v in was["metadata"].items() if k != START}:
+    if dict(clip.metadata) != old.metadata(was):
         yield "metadata"
     if was["quality"] != clip.quality:
         yield "quality record"
