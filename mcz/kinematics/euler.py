@@ -9,7 +9,7 @@ from mcz.kinematics.chain import Floats, turned
 # The most common order of BVH files first.
 ORDERS = ("zyx", "zxy", "yxz", "xyz", "xzy", "yzx")
 STEEP = np.sin(np.deg2rad(80))  # beyond it the outer axes nearly fall together: try other orders
-LOCKED = 1e-12  # cosine below which they do; to choose an angle then costs as much, in radians
+LOCKED = 1e-14  # cosine below which they do; to choose an angle then costs as much, in radians
 
 
 def euler_order(turns: Floats) -> str:

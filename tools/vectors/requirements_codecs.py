@@ -129,7 +129,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "LOSS-37": ("valid/lossless/counts-*",),
     "LOSS-38": ("valid/lossless/counts-rests*", "valid/lossless/counts-among-others"),
     "WAVE-01": ("valid/mrdwt/wavelet-*",),
-    "WAVE-02": ("valid/mrdwt/*", "invalid/mrdwt/hash-*"),
+    "WAVE-02": ("valid/mrdwt/*", "valid/?wt/*", "invalid/mrdwt/hash-*"),
     "MRDWT-03": ("invalid/mrdwt/resolutions*",),
     "MRDWT-04": ("valid/mrdwt/resolutions-*", "valid/*/cut-resolution"),
     "MRDWT-05": ("invalid/mrdwt/frames-*", "valid/mrdwt/coded-frames*"),
