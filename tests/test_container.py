@@ -13,7 +13,7 @@ import pytest
 import mcz
 from conformance.run import VECTORS
 from mcz.codecs import by_name
-from mcz.container import chunks, payloads
+from mcz.container import chunks, note_records
 from mcz.container.chunks import FOOT, HEADER, ChunkFlag, build_chunk, build_foot
 from mcz.container.feeding import packets
 from mcz.container.masks import build_mask
@@ -335,4 +335,4 @@ def test_source_counts_and_reads_exactly() -> None:
 
 def test_schemas_refuse_trailing_bytes() -> None:
     with pytest.raises(FormatError):
-        parse(payloads.Alia, b"\x01a\x00\x01b!", "ALIA")
+        parse(note_records.GroupNotes, b"\0\0!", "group notes")

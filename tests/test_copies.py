@@ -380,7 +380,7 @@ def test_many_of_them_lie_in_several_chunks() -> None:
 def test_a_model_is_copied_where_it_is_small_beside_the_rest(size: int, copied: bool) -> None:
     out, draw = io.BytesIO(), random.Random(4)
     writer = Writer(out, copies=True)
-    writer.shared(b"MODL", b"\x63" + draw.randbytes(size))
+    writer.shared(b"MODL", b"\0\x63" + draw.randbytes(size))
     writer.attachment("noise", draw.randbytes(100_000))
     writer.finish()
     data = out.getvalue()

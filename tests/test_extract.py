@@ -26,7 +26,7 @@ from mcz.container.writer import Writer
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import validate
-from mcz.schema import parse
+from mcz.schema import EXTENDED, parse
 from mcz.writing.clip_writer import write_clip
 from tests import overlap_codec
 from tests.commands import run
@@ -354,12 +354,25 @@ def test_listed_groups_and_extensions() -> None:
     """Groups of kind 3 are those that are left; what is not known is kept."""
     whole = written(rich())
     listed = {"kind": payloads.GROUP_LISTED, "sizes": [6, 3, 1]}
-    data = clip_with(whole, groups=listed, extension=b"of a signal")
+    data = clip_with(whole, groups=listed, extended=b"of a signal")
     part = extracted(data, joints=["hips", "knee"], frames=(5, 30))
     check(whole, part, 5, 30, ["hips", "knee"], 0)
     fields = clip_fields_of(part)
     assert list(fields.signals[0].groups.sizes) == [6, 1]
     assert fields.signals[0].extension == b"of a signal"
+
+
+def test_extensions_are_kept_in_what_is_cut() -> None:
+    whole = (
+        Path(__file__).parents[1] / "conformance/vectors/valid/extensions/all.mcz"
+    ).read_bytes()
+    part = extracted(whole, frames=(1, 2))
+    found = [(chunk.type, payload.count(b"later version")) for chunk, payload in parts_of(part)]
+    for type_, n in ((b"HEAD", 1), (b"SRCE", 1), (b"MODL", 1), (b"ATTA", 1), (b"QUAL", 1)):
+        assert (type_, n) in found
+    assert [n for type_, n in found if type_ == b"SKEL"] == [3, 3]
+    assert [n for type_, n in found if type_ == b"CLIP"] == [3, 3]
+    assert {n for type_, n in found if type_ in (b"DATA", b"CEND")} == {1}
 
 
 def test_an_open_clip_is_closed() -> None:
@@ -582,7 +595,14 @@ def clip_fields_of(data: bytes) -> Any:
     return parse(payloads.Clip, payload, "CLIP")
 
 
-def clip_with(data: bytes, *, flags: int = 0, n_frames: int | None = None, **signal: Any) -> bytes:
+def clip_with(
+    data: bytes,
+    *,
+    flags: int = 0,
+    n_frames: int | None = None,
+    extended: bytes = b"",
+    **signal: Any,
+) -> bytes:
     """The file with other fields in its clip and the first signal, checksums made right.
 
     Where it is open, its missing frames are told by CEND.
@@ -593,6 +613,9 @@ def clip_with(data: bytes, *, flags: int = 0, n_frames: int | None = None, **sig
     fields.flags |= flags
     fields.n_frames = fields.n_frames if n_frames is None else n_frames
     update(fields.signals[0], signal)
+    if extended:
+        own_flags = fields.signals[0].flags | EXTENDED
+        update(fields.signals[0], {"flags": own_flags, "extension": extended})
     if fields.flags & payloads.OPEN_CLIP:
         end = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"CEND")
         cend = parse(payloads.Cend, parts[end][1], "CEND")

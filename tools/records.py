@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import construct
 import numpy as np
 
-from mcz.schema import Record, build, read_varint
+from mcz.schema import EXTENDED, Record, build, read_varint, varint
 from mcz.schema.columns import Columns, read_column, read_varints
 from mcz.schema.records import RecordType
 from mcz.schema.types import Checked, Counted, Exactly, Sized
@@ -89,7 +89,7 @@ def span(kind: Any, payload: bytes, path: str) -> tuple[int, int]:
             items = record.rows
         for field, inner in items:
             start, type_ = stream.tell(), inner
-            if field == name and isinstance(inner, Columns) and name != names[-1]:
+            if field == name and depth < len(names) - 1:
                 break  # it need not be sound
             context[field] = inner._parsereport(stream, context, "")
             if field == name:
@@ -129,6 +129,16 @@ def _span_in_column(
         return own
     sizes, at = read_varints(data, at, count)
     return at + int(sizes[:number].sum()), at + int(sizes[: number + 1].sum())
+
+
+def extend(kind: Any, payload: bytes, path: str, more: bytes) -> bytes:
+    """``payload`` with an extension in the structure at ``path``, which had none."""
+    within = f"{path}." if path else ""
+    start, stop = span(kind, payload, f"{within}extension")
+    at = span(kind, payload, f"{within}flags")[0]
+    flags = bytes((payload[at] | EXTENDED,))
+    extension = varint(len(more)) + more
+    return payload[:at] + flags + payload[at + 1 : start] + extension + payload[stop:]
 
 
 def update(record: Record, changes: Mapping[str, Any]) -> None:

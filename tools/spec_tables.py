@@ -33,6 +33,8 @@ from tools import spec_trace
 MODULES = (
     "mcz.container.payloads",
     "mcz.container.index_records",
+    "mcz.container.note_records",
+    "mcz.container.copy_records",
     "mcz.container.copies",
     "mcz.container.metadata",
     "mcz.codecs.wavelet.shared",

@@ -253,7 +253,7 @@ ANSWERS = {
     "mdtt": KnownAnswer(
         0, "all",
         (
-            "10100201eab54b72f16695d82919012bd2f33e989a9999999999c93f0f7b7b7b7d7d827f80828a8a"
+            "101002016ffedff7a8927d8cf33d790d19ab22219a9999999999c93f0f7b7b7b7d7d827f80828a8a"
             "9080808000"
         ),
         (
@@ -270,7 +270,7 @@ ANSWERS = {
     "pca-rdo": KnownAnswer(
         0, "all",
         (
-            "10020e01dc9236d8e6d6b135cf4d3df28788c6a69a9999999999c93f0f7b7b7b7d7d827f80828a8a"
+            "10020e01a2c2dbbd0493e081a3db642484c796c29a9999999999c93f0f7b7b7b7d7d827f80828a8a"
             "9080808000"
         ),
         (

@@ -32,7 +32,7 @@ def joined_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> by
             raise FormatError(
                 f"more than the {row.size} bytes of the file", where=f"chunk {chunk.label}"
             )
-        parts.append(decoded(fields.data, fields.encoding, fields.part_size, chunk.label))
+        parts.append(decoded(fields.data, fields.flags, fields.part_size, chunk.label))
         left, digest = left - fields.part_size, fields.sha256  # ATTA-03
     data = b"".join(parts)
     if left or hashlib.sha256(data).digest() != digest:  # ATTA-04, ATTA-05

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
-from mcz.container import payloads
+from mcz.container import copy_records, payloads
 from mcz.container.chunks import (
     COPIED,
     FOOT,
@@ -77,14 +77,16 @@ def worth_it(copy: Copy, n_bytes: int) -> bool:
 def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
     """The payload of a COPY that will begin at ``offset``."""
     records = (
-        payloads.CopiedChunk(distance=offset - copy.offset, type=copy.type, payload=copy.payload)
+        copy_records.CopiedChunk(
+            distance=offset - copy.offset, type=copy.type, payload=copy.payload
+        )
         for copy in copies
     )
     content = b"".join(build(record, "COPY") for record in records)
     packed = deflate(content)
-    encoding = payloads.DEFLATED if len(packed) < len(content) else payloads.STORED
-    data = packed if encoding else content
-    return build(payloads.Copy(encoding=encoding, size=len(content), data=data), "COPY")
+    flags = payloads.DEFLATED if len(packed) < len(content) else payloads.STORED
+    data = packed if flags else content
+    return build(copy_records.Copy(flags=flags, size=len(content), data=data), "COPY")
 
 
 def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
@@ -92,12 +94,12 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
 
     Raises FormatError where they are not in file order, or not before the COPY.
     """
-    fields = parse(payloads.Copy, payload, chunk.label)
+    fields = parse(copy_records.Copy, payload, chunk.label)
     check(f"chunk {chunk.label}: bytes of the copies", fields.size, limit)  # LIMIT-16
-    content = decoded(fields.data, fields.encoding, fields.size, chunk.label)
+    content = decoded(fields.data, fields.flags, fields.size, chunk.label)
     copies: list[Copy] = []
     end = 0
-    for stored in parse_all(payloads.CopiedChunk, content, f"chunk {chunk.label}"):
+    for stored in parse_all(copy_records.CopiedChunk, content, f"chunk {chunk.label}"):
         if stored.type not in COPIED:  # COPY-01
             raise FormatError(
                 f"a copy of a chunk of type {stored.type!r}", where=f"chunk {chunk.label}"

@@ -35,7 +35,7 @@ from mcz.errors import FormatError
 from mcz.schema import Table, build, deflate
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
-PACKETS = {SEGMENT: 128, FRAME: 64}
+PACKETS = {SEGMENT: 64, FRAME: 32}
 INDEXES = 4  # of these a writer leaves no more, so that few requests open a file
 GROWTH = 27  # times the bytes of what is new: a smaller INDX is made part of it
 

@@ -109,9 +109,7 @@ class IndexedSegment(Record):
     n_frames: int = field(UVARINT, "frames")
     lead: int = field(UVARINT, "as in DATA")
     tail: int = field(UVARINT, "as in DATA")
-    flags: int = field(
-        UVARINT, "as in DATA; more where it is a packet: 128 of kind 1, 64 of kind 2"
-    )
+    flags: int = field(UVARINT, "as in DATA; more where it is a packet: 64 of kind 1, 32 of kind 2")
 
 
 class IndexedPlace(Record):

@@ -94,8 +94,8 @@ def build_metas(
 
 
 def _payload(content: bytes, short: bool, profile: Profile) -> bytes:
-    encoding, data = smallest(content, short=short, plain=profile.is_plain)
-    return build(payloads.Meta(encoding=encoding, size=len(content), data=data), "META")
+    flags, data = smallest(content, short=short, plain=profile.is_plain)
+    return build(payloads.Meta(flags=flags, size=len(content), data=data), "META")
 
 
 def record_bytes(record: Record) -> bytes:
@@ -113,7 +113,7 @@ def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
     where = f"chunk {chunk.label}"
     fields = parse(payloads.Meta, payload, where)
     check(f"{where}: bytes of the records", fields.size, metadata_limit(file_bytes))
-    content = decoded(fields.data, fields.encoding, fields.size, where)
+    content = decoded(fields.data, fields.flags, fields.size, where)
     records = []
     for stored in parse_all(payloads.MetaRecord, content, where):
         _check_keys(stored.removed, where)

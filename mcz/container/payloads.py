@@ -2,7 +2,7 @@
 
 Not that of DATA, which is bulk and read by hand: ``segments.py``; ``packets.py`` where it is open.
 
-Open structures end in ``extension``, which readers ignore and rewriting keeps.
+Readers ignore ``extension``: the end of a payload, or sized behind flag bit 7. Rewriting keeps it.
 """
 
 from __future__ import annotations
@@ -10,15 +10,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 
-from construct import GreedyBytes, If, Int8ul, this
+from construct import Construct, GreedyBytes, If, Int8ul, this
 
 from mcz.container.versions import FORMAT, NEEDS_MINOR
 from mcz.numbers import GRID, Grid
 from mcz.schema import (
+    EXTENDED,
     EXTENSION,
     FINITE,
     POSITIVE,
     SIZED,
+    SIZED_EXTENSION,
     SVARINT,
     TEXT,
     UVARINT,
@@ -54,12 +56,27 @@ class Head(Record):
     extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
 
 
+HAS_NAME, HAS_UNIT = 1, 2
+
+
 class Channel(Record):
     """A channel of a joint or of a signal."""
 
+    flags: int = field(
+        flags("has name", "has unit", extended=True),
+        "bit 0: has name; 1: has unit; 7: has extension",
+        default=0,
+    )
     kind: int = field(Int8ul, "channel kind of the registry; 0: plain scalar")
-    name: str = field(TEXT, "name, empty where the kind says it all", default="")
-    unit: str = field(TEXT, "unit, empty where the kind and the skeleton say it", default="")
+    name: str | None = field(
+        If(this.flags & HAS_NAME, TEXT), "name; empty where absent: the kind says it", default=None
+    )
+    unit: str | None = field(
+        If(this.flags & HAS_UNIT, TEXT),
+        "unit; empty where absent: kind and skeleton say it",
+        default=None,
+    )
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
 
 
 JOINT_FLAGS = ("adds to offset", "has offset", "has axis")
@@ -72,7 +89,9 @@ class Joint(Record):
     name: str = field(TEXT, "name of the joint")
     parent: int = field(UVARINT, "index of the parent + 1; 0 for a root")
     flags: int = field(
-        flags(*JOINT_FLAGS), "bit 0: positions add to offset; 1: has offset; 2: has axis", default=0
+        flags(*JOINT_FLAGS, extended=True),
+        "bit 0: positions add to offset; 1: has offset; 2: has axis; 7: has extension",
+        default=0,
     )
     offset: Vector | None = field(
         If(this.flags & HAS_OFFSET, VECTOR),
@@ -95,6 +114,7 @@ class Joint(Record):
     channels: list[Channel] = field(
         counted(Channel, kind="channels"), "the joint's channels, in column order", default=[]
     )
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
 
 
 class SkeletonSource(Record):
@@ -134,22 +154,33 @@ class Skel(Record):
 
 
 STORED, DEFLATED, AFTER_WORDS = 0, 1, 2
-ENCODING = one_of(Int8ul, (STORED, DEFLATED, AFTER_WORDS))  # CONV-15
+ENCODING = 3  # mask of the bits of flags
+
+
+def encoding_flags() -> Construct:
+    """The field ``flags`` of a chunk whose data are encoded."""
+    return one_of(Int8ul, (0, 1, 2, EXTENDED, EXTENDED + 1, EXTENDED + 2))  # CONV-14, CONV-15
+
+
+ENCODED = "bits 0-1: 0 stored, 1 raw deflate, 2 deflate after words; 7: has extension"
 
 
 class Srce(Record):
     """SRCE, the template of a source."""
 
     format: int = field(Int8ul, "source format id")
-    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
+    flags: int = field(encoding_flags(), ENCODED, default=0)
     size: int = field(UVARINT, "bytes of the template")
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
     data: bytes = field(GreedyBytes, "the template, encoded")
 
 
 class Modl(Record):
     """MODL, a model that codecs refer to."""
 
+    flags: int = field(flags(extended=True), "bit 7: has extension", default=0)
     kind: int = field(UVARINT, "model kind of the registry")
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
     data: bytes = field(GreedyBytes, "the model; its kind says how to read it")
 
 
@@ -161,8 +192,9 @@ class Atta(Record):
     n_parts: int = field(POSITIVE, "parts of the file, at least 1, all in one run")
     size: int = field(UVARINT, "bytes of the whole file")
     sha256: bytes = field(SHA256, "hash of the whole file")
-    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
+    flags: int = field(encoding_flags(), ENCODED, default=0)
     part_size: int = field(UVARINT, "bytes of this part, decoded")
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
     data: bytes = field(GreedyBytes, "this part, encoded")
 
 
@@ -177,16 +209,19 @@ class Alia(Record):
         one_of(Int8ul, (OF_CLIP, OF_SKELETON, OF_ATTACHMENT)), "0 clip, 1 skeleton, 2 attachment"
     )
     target: bytes = field(SIZED, "name of the clip or attachment, or id of the SKEL")
+    extension: bytes = field(EXTENSION, "ignored", default=b"")
 
 
 class ClipSource(Record):
     """The file that a clip came of, in CLIP."""
 
+    flags: int = field(flags(extended=True), "bit 7: has extension", default=0)
     template: bytes = field(ID, "id of the SRCE chunk")
     format: int = field(Int8ul, "source format id")
     detail: bytes = field(SIZED, "what the template leaves open for this clip")
     path: str = field(TEXT, "relative path of the source file, with forward slashes")
     size: int = field(UVARINT, "bytes of the source file")
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
 
 
 class GridRun(Record):
@@ -228,7 +263,9 @@ class Signal(Record):
 
     name: str = field(TEXT, "name of the signal")
     flags: int = field(
-        flags("own channels"), "bit 0: has channels of its own, not the skeleton's", default=0
+        flags("own channels", extended=True),
+        "bit 0: has channels of its own, not the skeleton's; 7: has extension",
+        default=0,
     )
     role: int = field(Int8ul, "role of the registry; 0: none", default=0)
     of: int | None = field(
@@ -249,7 +286,7 @@ class Signal(Record):
     header: bytes = field(SIZED, "the codec's own header")
     groups: Groups = field(Groups, "partition of the channels")
     n_resolutions: int = field(bounded(Int8ul, 1, 255), "resolutions, at least 1", default=1)
-    extension: bytes = field(SIZED, "ignored, kept", default=b"")
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
 
 
 CLIP_FLAGS = ("open", "rounded rate", "time base")
@@ -340,27 +377,12 @@ class Cend(Record):
     extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
 
 
-class Copy(Record):
-    """COPY, copies of small chunks."""
-
-    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
-    size: int = field(UVARINT, "bytes of the copies, decoded")
-    data: bytes = field(GreedyBytes, "the copies, encoded")
-
-
-class CopiedChunk(Record):
-    """A copy in the decoded data of COPY."""
-
-    distance: int = field(UVARINT, "bytes from where the chunk begins to where this COPY begins")
-    type: bytes = field(Exactly(4), "its type")
-    payload: bytes = field(SIZED, "its payload")
-
-
 class Meta(Record):
     """META, metadata of clips that lie before it."""
 
-    encoding: int = field(ENCODING, "0 stored, 1 raw deflate, 2 deflate after words")
+    flags: int = field(encoding_flags(), ENCODED, default=0)
     size: int = field(UVARINT, "bytes of the records, decoded")
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored; flag bit 7", default=None)
     data: bytes = field(GreedyBytes, "the records, encoded")
 
 
@@ -379,29 +401,3 @@ class Qual(Record):
         counted(Metadata), "metric id or setting, and its value as text"
     )
     extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
-
-
-class GridChange(Record):
-    """A grid that differs from the clip's, in GROUP_NOTES."""
-
-    channel: int = field(UVARINT, "channel, counted within the group")
-    grid: Grid = field(GRID, "its grid in this segment")
-
-
-class OddToken(Record):
-    """A token that its grid does not print, in GROUP_NOTES."""
-
-    row: int = field(UVARINT, "rows after the exception before, or after the segment's first row")
-    channel: int = field(UVARINT, "channel, counted within the group")
-    text: bytes = field(SIZED, "the token")
-
-
-class GroupNotes(Record):
-    """The notes stream of a group in a segment."""
-
-    grid_changes: list[GridChange] = field(
-        counted(GridChange), "grids that differ from the clip's", default=[]
-    )
-    exceptions: list[OddToken] = field(
-        counted(OddToken), "tokens that the grid does not print, sorted", default=[]
-    )

@@ -25,7 +25,7 @@ def check_plain(kind: bytes, payload: bytes, where: str) -> None:
     """Raise LimitError for a chunk that a file of the profile small cannot have."""
     record = ENCODED.get(kind)
     if record is not None:
-        packed = vars(parse(record, payload, where))["encoding"] != payloads.STORED
+        packed = vars(parse(record, payload, where))["flags"] & payloads.ENCODING != payloads.STORED
     else:
         packed = kind == ChunkType.SKEL and is_packed(payload, where)
     if packed:  # LIMIT-22

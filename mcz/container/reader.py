@@ -246,7 +246,7 @@ class Container:
             raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
         check(f"SRCE {id_.hex()}: bytes", fields.size, self.profile.text_bytes)
         check_decoded(f"SRCE {id_.hex()}", fields.size, self.max_decoded)
-        return decoded(fields.data, fields.encoding, fields.size, f"SRCE {id_.hex()}")
+        return decoded(fields.data, fields.flags, fields.size, f"SRCE {id_.hex()}")
 
     def clip(self, row: ClipRow) -> payloads.Clip:
         """The fields of CLIP, compared with what the index says of them."""

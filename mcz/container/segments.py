@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from mcz.errors import ChecksumError, FormatError, TruncatedError
-from mcz.schema import MAX_COUNT, read_varint, varint
+from mcz.schema import EXTENDED, MAX_COUNT, read_varint, varint
 
 FRESH, FRAME_NOTES, GROUP_NOTES, MASKS = 1, 2, 4, 8
-KNOWN_FLAGS = 15
+KNOWN_FLAGS = 15 | EXTENDED
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +58,7 @@ class StreamTable:
     size: int
     offsets: tuple[int, ...]
     lengths: tuple[int, ...]
+    extension: bytes = b""
     _codec_start: int = field(init=False, repr=False, compare=False)  # asked for each stream
 
     def __post_init__(self) -> None:
@@ -99,8 +100,11 @@ class StreamTable:
         return runs
 
 
-def build_segment(header: SegmentHeader, streams: Sequence[bytes]) -> bytes:
-    """The DATA payload; ``streams`` in stored order, absent kinds left out."""
+def build_segment(header: SegmentHeader, streams: Sequence[bytes], extension: bytes = b"") -> bytes:
+    """The DATA payload; ``streams`` in stored order, absent kinds left out.
+
+    ``extension`` is written where the flags of ``header`` say that there is one.
+    """
     present = bytearray((len(streams) + 7) // 8)
     for index, stream in enumerate(streams):
         if stream:
@@ -114,6 +118,7 @@ def build_segment(header: SegmentHeader, streams: Sequence[bytes]) -> bytes:
             bytes((header.flags,)),
             bytes(present),
             *(varint(len(stream)) for stream in streams if stream),
+            varint(len(extension)) + extension if header.flags & EXTENDED else b"",
         )
     )
     return b"".join((table, struct.pack("<I", zlib.crc32(table)), *streams))
@@ -162,6 +167,10 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
             if length == 0:  # DATA-04
                 raise FormatError(f"stream {index} is marked as present and has no bytes")
         lengths.append(length)
+    extension = b""
+    if header.flags & EXTENDED:  # CONV-10
+        size, at = read_varint(data, at)
+        extension, at = data[at : at + size], at + size
     if at + 4 > len(data):
         raise TruncatedError(f"a stream table ends at {len(data)}")
     (stored,) = struct.unpack_from("<I", data, at)
@@ -171,7 +180,7 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
     for length in lengths:
         offsets.append(offset)
         offset += length
-    return StreamTable(header, counts, at + 4, tuple(offsets), tuple(lengths))
+    return StreamTable(header, counts, at + 4, tuple(offsets), tuple(lengths), extension)
 
 
 def mask_of(segment: bytes) -> bytes:

@@ -53,10 +53,14 @@ def _bits(vector: tuple[float, ...]) -> tuple[str, ...]:
 
 def channel_records(channels: tuple[Channel, ...]) -> list[payloads.Channel]:
     """The channels as CLIP and SKEL have them."""
-    kinds = (CHANNEL_KINDS.index(c.kind) + 1 if c.kind else 0 for c in channels)
     return [
-        payloads.Channel(kind=kind, name=c.name, unit=c.unit)
-        for kind, c in zip(kinds, channels, strict=True)
+        payloads.Channel(
+            flags=bool(c.name) * payloads.HAS_NAME | bool(c.unit) * payloads.HAS_UNIT,
+            kind=CHANNEL_KINDS.index(c.kind) + 1 if c.kind else 0,
+            name=c.name or None,
+            unit=c.unit or None,
+        )
+        for c in channels
     ]
 
 
@@ -67,7 +71,7 @@ def parse_channels(rows: Sequence[payloads.Channel], where: str) -> tuple[Channe
         known = 0 < row.kind <= len(CHANNEL_KINDS)
         kind = CHANNEL_KINDS[row.kind - 1] if known else ""  # SKEL-07
         unknown = f"kind-{row.kind}" if row.kind and not known else ""
-        channels.append(Channel(kind, row.name or unknown, row.unit))
+        channels.append(Channel(kind, row.name or unknown, row.unit or ""))
     return tuple(channels)
 
 

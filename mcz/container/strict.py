@@ -22,8 +22,9 @@ Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset(range(2, 14))
 
 
-def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
-    """The ``size`` bytes that SRCE and ATTA hold as ``data``."""
+def decoded(data: bytes, flags: int, size: int, where: str) -> bytes:
+    """The ``size`` bytes that SRCE, ATTA, COPY and META hold as ``data``."""
+    encoding = flags & payloads.ENCODING
     if encoding == payloads.STORED:
         if len(data) != size:  # ATTA-03, SRCE-01
             raise FormatError(f"{len(data)} bytes stored, {size} stated", where=where)
@@ -62,7 +63,7 @@ def check_template(payload: bytes, where: str, profile: Profile) -> int:
     """Check a SRCE; return its source format."""
     fields = parse(payloads.Srce, payload, where)
     check(f"{where}: bytes", fields.size, profile.text_bytes)
-    decoded(fields.data, fields.encoding, fields.size, where)
+    decoded(fields.data, fields.flags, fields.size, where)
     return int(fields.format)
 
 

@@ -134,8 +134,8 @@ class Writer:
     def template(self, format_id: int, template: bytes) -> bytes:
         """Write a SRCE and return its id."""
         check("template: bytes", len(template), self.profile.text_bytes)
-        encoding, data = smallest(template, short=self.short, plain=self.profile.is_plain)
-        record = payloads.Srce(format=format_id, encoding=encoding, size=len(template), data=data)
+        flags, data = smallest(template, short=self.short, plain=self.profile.is_plain)
+        record = payloads.Srce(format=format_id, flags=flags, size=len(template), data=data)
         return self.shared(ChunkType.SRCE, build(record, "SRCE"))
 
     def attachment(self, name: str, data: bytes) -> None:
@@ -148,14 +148,14 @@ class Writer:
         row = AttachmentRow(name, len(data), [])
         for part in range(n_parts):
             piece = data[part * most :][:most]
-            encoding, packed = smallest(piece, short=self.short, plain=self.profile.is_plain)
+            flags, packed = smallest(piece, short=self.short, plain=self.profile.is_plain)
             record = payloads.Atta(
                 name=name,
                 part=part,
                 n_parts=n_parts,
                 size=len(data),
                 sha256=digest,
-                encoding=encoding,
+                flags=flags,
                 part_size=len(piece),
                 data=packed,
             )
@@ -199,10 +199,12 @@ class Writer:
         rate = record.rate_numerator, record.rate_denominator
         self._clip = ClipRow(name, record.skeleton, 0, *rate, signals, chunk)
 
-    def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+    def segment(
+        self, header: SegmentHeader, streams: Sequence[bytes], extension: bytes = b""
+    ) -> None:
         """Write one segment as a closed DATA, or as a packet while a DATA is open."""
         clip = self._in_clip("DATA")
-        payload = build_segment(header, streams)
+        payload = build_segment(header, streams, extension)
         if self._next_packet is None:
             chunk = self.chunk(ChunkType.DATA, payload)
             clip.segments.append(SegmentRow(chunk.payload_offset, len(payload), header))

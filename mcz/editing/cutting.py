@@ -300,8 +300,8 @@ class _Numbers(dict[int, int]):
 
 def cut_segment(
     container: Container, part: SignalCut, row: SegmentRow, *, noted: bool, name: str
-) -> tuple[SegmentHeader, list[bytes]]:
-    """The header and the streams of what is left of a segment; ``noted``: with frame notes.
+) -> tuple[SegmentHeader, list[bytes], bytes]:
+    """Header, streams and extension of what is left of a segment; ``noted``: with frame notes.
 
     Its chunk is read whole, so that damage is found and not copied.
     """
@@ -325,7 +325,8 @@ def cut_segment(
             kept.append(stream)
     first = header.first - part.base
     lead = min(header.lead, first)
-    return SegmentHeader(part.info.index, first, header.n_frames, lead, header.tail, flags), kept
+    new = SegmentHeader(part.info.index, first, header.n_frames, lead, header.tail, flags)
+    return new, kept, table.extension
 
 
 def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int], profile: Profile) -> bytes:

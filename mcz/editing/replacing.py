@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcz.brief import brief
-from mcz.container import payloads
+from mcz.container import note_records, payloads
 from mcz.container.chunks import ChunkType, read_chunk
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.locks import lock
@@ -169,7 +169,7 @@ class _Beside:
     def add(self, flag: int, stream: bytes) -> None:
         self.size += len(stream)
         if flag == GROUP_NOTES and stream:
-            notes = parse(payloads.GroupNotes, stream, "group notes")
+            notes = parse(note_records.GroupNotes, stream, "group notes")
             self.n_exceptions += len(notes.exceptions)
 
 
@@ -245,8 +245,8 @@ class _Editor(Copier):
 
     def _segment(
         self, row: SegmentRow, index: int, noted: bool
-    ) -> tuple[SegmentHeader, list[bytes]]:
-        """Header and streams of a segment, those of the joint in their places."""
+    ) -> tuple[SegmentHeader, list[bytes], bytes]:
+        """Header, streams and extension of a segment, those of the joint in their places."""
         counts, edit = self.recoded.info.counts, self.recoded
         table, old = self.container.streams(row, counts, None)
         flags = row.header.flags & ~(FRAME_NOTES | GROUP_NOTES | MASKS)
@@ -276,7 +276,7 @@ class _Editor(Copier):
                 kept.append(
                     old[table.codec(resolution, group)] if coded is None else coded[resolution]
                 )
-        return dataclasses.replace(row.header, flags=flags), kept
+        return dataclasses.replace(row.header, flags=flags), kept, table.extension
 
     def _edited_quality(self, row: ClipRow) -> None:
         """The quality record with what is known of the new values, and the other chunks."""

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.container import payloads
+from mcz.container import note_records
 from mcz.errors import FormatError
 from mcz.motion import Exceptions
 from mcz.numbers import Grid, values_of_texts
@@ -75,7 +75,7 @@ def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str
     if not data:
         return [], []
     where = f"clip {name!r}, group notes"
-    fields = parse(payloads.GroupNotes, data, where)
+    fields = parse(note_records.GroupNotes, data, where)
     n_channels = len(grids)
     changes = [(c.channel, c.grid) for c in fields.grid_changes]
     channels = [channel for channel, _ in changes]

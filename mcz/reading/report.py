@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from mcz.clock import time_facts
 from mcz.codecs.basis_models import name_of
-from mcz.container import payloads
+from mcz.container import note_records
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
@@ -258,7 +258,7 @@ def exceptions_info(container: Container, clip: Clip) -> JsonObject:
 
 
 def _count(notes: bytes) -> int:
-    return len(parse(payloads.GroupNotes, notes, "group notes").exceptions)
+    return len(parse(note_records.GroupNotes, notes, "group notes").exceptions)
 
 
 def validate(file: File, clips: Sequence[Clip] | None = None) -> list[Problem]:

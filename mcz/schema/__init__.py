@@ -17,10 +17,12 @@ from mcz.schema.records import field as field
 from mcz.schema.records import parse as parse
 from mcz.schema.records import parse_all as parse_all
 from mcz.schema.records import parse_until as parse_until
+from mcz.schema.types import EXTENDED as EXTENDED
 from mcz.schema.types import EXTENSION as EXTENSION
 from mcz.schema.types import FINITE as FINITE
 from mcz.schema.types import POSITIVE as POSITIVE
 from mcz.schema.types import SIZED as SIZED
+from mcz.schema.types import SIZED_EXTENSION as SIZED_EXTENSION
 from mcz.schema.types import SVARINT as SVARINT
 from mcz.schema.types import TEXT as TEXT
 from mcz.schema.types import UVARINT as UVARINT

@@ -221,9 +221,13 @@ def bounded(kind: Kind, least: float, most: float) -> Checked:
     return Checked(kind, lambda value: least <= value <= most)
 
 
-def flags(*names: str) -> Checked:
-    """One byte of flags, bit 0 first; the bits without a name are reserved and must be 0."""
-    return Checked(construct.Int8ul, lambda value: value < 1 << len(names))  # CONV-14
+def flags(*names: str, extended: bool = False) -> Checked:
+    """One byte of flags, bit 0 first; the bits without a name are reserved and must be 0.
+
+    ``extended``: bit 7 says that the structure has an extension.
+    """
+    known = (1 << len(names)) - 1 | extended * EXTENDED
+    return Checked(construct.Int8ul, lambda value: not value & ~known)  # CONV-14
 
 
 def as_construct(kind: Kind) -> Construct:
@@ -254,5 +258,7 @@ SIZED = Sized()
 TEXT = Text()
 # CONV-10
 EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kept on rewriting
+EXTENDED = 0x80  # in the flags of a structure: it has an extension, which is sized
+SIZED_EXTENSION = construct.If(construct.this.flags & EXTENDED, SIZED)
 FINITE = Checked(Float64l, lambda value: value - value == 0)  # SKEL-08
 POSITIVE = Checked(UVARINT, lambda value: value >= 1)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Layout
-from mcz.container import payloads
+from mcz.container import note_records
 from mcz.container.masks import build_mask
 from mcz.errors import MotionError
 from mcz.formats import recording_of
@@ -99,19 +99,20 @@ class MemorySource:
         changed = [c for c, grid in enumerate(signal.grids) if grid != self.layout.grids[c]]
         if not changed and not len(signal.exceptions):
             return []
-        notes = [payloads.GroupNotes() for _ in self.layout.groups]
+        notes = [note_records.GroupNotes() for _ in self.layout.groups]
         groups = enumerate(self.layout.groups)
         where = {c: (g, column) for g, group in groups for column, c in enumerate(group)}
         for channel in changed:
             group, column = where[channel]
-            change = payloads.GridChange(channel=column, grid=signal.grids[channel])
+            change = note_records.GridChange(channel=column, grid=signal.grids[channel])
             notes[group].grid_changes.append(change)
         before = [0] * len(notes)
         found = signal.exceptions
         for number, channel, text in zip(found.rows, found.channels, found.texts, strict=True):
             group, column = where[int(channel)]
             row = int(number) - before[group]
-            notes[group].exceptions.append(payloads.OddToken(row=row, channel=column, text=text))
+            odd = note_records.OddToken(row=row, channel=column, text=text)
+            notes[group].exceptions.append(odd)
             before[group] = int(number)
         return [build(n, "group notes") if n.grid_changes or n.exceptions else b"" for n in notes]
 

@@ -237,9 +237,9 @@ class Mutation:
             return self._payload(pieces, which)
         try:
             fields = parse(payloads.Srce, pieces[which].payload, "SRCE")
-            text = decoded(fields.data, fields.encoding, fields.size, "SRCE")
+            text = decoded(fields.data, fields.flags, fields.size, "SRCE")
             fields.data = self._bytes(text, 32)
-            fields.size, fields.encoding = len(fields.data), payloads.STORED
+            fields.size, fields.flags = len(fields.data), payloads.STORED
             return with_payload(pieces, which, build(fields, "SRCE"))
         except MczError:
             return None

@@ -15,9 +15,9 @@ const MOST_ENTRIES = 2 ** 22;
 
 /** Models that a clip may name although the file does not have them: id -> annex file. */
 const WELL_KNOWN = new Map([
-  ["6314e42fa36324205b81a0490d142f2a", "bases_cmu31.bin"],
-  ["fd15929e41cd04c934ae86e9f8b797e6", "bases_cmu31_virtual.bin"],
-  ["49f008f8628e2bd2722c996ef5047c40", "bases_cmu38.bin"],
+  ["9e21518cd57da5564b2362dd3e394e29", "bases_cmu31.bin"],
+  ["3aba5ed6cd44d0a7641f88dae9d78f4b", "bases_cmu31_virtual.bin"],
+  ["70c0977dda6720bd2f4c06329e8542a4", "bases_cmu38.bin"],
 ]);
 
 /** Bases that were decoded last, by data; together at most so many entries. */

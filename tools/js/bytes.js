@@ -5,6 +5,9 @@ import { Refused } from "./errors.js";
 const utf8 = new TextDecoder("utf-8", { fatal: true, ignoreBOM: true });
 const TWO_32 = 2 ** 32;
 
+/** The bit of the flags of a structure that has an extension. */
+export const EXTENDED = 128;
+
 /** Largest count, size and offset of a file. */
 const MAX_COUNT = Number.MAX_SAFE_INTEGER;
 
@@ -193,6 +196,11 @@ export class ByteReader {
     const value = this.u8();
     if (value & ~known) this.refuse(`reserved bits are set in flags ${value}`);
     return value;
+  }
+
+  /** The extension of a structure whose flags say that it has one: nobody reads it. */
+  extension(flags) {
+    if (flags & EXTENDED) this.sized();
   }
 
   /** The end of a closed structure. */

@@ -1,6 +1,6 @@
 // SPEC.md, "CLIP": a clip, its signals, their grids and groups.
 
-import { ByteReader, count, hex } from "./bytes.js";
+import { ByteReader, EXTENDED, count, hex } from "./bytes.js";
 import { Refused } from "./errors.js";
 import { INTEGER, parseGrid } from "./grids.js";
 import { readNeeds } from "./head.js";
@@ -129,12 +129,14 @@ function readMetadata(reader) {
 }
 
 function readClipSource(reader, file) {
+  const flags = reader.flags(EXTENDED);
   const template = file.templates.get(hex(reader.take(ID_SIZE)));
   if (!template) reader.refuse("the SRCE of its source does not come before it");
   const format = reader.u8();
   const detail = reader.sized();
   const path = reader.text();
   const size = reader.varint();
+  reader.extension(flags);
   if (path !== "") checkPath(path, reader.what);
   checkSourceFormat(format, template, "clip", reader.what);
   return { template, format, detail, path, size };
@@ -164,7 +166,8 @@ function checkRoles(reader, signals, timeBase) {
 
 function readSignal(reader, index, skeleton, limits) {
   const name = reader.text();
-  const ownChannels = (reader.flags(FLAG_OWN_CHANNELS) & FLAG_OWN_CHANNELS) !== 0;
+  const flags = reader.flags(FLAG_OWN_CHANNELS | EXTENDED);
+  const ownChannels = (flags & FLAG_OWN_CHANNELS) !== 0;
   const role = reader.u8();
   const of = role === RESIDUALS ? reader.varint() : null;
   const channels = ownChannels
@@ -183,7 +186,7 @@ function readSignal(reader, index, skeleton, limits) {
   const groupSizes = readGroups(reader, channels, ownChannels);
   const nResolutions = reader.u8();
   if (nResolutions === 0) reader.refuse("no resolutions");
-  reader.sized();
+  reader.extension(flags);
   return {
     name,
     index,

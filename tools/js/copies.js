@@ -4,7 +4,7 @@ import { ByteReader, sameBytes } from "./bytes.js";
 import { FRAMING_SIZE } from "./chunks.js";
 import { Refused } from "./errors.js";
 import { within } from "./limits.js";
-import { decoded } from "./shared.js";
+import { decoded, encodingFlags } from "./shared.js";
 
 /** The types of the chunks of which there may be copies. */
 export const COPIED = new Set(["HEAD", "SKEL", "MODL", "SRCE", "ALIA", "CLIP", "CEND"]);
@@ -53,8 +53,9 @@ export function copiesIn({ offset, payload }, limit) {
 
 function readContent(payload, limit) {
   const reader = new ByteReader(payload, "COPY");
-  const encoding = reader.u8();
+  const flags = encodingFlags(reader);
   const size = reader.varint();
+  reader.extension(flags);
   within(size, limit, "bytes of copies");
-  return decoded(encoding, reader.rest(), size, "COPY");
+  return decoded(flags, reader.rest(), size, "COPY");
 }

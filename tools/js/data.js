@@ -1,6 +1,6 @@
 // SPEC.md, "DATA": segments with their stream table, group notes and masks.
 
-import { ByteReader, count } from "./bytes.js";
+import { ByteReader, EXTENDED, count } from "./bytes.js";
 import { crc32 } from "./crc32.js";
 import { Refused } from "./errors.js";
 import { INTEGER, hasText, parseGrid } from "./grids.js";
@@ -53,6 +53,7 @@ export function readSegment(payload, clip, limits) {
   segment.payload = payload;
   segment.tableAt = reader.at;
   const lengths = readTable(reader, nStreams(segment.flags, signal));
+  reader.extension(segment.flags);
   const crc = crc32(payload, 0, reader.at);
   if (reader.u32() !== crc) reader.refuse("the table_crc is wrong");
   for (const length of lengths) reader.skip(length);
@@ -67,7 +68,7 @@ export function segmentFields(reader) {
   const nFrames = reader.varint();
   const lead = reader.varint();
   const tail = reader.varint();
-  const known = FLAG_FRESH | FLAG_FRAME_NOTES | FLAG_GROUP_NOTES | FLAG_MASKS;
+  const known = FLAG_FRESH | FLAG_FRAME_NOTES | FLAG_GROUP_NOTES | FLAG_MASKS | EXTENDED;
   const flags = reader.flags(known);
   return { signal, firstFrame, nFrames, lead, tail, flags };
 }
@@ -193,6 +194,7 @@ export function takeStreams({ payload, tableAt, flags, mask }, signal) {
   }
   const reader = new ByteReader(payload, "DATA", tableAt);
   const lengths = readTable(reader, nStreams(flags, signal));
+  reader.extension(flags);
   reader.u32();
   let next = 0;
   const take = () => {

@@ -2,7 +2,7 @@
 
 import { ByteReader } from "./bytes.js";
 import { indexLimit, within } from "./limits.js";
-import { decoded } from "./shared.js";
+import { decoded, encodingFlags } from "./shared.js";
 
 /** Keys that belong to the values and the source of a clip: nothing behind it may say them. */
 const INTERPRETED = new Set(["name-encoding", "skeleton-note", "source-note"]);
@@ -17,10 +17,11 @@ const INTERPRETED = new Set(["name-encoding", "skeleton-note", "source-note"]);
  */
 export function readRecords(payload, fileBytes) {
   const outer = new ByteReader(payload, "META");
-  const encoding = outer.u8();
+  const flags = encodingFlags(outer);
   const size = outer.varint();
+  outer.extension(flags);
   within(size, indexLimit(fileBytes), "bytes of metadata");
-  const reader = new ByteReader(decoded(encoding, outer.rest(), size, "META"), "META, decoded");
+  const reader = new ByteReader(decoded(flags, outer.rest(), size, "META"), "META, decoded");
   const records = [];
   while (reader.left > 0) records.push(readRecord(reader));
   return records;

@@ -20,7 +20,7 @@ export const CHECK_SIZE = 4;
 const MOST_SEQUENCE = 8; // bytes of a sequence number
 
 /** What INDX adds to the flags of a segment in a packet, by the kind of the packet. */
-const INDEX_FLAGS = { [KIND_SEGMENT]: 128, [KIND_FRAME]: 64 };
+const INDEX_FLAGS = { [KIND_SEGMENT]: 64, [KIND_FRAME]: 32 };
 
 /**
  * The kind of the packet that a segment is, as an index says it; 0 of a closed DATA.

@@ -1,21 +1,34 @@
 // SPEC.md, "Shared chunks": SRCE, MODL, ATTA, ALIA and paths.
 
-import { ByteReader, hex, sameBytes, textOf } from "./bytes.js";
+import { ByteReader, EXTENDED, hex, sameBytes, textOf } from "./bytes.js";
 import { Refused } from "./errors.js";
 import { inflate } from "./inflate.js";
 import { within } from "./limits.js";
 import { Sha256 } from "./sha256.js";
 import { inflateAfterWords } from "./words.js";
 
-const STORED = 0;
+const ENCODING = 3; // mask of the bits of flags: 0 stored
 const RAW_DEFLATE = 1;
 const AFTER_WORDS = 2;
 
-/** Decodes the `data` of SRCE, ATTA and COPY. */
-export function decoded(encoding, data, size, what) {
+/**
+ * Reads the flags of SRCE, ATTA, COPY or META.
+ *
+ * @param {ByteReader} reader
+ * @returns {number}
+ * @throws {Refused}
+ */
+export function encodingFlags(reader) {
+  const flags = reader.flags(ENCODING | EXTENDED);
+  if ((flags & ENCODING) > AFTER_WORDS) reader.refuse(`encoding ${flags & ENCODING}`);
+  return flags;
+}
+
+/** Decodes the `data` of SRCE, ATTA, COPY and META. */
+export function decoded(flags, data, size, what) {
+  const encoding = flags & ENCODING;
   if (encoding === RAW_DEFLATE) return inflate(data, size, what);
   if (encoding === AFTER_WORDS) return inflateAfterWords(data, size, what);
-  if (encoding !== STORED) throw new Refused(`${what}: encoding ${encoding}`);
   if (data.length !== size) throw new Refused(`${what}: ${data.length} bytes, not ${size}`);
   return data;
 }
@@ -30,10 +43,11 @@ export function decoded(encoding, data, size, what) {
 export function readTemplate(payload, limits, limit) {
   const reader = new ByteReader(payload, "SRCE");
   const format = reader.u8();
-  const encoding = reader.u8();
+  const flags = encodingFlags(reader);
   const size = reader.varint();
+  reader.extension(flags);
   within(size, Math.min(limits.templateBytes, limit), "bytes of a template");
-  return { format, data: decoded(encoding, reader.rest(), size, "SRCE") };
+  return { format, data: decoded(flags, reader.rest(), size, "SRCE") };
 }
 
 /**
@@ -43,7 +57,10 @@ export function readTemplate(payload, limits, limit) {
  */
 export function readModel(payload) {
   const reader = new ByteReader(payload, "MODL");
-  return { kind: reader.varint(), data: reader.rest() };
+  const flags = reader.flags(EXTENDED);
+  const kind = reader.varint();
+  reader.extension(flags);
+  return { kind, data: reader.rest() };
 }
 
 /** An attached file, put together from its ATTA chunks, which follow one another. */
@@ -84,11 +101,11 @@ export class Attachment {
     }
     if (!this.hasPart(part)) this.refuse("its parts do not agree");
     within(this.found + part.partSize, this.limit, `bytes of attachment ${this.name}`);
-    const bytes = decoded(part.encoding, part.data, part.partSize, `ATTA ${this.name}`);
+    const bytes = decoded(part.flags, part.data, part.partSize, `ATTA ${this.name}`);
     this.found += bytes.length;
     this.hash.update(bytes);
     // What inflates to more is inflated anew when it is asked for.
-    this.parts.push({ encoding: part.encoding, data: part.data, size: part.partSize });
+    this.parts.push({ flags: part.flags, data: part.data, size: part.partSize });
     if (!this.complete) return;
     if (this.found !== this.size) this.refuse(`${this.found} bytes, not the stated ${this.size}`);
     if (!sameBytes(this.hash.digest(), this.sha256)) this.refuse("the hash is wrong");
@@ -108,7 +125,7 @@ export class Attachment {
     const out = new Uint8Array(this.size);
     let at = 0;
     for (const part of this.parts) {
-      out.set(decoded(part.encoding, part.data, part.size, `ATTA ${this.name}`), at);
+      out.set(decoded(part.flags, part.data, part.size, `ATTA ${this.name}`), at);
       at += part.size;
     }
     return out;
@@ -126,11 +143,12 @@ function readPart(payload) {
   const nParts = reader.varint();
   const size = reader.varint();
   const sha256 = reader.take(32);
-  const encoding = reader.u8();
+  const flags = encodingFlags(reader);
   const partSize = reader.varint();
+  reader.extension(flags);
   const data = reader.rest();
   if (nParts < 1) reader.refuse("a file of no parts");
-  return { name, part, nParts, size, sha256, encoding, partSize, data };
+  return { name, part, nParts, size, sha256, flags, partSize, data };
 }
 
 export const ALIAS_OF = { CLIP: 0, SKELETON: 1, ATTACHMENT: 2 };
@@ -146,7 +164,7 @@ export function readAlias(payload, file) {
   const name = reader.text();
   const of = reader.u8();
   const bytes = reader.sized();
-  reader.end();
+  reader.rest();
   checkPath(name, "ALIA");
   const target = aliasTarget(of, bytes, file);
   if (!target) throw new Refused(`ALIA ${name}: its target does not come before it`);

@@ -1,6 +1,6 @@
 // SPEC.md, "SKEL": skeletons, joints and channels.
 
-import { ByteReader, hex } from "./bytes.js";
+import { ByteReader, EXTENDED, hex } from "./bytes.js";
 import { within } from "./limits.js";
 import { checkSourceFormat } from "./registry.js";
 import { inflateAfterWords } from "./words.js";
@@ -10,6 +10,8 @@ const FLAG_PACKED = 2;
 const FLAG_ADDS = 1;
 const FLAG_OFFSET = 2;
 const FLAG_AXIS = 4;
+const FLAG_NAME = 1;
+const FLAG_UNIT = 2;
 const MAX_ANGLE_UNIT = 2;
 const MAX_UP_AXIS = 3;
 const MAX_AXIS_ORDER = 5;
@@ -119,12 +121,13 @@ function readJoint(reader, index, firstColumn) {
   const name = reader.text();
   const parent = reader.varint() - 1;
   if (parent >= index) reader.refuse(`joint ${index} comes before its parent ${parent}`);
-  const flags = reader.flags(FLAG_ADDS | FLAG_OFFSET | FLAG_AXIS);
+  const flags = reader.flags(FLAG_ADDS | FLAG_OFFSET | FLAG_AXIS | EXTENDED);
   const offset = flags & FLAG_OFFSET ? readPoint(reader) : [0, 0, 0];
   const axis = flags & FLAG_AXIS ? readPoint(reader) : [0, 0, 0];
   const axisOrder = flags & FLAG_AXIS ? upTo(MAX_AXIS_ORDER, reader, "axis_order") : 0;
   const tails = reader.counted(readPoint);
   const channels = reader.counted(() => readChannel(reader, index));
+  reader.extension(flags);
   const positionsAdd = (flags & FLAG_ADDS) !== 0;
   return { name, parent, positionsAdd, offset, axis, axisOrder, tails, channels, firstColumn };
 }
@@ -141,5 +144,10 @@ function readPoint(reader) {
  * @returns {Channel}
  */
 export function readChannel(reader, joint) {
-  return { kind: reader.u8(), name: reader.text(), unit: reader.text(), joint };
+  const flags = reader.flags(FLAG_NAME | FLAG_UNIT | EXTENDED);
+  const kind = reader.u8();
+  const name = flags & FLAG_NAME ? reader.text() : "";
+  const unit = flags & FLAG_UNIT ? reader.text() : "";
+  reader.extension(flags);
+  return { kind, name, unit, joint };
 }

@@ -216,7 +216,7 @@ export class Walk {
   readAlias({ payload }) {
     const alias = readAlias(payload, this.file);
     if (this.file.aliases.has(alias.name)) this.refuse(`a second alias ${alias.name}`);
-    this.file.aliases.set(alias.name, { ...alias, payload });
+    this.file.aliases.set(alias.name, alias);
   }
 
   readClip({ payload, offset }) {

@@ -21,7 +21,7 @@ from mcz.container.segments import SegmentHeader
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
-from tools.vectors.build import motions
+from tools.vectors.build import extensions, motions
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.edits import Made, both, indexed, put, raw_stream
 from tools.vectors.build.files import Crafter, file_of, finished, rehash
@@ -239,6 +239,19 @@ def copies(stored: bool = False, few: int | None = None) -> bytes:
     content = content_of(copies_of(crafter)[:few], crafter.offset)
     crafter.plain_chunk(ChunkType.COPY, payload_of(content, stored=stored), ChunkFlag.ANCILLARY)
     return finished(crafter, index=False)
+
+
+@base
+def everything() -> Base:
+    """A clip with a source, one with channels of its own, an attachment and its alias."""
+    texts = tuple((name, b"attached " * 9) for name in ("b.txt", "c.txt"))
+    return Base((take(PLAIN, "plain"), own_channels()), None, (("plain.bvh", PLAIN), *texts))
+
+
+@base
+def extended() -> bytes:
+    """Everything, and an extension in each structure."""
+    return extensions.extended(*everything().motions)
 
 
 @base

@@ -109,7 +109,7 @@ _LIVE_TESTS = {
 }
 
 ARGUED: dict[str, str] = {
-    "CONV-11": _REWRITER + "test_extract.py::test_listed_groups_and_extensions",
+    "CONV-11": _REWRITER + "test_extract.py::test_extensions_are_kept_in_what_is_cut",
     "CHUNK-04": "a file that breaks it has more than 2 GiB, or ends before the chunk (CHUNK-05)",
     "CHUNK-07": "of what a reader tells its caller where that asked for unverified parts: shown by "
     "tests/test_parts.py::test_the_command_says_what_is_unverified",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from mcz.container import payloads
+from mcz.container import copy_records
 from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
 from mcz.container.copies import Copy
 from mcz.schema import deflate, varint
@@ -38,5 +38,5 @@ def payload_of(content: bytes, *, size: int | None = None, stored: bool = False)
     """The payload of a COPY; ``size`` is what it says that there is."""
     data = content if stored else deflate(content)
     stated = len(content) if size is None else size
-    fields = {"encoding": int(not stored), "size": stated, "data": data}
-    return built(payloads.Copy, fields, "COPY")
+    fields = {"flags": int(not stored), "size": stated, "data": data}
+    return built(copy_records.Copy, fields, "COPY")

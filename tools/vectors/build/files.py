@@ -135,7 +135,8 @@ class Crafter(Writer):
     "end_packet" edit their bytes. ``frames``: those of signal 0 from this number on that have one
     stream beside the mask of those before are packets of kind 2. ``anew``: a segment that starts
     fresh begins an open DATA. ``repeat``: a REPT, which "REPT" edits, precedes the open DATA of
-    these numbers, from 0. ``continued``: each INDX continues the one before.
+    these numbers, from 0. ``continued``: each INDX continues the one before. ``extension`` is that
+    of segments whose flags say that they have one.
     """
 
     def __init__(
@@ -149,6 +150,7 @@ class Crafter(Writer):
         **edits: Callable[..., Any],
     ) -> None:
         self.edits = edits
+        self.extension = b""
         self.anew = anew
         self.repeat = repeat
         self.continued = False
@@ -204,12 +206,14 @@ class Crafter(Writer):
         for part, piece in enumerate(pieces):
             packed = deflate(piece)
             shorter = len(packed) < len(piece)
-            fields = {"part": part, "part_size": len(piece), "encoding": int(shorter)}
+            fields = {"part": part, "part_size": len(piece), "flags": int(shorter)}
             fields["data"] = packed if shorter else piece
             row.parts.append(self.chunk(b"ATTA", built(payloads.Atta, common | fields, name)))
         self.directory.attachments[name] = row
 
-    def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+    def segment(
+        self, header: SegmentHeader, streams: Sequence[bytes], extension: bytes = b""
+    ) -> None:
         self._made.append((header, streams))
 
     def end_clip(self, n_frames: int, source_sha256: bytes, value_sha256: Sequence[bytes]) -> None:
@@ -224,7 +228,7 @@ class Crafter(Writer):
             if self._is_frame(header, streams):
                 self._frame(header, streams[-1])
                 continue
-            payload = self.edited("DATA", build_segment(header, streams))
+            payload = self.edited("DATA", build_segment(header, streams, self.extension))
             self._segment(header, payload)
         row = self._clip
         super().end_clip(n_frames, source_sha256, value_sha256)
@@ -448,7 +452,7 @@ def attached(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
 
     def edit(payload: bytes) -> bytes:
         fields = parse(payloads.Atta, payload, "ATTA")
-        update(fields, {"encoding": 1, "size": size, "part_size": size, "data": stream})
+        update(fields, {"flags": 1, "size": size, "part_size": size, "data": stream})
         return built(payloads.Atta, fields, "ATTA")
 
     def row(fields: Any) -> Any:

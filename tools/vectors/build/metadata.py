@@ -28,7 +28,7 @@ def payload_of(
     data = content if stored else deflate(content, words=words() if after else b"")
     encoding = 0 if stored else 2 if after else 1
     fields = {
-        "encoding": encoding,
+        "flags": encoding,
         "size": len(content) if size is None else size,
         "data": data,
     }

@@ -210,11 +210,11 @@ def with_template(edit: Edit, *, deflated: bool = False) -> Edit:
     def edit_payload(payload: bytes) -> bytes:
         fields = parse(payloads.Srce, payload, "SRCE")
         text = fields.data
-        if fields.encoding:
+        if fields.flags & payloads.ENCODING:
             text = inflate(fields.data, fields.size, "SRCE")
         text = edit(text)
         packed = deflate(text) if deflated else text
-        update(fields, {"encoding": int(deflated), "size": len(text), "data": packed})
+        update(fields, {"flags": int(deflated), "size": len(text), "data": packed})
         return built(payloads.Srce, fields, "SRCE")
 
     return edit_payload

@@ -14,7 +14,7 @@ def after_words(payload: bytes) -> bytes:
     """A SRCE whose template, deflated until now, is deflated after words."""
     fields = parse(payloads.Srce, payload, "SRCE")
     text = inflate(fields.data, fields.size, "SRCE")
-    packed = {"encoding": payloads.AFTER_WORDS, "data": deflate(text, words=words())}
+    packed = {"flags": payloads.AFTER_WORDS, "data": deflate(text, words=words())}
     return built(payloads.Srce, vars(fields) | packed, "SRCE")
 
 

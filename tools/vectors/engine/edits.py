@@ -203,8 +203,12 @@ class Editor:
     def _swap(self, rest: str) -> None:
         """``swap CLIP.signals.0 CLIP.signals.1``: items of a list."""
         one, other = (Target.of(FIELD.fullmatch(word)) for word in rest.split())
-        part = self.layout.find(one.type, one.number)
-        part.payload = swapped(SCHEMAS[one.name], part.payload, one.path, other.path)
+        part, view = self.layout.find(one.type, one.number), VIEWS.get(one.name)
+        if view is None:
+            part.payload = swapped(SCHEMAS[one.name], part.payload, one.path, other.path)
+        else:
+            inner = swapped(view.schema, view.read(part.payload), one.path, other.path)
+            part.payload = view.write(part.payload, inner)
 
     def _edit(self, match: re.Match[str]) -> None:
         target = Target.of(match)

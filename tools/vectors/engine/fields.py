@@ -6,13 +6,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.container import index_records, payloads
+from mcz.container import copy_records, index_records, note_records, payloads
 from mcz.container.index_records import Index
 from mcz.container.packed import words
+from mcz.container.strict import decoded
 from mcz.formats import notes
 from mcz.formats.c3d_layout import C3dDetail, C3dTemplate
 from mcz.formats.layout import Detail, Template
-from mcz.schema import Record, build, deflate, inflate, parse, read_varint, varint
+from mcz.schema import (
+    Record,
+    build,
+    counted,
+    deflate,
+    field,
+    parse,
+    parse_all,
+    read_varint,
+    varint,
+)
 from tools.records import built, span
 
 SCHEMAS: dict[str, Any] = {
@@ -24,7 +35,7 @@ SCHEMAS: dict[str, Any] = {
     "ALIA": payloads.Alia,
     "CLIP": payloads.Clip,
     "CEND": payloads.Cend,
-    "COPY": payloads.Copy,
+    "COPY": copy_records.Copy,
     "META": payloads.Meta,
     "QUAL": payloads.Qual,
     "INDX": index_records.Indx,
@@ -44,14 +55,7 @@ class View:
 
 def _content(payload: bytes) -> bytes:
     fields = parse(payloads.Srce, payload, "SRCE")
-    if fields.encoding == payloads.STORED:
-        return fields.data
-    known = words() if fields.encoding == payloads.AFTER_WORDS else b""
-    return (
-        inflate(fields.data, fields.size, "SRCE", words=known)
-        if known
-        else inflate(fields.data, fields.size, "SRCE")
-    )
+    return decoded(fields.data, fields.flags, fields.size, "SRCE")
 
 
 def _with_content(payload: bytes, content: bytes) -> bytes:
@@ -61,19 +65,34 @@ def _with_content(payload: bytes, content: bytes) -> bytes:
         payloads.STORED: lambda: content,
         payloads.DEFLATED: lambda: deflate(content),
         payloads.AFTER_WORDS: lambda: deflate(content, words=words()),
-    }[fields.encoding]()
+    }[fields.flags & payloads.ENCODING]()
     return built(payloads.Srce, vars(fields) | {"size": len(content), "data": packed}, "SRCE")
 
 
 def _copied(payload: bytes) -> bytes:
-    """The content of a COPY or META: encoding, size, data."""
+    """The content of a COPY or META: flags, size, data."""
     size, at = read_varint(payload, 1)
-    return payload[at:] if payload[0] == payloads.STORED else inflate(payload[at:], size, "COPY")
+    return decoded(payload[at:], payload[0], size, "COPY")
 
 
 def _with_copied(payload: bytes, content: bytes) -> bytes:
     data = content if payload[0] == payloads.STORED else deflate(content)
     return payload[:1] + varint(len(content)) + data
+
+
+class CopiedChunks(Record):
+    """The content of a COPY as a list."""
+
+    copies: list[copy_records.CopiedChunk] = field(counted(copy_records.CopiedChunk), "the copies")
+
+
+def _copy_list(payload: bytes) -> bytes:
+    content = _copied(payload)
+    return varint(len(parse_all(copy_records.CopiedChunk, content, "COPY"))) + content
+
+
+def _with_copy_list(payload: bytes, content: bytes) -> bytes:
+    return _with_copied(payload, content[read_varint(content, 0)[1] :])
 
 
 def _inside(schema: Any, path: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -98,13 +117,14 @@ VIEWS: dict[str, View] = {
     "DETAIL": View(b"CLIP", Detail, *_inside(payloads.Clip, "source.0.detail")),
     "C3DDETAIL": View(b"CLIP", C3dDetail, *_inside(payloads.Clip, "source.0.detail")),
     "COPIES": View(b"COPY", None, _copied, _with_copied),
+    "COPIED": View(b"COPY", CopiedChunks, _copy_list, _with_copy_list),
     "RECORDS": View(b"META", None, _copied, _with_copied),
     "HEADER": View(b"CLIP", None, *_inside(payloads.Clip, "signals.0.header")),
     "HEADER1": View(b"CLIP", None, *_inside(payloads.Clip, "signals.1.header")),
 }
 STREAMS: dict[str, type[Record] | None] = {
     "DATA": None,
-    "NOTES": payloads.GroupNotes,
+    "NOTES": note_records.GroupNotes,
     "ROWS": notes.Notes,
 }
 

@@ -43,7 +43,7 @@ from mcz.container.segments import parse_header as parse_segment
 from mcz.container.source import open_source
 from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
-from mcz.schema import build, deflate, parse, read_varint
+from mcz.schema import EXTENDED, build, deflate, parse, read_varint
 
 SHARED = (b"SKEL", b"MODL", b"SRCE")
 REFER = (b"SKEL", b"CLIP", b"ALIA")  # chunks that name shared ones
@@ -57,12 +57,13 @@ class Segment:
 
     header: SegmentHeader
     streams: list[bytes]
+    extension: bytes = b""
 
     @classmethod
     def of(cls, payload: bytes) -> Segment:
         """The parts of ``payload``; streams at the end may be missing that are empty."""
         header, start = parse_segment(payload)
-        for size in range(len(payload)):
+        for size in (*range(1, len(payload)), 0):  # most have streams
             at, bitmap = start + size, int.from_bytes(payload[start : start + size], "little")
             lengths = []
             for index in range(8 * size):
@@ -70,6 +71,10 @@ class Segment:
                 if bitmap >> index & 1:
                     length, at = read_varint(payload, at)
                 lengths.append(length)
+            extension = b""
+            if header.flags & EXTENDED and at < len(payload):
+                length, at = read_varint(payload, at)
+                extension, at = payload[at : at + length], at + length
             if payload[at : at + 4] == struct.pack("<I", zlib.crc32(payload[:at])):
                 break
         else:
@@ -78,10 +83,10 @@ class Segment:
         for length in lengths:
             streams.append(payload[at : at + length])
             at += length
-        return cls(header, streams)
+        return cls(header, streams, extension)
 
     def build(self) -> bytes:
-        return build_segment(self.header, self.streams)
+        return build_segment(self.header, self.streams, self.extension)
 
 
 @dataclass(eq=False)

@@ -6,6 +6,7 @@ import hashlib
 import struct
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from mcz.container.packets import END, Packet, build_packet
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from mcz.schema import inflate, parse
-from tools.records import built
+from tools.records import built, extend
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.edits import Made, at, both, headed, plus, put, swap
 from tools.vectors.build.files import (
@@ -236,7 +237,7 @@ def _extensions(shelf: Whole) -> None:
     crafter = Crafter()
     crafter.clip(dance())
     crafter.ancillary(b"QUAL", built(payloads.Qual, {"entries": [], "extension": LATER}, "QUAL"))
-    signal = put(payloads.Clip, "signals.0.extension", bytes((len(LATER),)) + LATER)
+    signal = partial(extend, payloads.Clip, path="signals.0", more=LATER)
     cases = (
         ("HEAD", "HEAD", file_of(dance(), HEAD=plus(LATER))),
         ("SKEL", "SKEL", file_of(dance(), SKEL=plus(LATER))),

@@ -26,7 +26,7 @@ from mcz.container.versions import FORMAT
 from mcz.motion import Motion
 from mcz.schema import build, deflate, parse, varint
 from mcz.writing.clip_writer import write_skeleton
-from tools.records import built
+from tools.records import built, extend
 from tools.vectors.build.edits import both, plus, put
 from tools.vectors.build.files import Crafter, Vector, arrays, partial
 from tools.vectors.build.random_clips import clip
@@ -165,7 +165,7 @@ class _Maker:
             crafter.shared(b"MODL", built(payloads.Modl, fields, "MODL"))
         elif which == 2:
             data = self.bytes()
-            fields = {"format": 3, "encoding": 1, "size": len(data), "data": deflate(data)}
+            fields = {"format": 3, "flags": 1, "size": len(data), "data": deflate(data)}
             crafter.shared(b"SRCE", built(payloads.Srce, fields, "SRCE"))
         else:
             for (kind, _), place in list(crafter.directory.shared.items())[:1]:
@@ -262,8 +262,7 @@ class _Maker:
             ]
             if self.says("an extension of a signal", 0.15):
                 more = self.bytes()
-                edit = put(payloads.Clip, f"{place}.extension", varint(len(more)) + more)
-                clip_edits.append(edit)
+                clip_edits.append(lambda p, at=place, more=more: extend(payloads.Clip, p, at, more))
         gaps = b"\0"
         if opened:
             clip_edits.append(_opened)

@@ -48,7 +48,7 @@ def _attachments(shelf: Broken) -> None:
         ("hash", "A hash that is not that of the parts.", put(payloads.Atta, "sha256", b"h" * 32)),
         ("size", "The parts are shorter than the size.", put(payloads.Atta, "size", b"\x0d")),
         ("part-size", "A part is shorter than it says.", of(1, "part_size", b"\7")),
-        ("encoding", "An encoding beyond the table.", of(1, "encoding", b"\3")),
+        ("encoding", "An encoding beyond the table.", of(1, "flags", b"\3")),
     )
     for name, purpose, edit in cases:
         shelf.add(f"ATTA-{name}", "ATTA", purpose, _attached(edit))

@@ -141,7 +141,7 @@ def _templates(shelf: Broken) -> None:
         ),
         ("deflate-tail", "Conventions", "A byte follows the deflate stream.", plus(b"\0")),
         ("deflate-end", "Conventions", "The deflate stream has no end.", lambda data: data[:-1]),
-        ("encoding", "", "An encoding beyond the table.", field("encoding", b"\3")),
+        ("encoding", "", "An encoding beyond the table.", field("flags", b"\3")),
         ("stored-size", "", "Stored, of another size than stated.", stored),
     )
     for name, heading, purpose, edit in cases:
@@ -160,7 +160,7 @@ def _bounds(shelf: Broken) -> None:
     data = file_of(take(PLAIN, "plain"), SRCE=lambda p: p[:4] + b"\x07" + p[5:])
     shelf.add("SRCE-deflate-block", spec, "A template: It is no deflate stream.", data)
     crafter = Crafter()
-    huge = {"format": 3, "encoding": 1, "size": 2**26 + 1, "data": deflate(bytes(2**26 + 1))}
+    huge = {"format": 3, "flags": 1, "size": 2**26 + 1, "data": deflate(bytes(2**26 + 1))}
     crafter.shared(b"SRCE", built(payloads.Srce, huge, "SRCE"))
     purpose = "A template of 2^26 + 1 bytes in the base profile."
     shelf.add("SRCE-limit", "SRCE; Limits and profiles", purpose, finished(crafter))

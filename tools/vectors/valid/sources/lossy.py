@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs.contract import Codec
-from mcz.container import payloads
+from mcz.container import note_records, payloads
 from mcz.container.segments import GROUP_NOTES
 from mcz.formats import amc, asf
 from mcz.motion import Motion, Signal
@@ -250,7 +250,7 @@ def _changes(shelf: Whole) -> None:
         (first, (header, streams)) = made
         none: dict[str, Any] = {"exceptions": []}
         notes = [
-            built(payloads.GroupNotes, none | changes[c], "notes") if c in changes else b""
+            built(note_records.GroupNotes, none | changes[c], "notes") if c in changes else b""
             for c in range(signal.n_channels)
         ]
         return [first, (replace(header, flags=header.flags | GROUP_NOTES), [*notes, *streams])]

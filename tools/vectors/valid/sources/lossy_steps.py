@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.codecs.parameters import SCALED
-from mcz.container import payloads
+from mcz.container import note_records
 from mcz.container.segments import GROUP_NOTES
 from mcz.formats import bvh, c3d
 from mcz.motion import Exceptions, Motion, Signal
@@ -89,7 +89,7 @@ def _lossy_exceptions(shelf: Whole) -> None:
         found = []
         for (header, streams), column, text in zip(segments, columns, texts, strict=True):
             entry = {"row": 0, "channel": 0, "text": text}
-            note = built(payloads.GroupNotes, {"grid_changes": [], "exceptions": [entry]}, "")
+            note = built(note_records.GroupNotes, {"grid_changes": [], "exceptions": [entry]}, "")
             notes = [note if c == column else b"" for c in range(6)]
             flagged = replace(header, flags=header.flags | GROUP_NOTES)
             found.append((flagged, [*notes, *streams]))
