@@ -13,7 +13,7 @@ from mcz import compare, sample
 from mcz.codecs import CODECS, bitstream
 from mcz.codecs.basis_models import name_of
 from mcz.codecs.online.options import PRESET_IDS
-from mcz.container import limits, packets
+from mcz.container import limits
 from mcz.container.chunks import FLAGS_OF
 from mcz.container.versions import FORMAT_NAME
 from mcz.container.walk_with_losses import KNOWN
@@ -63,13 +63,6 @@ def test_chunk_types() -> None:
     found = {name.encode(): row["flags"] for name, row in by("type", "chunk_types").items()}
     assert found == dict.fromkeys(found, 0) | FLAGS_OF
     assert set(found) == KNOWN
-
-
-def test_kinds_of_packets() -> None:
-    names = {row["name"]: id_ for id_, row in by("id", "packet_kinds").items()}
-    ours = packets.END, packets.SEGMENT, packets.FRAME
-    assert tuple(names.values()) == ours
-    assert list(names) == ["end", "segment", "frame"]
 
 
 def test_profiles() -> None:

@@ -271,7 +271,7 @@ def test_parts_of_source_formats() -> None:
         name: known.id for name, known in FORMATS.items()
     }
     for name, known in FORMATS.items():
-        assert rows[name][3].endswith("NOTES") == (known.join_notes is not None)
+        assert rows[name][4].endswith("NOTES") == (known.join_notes is not None)
 
 
 def test_worked_example_of_a_template() -> None:

@@ -47,7 +47,6 @@ def registry(text: str) -> dict[str, Any]:
             rows_after(text, "**Identification**"), "what", "value", "meaning"
         ),
         "chunk_types": _keyed(rows_after(text, "**Chunk types**"), "type", "flags", "meaning"),
-        "packet_kinds": _keyed(rows_after(text, "**Kinds of packets**"), "id", "name"),
         "profiles": [
             {"id": id_, "name": name, "limits": {row[0]: _number(row[at]) for row in limits}}
             for id_, name, at in ((0, "base", 2), (1, "large", 3), (2, "small", 1))
@@ -63,7 +62,8 @@ def registry(text: str) -> dict[str, Any]:
         ],
         "point_sets": _keyed(rows_after(text, "**Points.**"), "id", "of", "points"),
         "source_formats": _keyed(
-            rows_after(text, "**Source formats**"), "id", "name", "suffixes", "source_of"
+            rows_after(text, "## Source reconstruction\n"),
+            *("name", "id", "suffixes", "template", "detail", "frame_notes", "restored_from"),
         ),
         "roles": _keyed(rows_after(text, "**Roles of signals**"), "id", "name", "meaning"),
         "channel_kinds": list(_kinds(rows_after(text, "**Channel kinds**"))),
@@ -78,7 +78,6 @@ def registry(text: str) -> dict[str, Any]:
             for names, unit, meaning in rows_after(page.read_text("utf-8"), heading)
             for name in names.split(", ")
         ],
-        "model_kinds": _keyed(rows_after(text, "**Model kinds**"), "id", "name"),
         "bases": _keyed(
             rows_after(text, "Some models are well known."), "name", "annex", "id", "meaning"
         ),
