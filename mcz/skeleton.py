@@ -107,12 +107,27 @@ class Joint:
             raise MotionError(f"joint {self.name!r}: axis order {self.axis_order!r}")
 
 
+AXES = ("", "x", "y", "z", "-x", "-y", "-z")
+HANDS = ("", "right", "left")
+
+
+def column_of(axis: str) -> int:
+    """The column of an axis, whatever its sign.
+
+    >>> column_of("z"), column_of("-y")
+    (2, 1)
+    """
+    return "xyz".index(axis[-1])
+
+
 SKELETON = {
     "joints": several(of_type(Joint, "a joint"), "joints"),
     "name": NAME,
     "unit_cm": optional(NUMBER),
     "angle_unit": TEXT,
     "up_axis": TEXT,
+    "forward_axis": TEXT,
+    "handedness": TEXT,
     "intrinsic": TRUTH,
     "base": optional(DATA),
     "source": optional(of_type(Source, "a Source")),
@@ -124,7 +139,9 @@ class Skeleton:
     """The joints of a clip, parents before children, and what their numbers mean.
 
     ``unit_cm`` is the length of one unit in centimeters, None while unknown; ``angle_unit`` is
-    "deg", "rad" or "" (unknown); ``up_axis`` is "x", "y", "z" or "" (unknown).
+    "deg", "rad" or "" (unknown); ``up_axis`` and ``forward_axis``, where a
+    figure faces, are "x", "y", "z", "-x", "-y", "-z" or "" (unknown), not parallel; ``handedness``
+    of the axes is "right", "left" or "" (unknown). Arithmetic takes no notice of these three.
     ``intrinsic``: the rotation channels of a joint apply about the axes that turn with it, as
     listed (BVH); otherwise about fixed axes (Acclaim).
     ``base`` is the id of the skeleton that this one was derived from.
@@ -135,6 +152,8 @@ class Skeleton:
     unit_cm: float | None = None
     angle_unit: str = "deg"
     up_axis: str = ""
+    forward_axis: str = ""
+    handedness: str = ""
     intrinsic: bool = True
     base: bytes | None = None
     source: Source | None = field(default=None, compare=False, repr=False)
@@ -152,8 +171,15 @@ class Skeleton:
             raise MotionError(f"unit of {self.unit_cm} cm")
         if self.angle_unit not in ("deg", "rad", ""):
             raise MotionError(f"angle unit {self.angle_unit!r}")
-        if self.up_axis not in ("x", "y", "z", ""):
-            raise MotionError(f"up axis {self.up_axis!r}")
+        for name in ("up_axis", "forward_axis"):
+            axis = getattr(self, name).removeprefix("+")
+            if axis not in AXES:
+                raise MotionError(f"{name.replace('_', ' ')} {axis!r}")
+            object.__setattr__(self, name, axis)
+        if self.up_axis and self.up_axis[-1:] == self.forward_axis[-1:]:  # SKEL-10
+            raise MotionError(f"up axis {self.up_axis!r}, parallel to forward axis")
+        if self.handedness not in HANDS:
+            raise MotionError(f"handedness {self.handedness!r}")
 
     @property
     def channels(self) -> tuple[Channel, ...]:

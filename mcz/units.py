@@ -6,12 +6,11 @@ import re
 from dataclasses import replace
 from fractions import Fraction
 
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.motion import Skeleton
+from mcz.skeleton import AXES, HANDS
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
-UP_AXES = ("x", "y", "z")
-
 
 _LENGTH = re.compile(r"([0-9]{0,15}\.?[0-9]{0,15}) ?([a-z]+)")
 LEAST_CM, MOST_CM = 1e-6, 1e9
@@ -38,13 +37,33 @@ def in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:
     return skeleton if unit is None else replace(skeleton, unit_cm=unit_cm_of(unit))
 
 
-def facing(skeleton: Skeleton, up: str | None) -> Skeleton:
-    """``skeleton`` with the axis of that name pointing up, None: as it is; raises OptionError.
+def axes_of(skeleton: Skeleton) -> tuple[str, str, str]:
+    """Up axis, forward axis and handedness."""
+    return skeleton.up_axis, skeleton.forward_axis, skeleton.handedness
 
-    Where that is another axis than before, it is no longer the skeleton of its own source file.
+
+def facing(
+    skeleton: Skeleton,
+    up: str | None,
+    forward: str | None = None,
+    handedness: str | None = None,
+) -> Skeleton:
+    """``skeleton`` with these axes and handedness, None: as they are; raises OptionError.
+
+    Where they are others than before, it is no longer the skeleton of its own source file.
     """
-    if up is None or up == skeleton.up_axis:
-        return skeleton
-    if up not in UP_AXES:
-        raise OptionError(f"up axis {up!r} is not one of {', '.join(UP_AXES)}")
-    return replace(skeleton, up_axis=up, source=None)
+    for what, axis in (("up", up), ("forward", forward)):
+        if axis is not None and axis.removeprefix("+") not in AXES[1:]:
+            raise OptionError(f"{what} axis {axis!r} is not one of {', '.join(AXES[1:])}")
+    if handedness not in (None, *HANDS[1:]):
+        raise OptionError(f"handedness {handedness!r} is neither right nor left")
+    try:
+        found = replace(
+            skeleton,
+            up_axis=up or skeleton.up_axis,
+            forward_axis=forward or skeleton.forward_axis,
+            handedness=handedness or skeleton.handedness,
+        )
+    except MotionError as error:  # parallel axes
+        raise OptionError(str(error)) from None
+    return skeleton if axes_of(found) == axes_of(skeleton) else replace(found, source=None)

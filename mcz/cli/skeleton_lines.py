@@ -20,6 +20,8 @@ def skeleton_lines(skeleton: JsonObject) -> Iterator[str]:
         f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
         f"{skeleton['up_axis']} up" if skeleton["up_axis"] else "up axis unknown",
     ]
+    facts += [f"{skeleton['forward_axis']} forward"] if skeleton["forward_axis"] else []
+    facts += [f"{skeleton['handedness']}-handed"] if skeleton["handedness"] else []
     name = f" {skeleton['name']}" if skeleton["name"] else ""
     id_ = f" ({skeleton['id'][:8]})" if "id" in skeleton else ""
     yield f"skeleton{name}{id_}: {', '.join(facts)}"

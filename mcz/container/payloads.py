@@ -140,7 +140,11 @@ class Skel(Record):
         optional(FINITE), "0 or 1 binary64: one length unit in cm; none: unknown", default=None
     )
     angle_unit: int = field(one_of(Int8ul, range(3)), "0 unknown, 1 degrees, 2 radians", default=0)
-    up_axis: int = field(one_of(Int8ul, range(4)), "0 unknown, 1 x, 2 y, 3 z", default=0)
+    up_axis: int = field(
+        one_of(Int8ul, range(7)), "0 unknown, 1 +x, 2 +y, 3 +z, 4 -x, 5 -y, 6 -z", default=0
+    )
+    forward_axis: int = field(one_of(Int8ul, range(7)), "likewise, where a figure faces", default=0)
+    handedness: int = field(one_of(Int8ul, range(3)), "0 unknown, 1 right, 2 left", default=0)
     base: bytes | None = field(
         optional(ID), "0 or 1: id of the SKEL that this one was derived from", default=None
     )

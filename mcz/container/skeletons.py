@@ -9,9 +9,9 @@ from mcz.container.limits import Profile, check
 from mcz.errors import FormatError, MotionError
 from mcz.motion import CHANNEL_KINDS, ORIGIN, Channel, Joint, Skeleton
 from mcz.schema import build
+from mcz.skeleton import AXES, HANDS
 
 ANGLE_UNITS = ("", "deg", "rad")
-UP_AXES = ("", "x", "y", "z")
 AXIS_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
@@ -22,7 +22,9 @@ def build_skeleton(skeleton: Skeleton, source: payloads.SkeletonSource | None) -
         flags=int(skeleton.intrinsic),
         unit_cm=skeleton.unit_cm,
         angle_unit=ANGLE_UNITS.index(skeleton.angle_unit),
-        up_axis=UP_AXES.index(skeleton.up_axis),
+        up_axis=AXES.index(skeleton.up_axis),
+        forward_axis=AXES.index(skeleton.forward_axis),
+        handedness=HANDS.index(skeleton.handedness),
         base=skeleton.base or None,  # b"": derived, from what is not told
         source=source,
         joints=[_joint_record(joint) for joint in skeleton.joints],
@@ -85,7 +87,9 @@ def parse_skeleton(fields: payloads.Skel, profile: Profile, where: str) -> Skele
             name=fields.name,
             unit_cm=fields.unit_cm,
             angle_unit=ANGLE_UNITS[fields.angle_unit],
-            up_axis=UP_AXES[fields.up_axis],
+            up_axis=AXES[fields.up_axis],
+            forward_axis=AXES[fields.forward_axis],
+            handedness=HANDS[fields.handedness],
             intrinsic=bool(fields.flags & 1),
             base=fields.base,
         )

@@ -70,6 +70,8 @@ def marker_skeleton(
         skeleton.unit_cm,
         "",
         skeleton.up_axis,
+        skeleton.forward_axis,
+        skeleton.handedness,
         base=base,
     )
 

@@ -100,6 +100,8 @@ def _facts(motion: Motion) -> dict[str, str | int | float | None]:
         "frame rate": None if rate is None else float(rate),
         "unit in cm": bones.unit_cm,
         "up axis": bones.up_axis or None,
+        "forward axis": bones.forward_axis or None,
+        "handedness": bones.handedness or None,
     }
 
 

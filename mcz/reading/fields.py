@@ -169,4 +169,6 @@ FIELDS: dict[str, Getter] = {
     "n_joints": lambda clip: clip.skeleton.n_joints,
     "unit_cm": lambda clip: clip.skeleton.unit_cm,
     "up_axis": lambda clip: clip.skeleton.up_axis or None,
+    "forward_axis": lambda clip: clip.skeleton.forward_axis or None,
+    "handedness": lambda clip: clip.skeleton.handedness or None,
 }

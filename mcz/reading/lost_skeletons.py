@@ -20,7 +20,7 @@ from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.packed import pack_skeleton
 from mcz.container.reader import Container
-from mcz.container.skeletons import UP_AXES, build_skeleton
+from mcz.container.skeletons import build_skeleton
 from mcz.container.writer import payload_id
 from mcz.errors import MczError
 from mcz.formats import FORMATS, format_by_id
@@ -29,6 +29,7 @@ from mcz.numbers import GridKind
 from mcz.reading.clip import Clip
 from mcz.reading.signal_info import role_name
 from mcz.reading.signal_reader import SignalReader
+from mcz.skeleton import AXES
 from mcz.types import Values
 from mcz.units import UNIT_CM
 
@@ -161,7 +162,7 @@ def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
         for base in _bases(container) if form.wants_skeleton else (None,):
             arguments = () if not form.wants_skeleton else (base,)
             skeleton: Skeleton = form.read(text, row.name, *arguments).skeleton
-            for up_axis in dict.fromkeys((skeleton.up_axis, *UP_AXES)):
+            for up_axis in dict.fromkeys((skeleton.up_axis, *AXES)):
                 for joints in dict.fromkeys(_ways(skeleton.joints)):
                     other = replace(skeleton, up_axis=up_axis, joints=joints)
                     yield from _payloads(other, None)
@@ -209,7 +210,7 @@ def _ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
 def _of_base(container: Container, base: bytes) -> Iterator[bytes]:
     """The payloads of SKEL that writers derive from a skeleton where another axis points up."""
     skeleton = container.skeleton(base)
-    for up_axis in UP_AXES:
+    for up_axis in AXES:
         payload = build_skeleton(replace(skeleton, up_axis=up_axis, base=base), None)
         yield from (payload, pack_skeleton(payload))
 

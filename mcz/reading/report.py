@@ -99,6 +99,8 @@ def joint_facts(skeleton: Skeleton) -> JsonObject:
         "height": figure_height(skeleton),
         "angle_unit": skeleton.angle_unit,
         "up_axis": skeleton.up_axis,
+        "forward_axis": skeleton.forward_axis,
+        "handedness": skeleton.handedness,
         "joints": [
             {
                 "name": joint.name,

@@ -35,6 +35,8 @@ def pose_arrays(motion: Motion) -> dict[str, Items]:
         "offsets": skeleton.offsets,
         "unit_cm": np.array(np.nan if skeleton.unit_cm is None else skeleton.unit_cm),
         "up_axis": np.array(skeleton.up_axis),
+        "forward_axis": np.array(skeleton.forward_axis),
+        "handedness": np.array(skeleton.handedness),
         "angle_unit": np.array(skeleton.angle_unit),
         "metadata_keys": np.array(list(motion.metadata), np.str_),
         "metadata_values": np.array(list(motion.metadata.values()), np.str_),

@@ -11,6 +11,7 @@ from mcz.kinematics.marker_motion import in_positions
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion, Skeleton
 from mcz.types import Params
+from mcz.units import axes_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ def read_with(skeleton: Skeleton, base: Skeleton | None) -> tuple[tuple[StoredSk
 
 def derived_from(skeleton: Skeleton, base: Skeleton) -> bool:
     """Whether a skeleton read with ``base`` differs from it, whose file stays as it is."""
-    return skeleton.base is not None or skeleton.up_axis != base.up_axis
+    return skeleton.base is not None or axes_of(skeleton) != axes_of(base)
 
 
 def under_its_path(skeleton: Skeleton) -> StoredSkeleton:

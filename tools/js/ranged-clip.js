@@ -21,7 +21,8 @@ import { frameNumbers } from "./time-base.js";
 import { timesOf } from "./times.js";
 
 const AHEAD = 64 * 1024; // bytes of segments that come with CLIP where requests cost
-const UP_AXES = [null, "x", "y", "z"];
+const AXES = [null, "x", "y", "z", "-x", "-y", "-z"];
+const HANDS = [null, "right", "left"];
 const LENGTH_UNITS = { 0.1: "mm", 1: "cm", 10: "dm", 100: "m", 2.54: "in", 30.48: "ft" };
 
 /**
@@ -114,7 +115,9 @@ export class RangedClip {
     this.roundedRate = clip.roundedRate;
     this.skeleton = clip.skeleton;
     this.skeletonId = row.skeletonId;
-    this.upAxis = UP_AXES[clip.skeleton.upAxis];
+    this.upAxis = AXES[clip.skeleton.upAxis];
+    this.forwardAxis = AXES[clip.skeleton.forwardAxis];
+    this.handedness = HANDS[clip.skeleton.handedness];
     this.unitCm = clip.skeleton.unitCm;
     this.lengthUnit = LENGTH_UNITS[clip.skeleton.unitCm] ?? null;
     this.firstFrame = Number(clip.numbers[0].number);

@@ -13,7 +13,8 @@ const FLAG_AXIS = 4;
 const FLAG_NAME = 1;
 const FLAG_UNIT = 2;
 const MAX_ANGLE_UNIT = 2;
-const MAX_UP_AXIS = 3;
+const MAX_AXIS = 6;
+const MAX_HANDEDNESS = 2;
 const MAX_AXIS_ORDER = 5;
 const ID_SIZE = 16;
 
@@ -45,7 +46,9 @@ const ID_SIZE = 16;
  * @property {boolean} intrinsic rotations apply about the turned axes
  * @property {number | null} unitCm one length unit in cm
  * @property {number} angleUnit 0 unknown, 1 degrees, 2 radians
- * @property {number} upAxis 0 unknown, 1 x, 2 y, 3 z
+ * @property {number} upAxis 0 unknown, 1 +x, 2 +y, 3 +z, 4 -x, 5 -y, 6 -z
+ * @property {number} forwardAxis likewise
+ * @property {number} handedness 0 unknown, 1 right, 2 left
  * @property {string | null} base id of the SKEL that it was derived from
  * @property {object | null} source how to restore its file: template, format, size, sha256
  * @property {Joint[]} joints parents before children
@@ -68,7 +71,7 @@ export function readSkeleton(payload, id, file) {
   const unitCm = reader.optional(() => reader.f64());
   if (unitCm !== null && !(unitCm > 0 && unitCm < Infinity)) reader.refuse(`unit_cm is ${unitCm}`);
   const angleUnit = upTo(MAX_ANGLE_UNIT, reader, "angle_unit");
-  const upAxis = upTo(MAX_UP_AXIS, reader, "up_axis");
+  const axes = readAxes(reader);
   const base = reader.optional(() => hex(reader.take(ID_SIZE)));
   if (base !== null && !file.skeletons.has(base)) {
     reader.refuse(`its base ${base} does not come before it`);
@@ -77,7 +80,17 @@ export function readSkeleton(payload, id, file) {
   const joints = readJoints(reader, file.limits);
   reader.rest();
   const channels = joints.flatMap((joint) => joint.channels);
-  return { id, name, intrinsic, unitCm, angleUnit, upAxis, base, source, joints, channels };
+  return { id, name, intrinsic, unitCm, angleUnit, ...axes, base, source, joints, channels };
+}
+
+function readAxes(reader) {
+  const upAxis = upTo(MAX_AXIS, reader, "up_axis");
+  const forwardAxis = upTo(MAX_AXIS, reader, "forward_axis");
+  const handedness = upTo(MAX_HANDEDNESS, reader, "handedness");
+  if (upAxis && forwardAxis && upAxis % 3 === forwardAxis % 3) {
+    reader.refuse("its forward axis is parallel to its up axis"); // SKEL-10
+  }
+  return { upAxis, forwardAxis, handedness };
 }
 
 /** The fields behind the flags, packed. */

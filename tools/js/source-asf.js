@@ -22,8 +22,9 @@ const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 export function checkAsf(text, skeleton) {
   const described = new AsfReader(textOfAny(text)).skeleton(skeleton.name);
   const found = { ...described, joints: described.joints.map(plain) };
-  const { name, intrinsic, angleUnit, upAxis, joints } = skeleton;
-  const stated = { name, intrinsic, angleUnit, upAxis, joints: joints.map(plain) };
+  const { name, intrinsic, angleUnit, upAxis, forwardAxis, handedness, joints } = skeleton;
+  const axes = { upAxis, forwardAxis, handedness };
+  const stated = { name, intrinsic, angleUnit, ...axes, joints: joints.map(plain) };
   // JSON writes -0 as 0, which is equal to it.
   if (JSON.stringify(found) !== JSON.stringify(stated)) {
     throw new Refused("the source of a skeleton describes another one");
@@ -132,7 +133,8 @@ class AsfReader {
       joints.push(jointOf(bone, parent, offset, [tail]));
     }
     const angleUnit = ANGLE_UNITS[this.angle];
-    return { name: this.name || name, intrinsic: false, angleUnit, upAxis: 0, joints };
+    const axes = { upAxis: 0, forwardAxis: 0, handedness: 0 };
+    return { name: this.name || name, intrinsic: false, angleUnit, ...axes, joints };
   }
 
   link() {

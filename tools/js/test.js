@@ -737,7 +737,7 @@ test("ASF: the skeleton that a file describes", () => {
       channels: [channel(10), channel(4), channel(200, "twist")],
     },
   ];
-  const skeleton = { name: "any", intrinsic: false, angleUnit: 2, upAxis: 0, joints };
+  const skeleton = { name: "any", intrinsic: false, angleUnit: 2, upAxis: 0, forwardAxis: 0, handedness: 0, joints };
   checkAsf(bytes(text), skeleton);
   for (const [old, now] of [
     ["4", "4e0"],

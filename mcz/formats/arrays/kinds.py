@@ -48,5 +48,7 @@ def with_kinds(motion: Motion, name: str) -> Motion:
         unit_cm=skeleton.unit_cm,
         angle_unit=angle_unit,
         up_axis=skeleton.up_axis,
+        forward_axis=skeleton.forward_axis,
+        handedness=skeleton.handedness,
     )
     return replace(motion, skeleton=named)

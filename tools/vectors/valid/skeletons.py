@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.skeleton import AXES, HANDS
 from mcz.writing.clip_writer import write_skeleton
 from tools.vectors.build.files import Crafter, Vector, Whole, file_of, finished
 from tools.vectors.build.motions import HUNDREDTHS, channels, dance, numbers, puppet
@@ -18,6 +19,7 @@ def vectors() -> Iterable[Vector]:
     _skeletons(shelf)
     _derived(shelf)
     _empty(shelf)
+    _axes(shelf)
     return shelf.vectors
 
 
@@ -54,3 +56,15 @@ def _empty(shelf: Whole) -> None:
         motion = Motion(bones, (Signal(np.empty((4, 0))),), name=name)
         purpose = f"A clip of 4 frames without a channel: {name}."
         shelf.hold(name, "SKEL; CEND", purpose, file_of(motion), motion)
+
+
+def _axes(shelf: Whole) -> None:
+    """A skeleton of each up axis, facing along the next; the hands in turn."""
+    crafter = Crafter()
+    for number, up in enumerate(AXES):
+        forward = AXES[number % 6 + 1] if up else "-z"
+        skeleton = replace(puppet(), up_axis=up, forward_axis=forward, handedness=HANDS[number % 3])
+        write_skeleton(crafter, replace(skeleton, name=f"up {up or 'unknown'}"))
+    purpose = "Skeletons of all up axes, forward axes and hands; no value depends on them."
+    motion = dance(skeleton=skeleton)
+    shelf.hold("axes", "SKEL", purpose, finished(crafter, motion), motion)

@@ -86,6 +86,7 @@ def _other_skeletons(shelf: Unrestorable) -> None:
         ("name", "another name", "name", b"\4Mime"),
         ("angle-unit", "radians", "angle_unit", b"\2"),
         ("up-axis", "an up axis, which no ASF file has", "up_axis", b"\2"),
+        ("handedness", "a handedness, which no ASF file has", "handedness", b"\1"),
         ("joint-name", "another name of a joint", "joints.1.name", b"\5thigh"),
         ("tail", "another bone", "joints.1.tails", tails),
         ("channel", "another channel", "joints.2.channels.0.kind", b"\5"),
