@@ -7,6 +7,7 @@ mappings, which become the records of ``mcz.schema``.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import Any, TypeVar
@@ -14,6 +15,8 @@ from typing import Any, TypeVar
 import construct
 import numpy as np
 
+from mcz.container.packed import chunk_id
+from mcz.errors import MczError
 from mcz.schema import EXTENDED, Record, build, read_varint, varint
 from mcz.schema.columns import Columns, read_column, read_varints
 from mcz.schema.records import RecordType
@@ -139,6 +142,14 @@ def extend(kind: Any, payload: bytes, path: str, more: bytes) -> bytes:
     flags = bytes((payload[at] | EXTENDED,))
     extension = varint(len(more)) + more
     return payload[:at] + flags + payload[at + 1 : start] + extension + payload[stop:]
+
+
+def id_of(kind: bytes, payload: bytes) -> bytes:
+    """The id of a shared chunk; of one that cannot be inflated any."""
+    try:
+        return chunk_id(kind, payload)
+    except MczError:
+        return hashlib.sha256(payload).digest()[:16]
 
 
 def update(record: Record, changes: Mapping[str, Any]) -> None:

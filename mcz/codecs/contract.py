@@ -72,7 +72,7 @@ FindModel = Callable[[bytes], Model | None]
 
 def id_of(model: Model) -> bytes:
     """The id that a clip names the model by: that of its MODL."""
-    return hashlib.sha256(b"\0" + varint(model.kind) + model.data).digest()[:ID_SIZE]  # flags first
+    return hashlib.sha256(b"MODL\0" + varint(model.kind) + model.data).digest()[:ID_SIZE]
 
 
 def model_finder(models: Sequence[Model]) -> FindModel:

@@ -253,7 +253,7 @@ ANSWERS = {
     "mdtt": KnownAnswer(
         0, "all",
         (
-            "101002016ffedff7a8927d8cf33d790d19ab22219a9999999999c93f0f7b7b7b7d7d827f80828a8a"
+            "10100201263c3c166dbe806db82b8c56750715a89a9999999999c93f0f7b7b7b7d7d827f80828a8a"
             "9080808000"
         ),
         (
@@ -270,7 +270,7 @@ ANSWERS = {
     "pca-rdo": KnownAnswer(
         0, "all",
         (
-            "10020e01a2c2dbbd0493e081a3db642484c796c29a9999999999c93f0f7b7b7b7d7d827f80828a8a"
+            "10020e0124c84b4235e8797a3d0c43888b34f4249a9999999999c93f0f7b7b7b7d7d827f80828a8a"
             "9080808000"
         ),
         (

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
 from mcz.container.directory import AttachmentRow
-from mcz.container.strict import decoded
+from mcz.container.packed import decoded
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import parse
 

@@ -7,6 +7,7 @@ all are named. SPEC.md, "Chunks", "Open DATA and packets", "INDX" and "FOOT", ar
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from mcz.container.chunks import Chunk, ChunkType
@@ -16,11 +17,11 @@ from mcz.container.feeding import events
 from mcz.container.grammar import INDEX, START
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import index_limit
+from mcz.container.packed import chunk_id
 from mcz.container.packets import END
 from mcz.container.parser import ALL, Parser
 from mcz.container.places import Places
 from mcz.container.source import ByteSource
-from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, UnsupportedError
 
 SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)
@@ -119,7 +120,9 @@ class _Check:
             except FormatError as error:
                 self._note(chunk.offset, str(error))
         elif chunk.type in SHARED:
-            self._places.shared.setdefault((chunk.type, payload_id(event.payload)), chunk)
+            with suppress(FormatError):  # its content is not looked at here
+                id_ = chunk_id(chunk.type, event.payload, self.parser.profile)
+                self._places.shared.setdefault((chunk.type, id_), chunk)
         self._places.add(chunk)
 
     def _packet(self, event: PacketEvent) -> None:

@@ -24,8 +24,8 @@ from mcz.container.chunks import (
 )
 from mcz.container.directory import Directory
 from mcz.container.limits import check
+from mcz.container.packed import decoded
 from mcz.container.source import ByteSource
-from mcz.container.strict import decoded
 from mcz.errors import FormatError
 from mcz.schema import build, deflate, parse, parse_all
 

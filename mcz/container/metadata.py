@@ -14,8 +14,7 @@ from mcz.container.chunks import Chunk
 from mcz.container.directory import ClipRow
 from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.container.metadata_keys import INTERPRETED
-from mcz.container.packed import smallest
-from mcz.container.strict import decoded
+from mcz.container.packed import decoded, smallest
 from mcz.errors import FormatError
 from mcz.schema import build, parse, parse_all, parse_until
 

@@ -40,7 +40,7 @@ from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.metadata import Placed, Record, Remembered, applied, records_in
 from mcz.container.overlay import Overlay
-from mcz.container.packed import parse_skel
+from mcz.container.packed import chunk_id, plain_id, plain_payload
 from mcz.container.packets import CHECK_SIZE, FRAME, MOST_HEAD, Packet, implied_by, is_packet
 from mcz.container.restoring import is_like, scan_for_salvage
 from mcz.container.runs import Runs
@@ -56,8 +56,6 @@ from mcz.container.segments import (
 )
 from mcz.container.skeletons import parse_skeleton
 from mcz.container.source import ByteSource
-from mcz.container.strict import decoded
-from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.motion import Skeleton
 from mcz.schema import parse, parse_until
@@ -206,7 +204,7 @@ class Container:
         chunk = build_chunk(kind, payload)
         self.broken = [row for row in self.broken if not is_like(self.source, row[0], chunk)]
         self.source = better.with_more({end: chunk})
-        self.directory.shared[kind, payload_id(payload)] = Chunk(kind, 0, end, len(payload))
+        self.directory.shared[kind, chunk_id(kind, payload)] = Chunk(kind, 0, end, len(payload))
 
     def model(self, id_: bytes) -> payloads.Modl:
         """The MODL with this id, its hash checked."""
@@ -216,9 +214,11 @@ class Container:
         chunk = self.directory.shared.get((kind, id_))
         if chunk is None:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
-        if payload_id(payload := self.payload(chunk)) != id_:
+        where, payload = f"{kind.decode()} {id_.hex()}", self.payload(chunk)
+        plain = plain_payload(kind, payload, where, self.profile, self.max_decoded)
+        if plain_id(kind, plain) != id_:
             raise ChecksumError(f"its id is not {id_.hex()}", where=f"chunk {chunk.label}")
-        return payload, chunk.label
+        return plain, chunk.label
 
     def skeleton(self, id_: bytes) -> Skeleton:
         """The skeleton in the SKEL with this id, its own source file not read."""
@@ -232,7 +232,8 @@ class Container:
         """Both; the last ones are kept, since the clips of a file share them."""
         found = self._skeletons.get(id_)
         if found is None:
-            fields = parse_skel(*self._shared_payload(ChunkType.SKEL, id_), self.profile)
+            payload = self._shared_payload(ChunkType.SKEL, id_)
+            fields = parse(payloads.Skel, *payload, self.profile.counts)
             found = fields, parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
             while len(self._skeletons) >= KEPT_SKELETONS:
                 self._skeletons.pop(next(iter(self._skeletons)), None)
@@ -244,9 +245,7 @@ class Container:
         fields = parse(payloads.Srce, *self._shared_payload(ChunkType.SRCE, id_))
         if fields.format != format_id:  # CLIP-03, SKEL-04
             raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
-        check(f"SRCE {id_.hex()}: bytes", fields.size, self.profile.text_bytes)
-        check_decoded(f"SRCE {id_.hex()}", fields.size, self.max_decoded)
-        return decoded(fields.data, fields.flags, fields.size, f"SRCE {id_.hex()}")
+        return fields.data
 
     def clip(self, row: ClipRow) -> payloads.Clip:
         """The fields of CLIP, compared with what the index says of them."""

@@ -14,11 +14,11 @@ from mcz.container.directory import Found, SegmentRow
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.feeding import events
 from mcz.container.grammar import BODY, CLIP, GRAMMAR, INDEX, NAMED, OTHER, START
+from mcz.container.packed import chunk_id
 from mcz.container.packets import END
 from mcz.container.repeats import chunks_in
 from mcz.container.scanner import Scanner
 from mcz.container.source import ByteSource
-from mcz.container.writer import payload_id
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 
 
@@ -127,7 +127,10 @@ class Salvager(Scanner):
             return payload == self.found.directory.head
         if kind == ChunkType.CLIP:
             return payload == self._opening
-        return (kind, payload_id(payload)) in self.found.directory.shared
+        try:
+            return (kind, chunk_id(kind, payload)) in self.found.directory.shared
+        except FormatError:
+            return False
 
     def _note(self, error: FormatError) -> None:
         self.found.damage.append(str(error))
@@ -219,7 +222,8 @@ class Salvager(Scanner):
             with suppress(FormatError):  # what is no REPT says nothing
                 for inner in chunks_in(payload, chunk.payload_offset):
                     if inner.thing in ("SKEL", "MODL"):
-                        key = inner.chunk.type, payload_id(inner.payload)
+                        kind = inner.chunk.type
+                        key = kind, chunk_id(kind, inner.payload)
                         held.shared.setdefault(key, inner.chunk)
 
     def finish(self) -> None:

@@ -23,12 +23,12 @@ from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEven
 from mcz.container.grammar import NAMED, OTHER
 from mcz.container.index_check import IndexCheck
 from mcz.container.limits import check, index_limit
+from mcz.container.packed import plain_id, plain_payload
 from mcz.container.packets import SEGMENT
 from mcz.container.parser import ALL, PASS, Parser
 from mcz.container.plain import check_plain
 from mcz.container.segments import GROUP_NOTES, parse_header
 from mcz.container.strict_ancillary import check_ancillary
-from mcz.container.writer import payload_id
 from mcz.errors import FormatError, LimitError
 from mcz.schema import parse
 
@@ -118,24 +118,25 @@ class Scanner:
         self.found.directory.head = payload
 
     def _shared(self, chunk: Chunk, payload: bytes) -> None:
-        id_ = payload_id(payload)
+        plain = plain_payload(chunk.type, payload, chunk.label, self.parser.profile)
+        id_ = plain_id(chunk.type, plain)
         if self.strict:
-            self._check_shared(chunk, id_, payload)
+            self._check_shared(chunk, id_, plain)
         self.found.directory.shared.setdefault((chunk.type, id_), chunk)  # GRAM-05
 
-    def _check_shared(self, chunk: Chunk, id_: bytes, payload: bytes) -> None:
+    def _check_shared(self, chunk: Chunk, id_: bytes, plain: bytes) -> None:
         if chunk.type == ChunkType.SKEL:
             directory = self.found.directory
             # ALIA-01
             if strict.check_skeleton(
-                payload, chunk.label, directory, self._templates, self.parser.profile
+                plain, chunk.label, directory, self._templates, self.parser.profile
             ):
                 self._sourced.add((payloads.OF_SKELETON, id_))
         elif chunk.type == ChunkType.SRCE:
-            self._templates[id_] = strict.check_template(payload, chunk.label, self.parser.profile)
+            self._templates[id_] = parse(payloads.Srce, plain, chunk.label).format
         else:
-            parse(payloads.Modl, payload, chunk.label)
-            self._model_bytes += len(payload)
+            parse(payloads.Modl, plain, chunk.label)
+            self._model_bytes += len(plain)
             # LIMIT-06
             check(
                 f"chunk {chunk.label}: all models",

@@ -11,26 +11,14 @@ from pathlib import PurePosixPath
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import Directory
-from mcz.container.limits import Profile, check
-from mcz.container.packed import parse_skel, words
+from mcz.container.limits import Profile
 from mcz.container.skeletons import parse_skeleton
 from mcz.errors import FormatError
-from mcz.schema import inflate, parse
+from mcz.schema import parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 # The source formats of the registry, by what they are sources of.
 OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset(range(2, 14))
-
-
-def decoded(data: bytes, flags: int, size: int, where: str) -> bytes:
-    """The ``size`` bytes that SRCE, ATTA, COPY and META hold as ``data``."""
-    encoding = flags & payloads.ENCODING
-    if encoding == payloads.STORED:
-        if len(data) != size:  # ATTA-03, SRCE-01
-            raise FormatError(f"{len(data)} bytes stored, {size} stated", where=where)
-        return bytes(data)
-    after = words() if encoding == payloads.AFTER_WORDS else b""
-    return inflate(data, size, where, words=after)
 
 
 def is_plain_path(name: str) -> bool:
@@ -47,24 +35,16 @@ def check_path(name: str, where: str) -> None:
 
 
 def check_skeleton(
-    payload: bytes, where: str, directory: Directory, templates: Templates, profile: Profile
+    plain: bytes, where: str, directory: Directory, templates: Templates, profile: Profile
 ) -> bool:
-    """Check a SKEL; return whether it has a source file of its own."""
-    fields = parse_skel(payload, where, profile)
+    """Check a SKEL that is not packed; return whether it has a source file of its own."""
+    fields = parse(payloads.Skel, plain, where, profile.counts)
     parse_skeleton(fields, profile, where)
     if fields.base is not None:
         _refer(directory, ChunkType.SKEL, fields.base, where)  # SKEL-02
     if fields.source is not None:
         _check_source(fields.source, where, directory, templates, OF_CLIPS)
     return bool(fields.source)
-
-
-def check_template(payload: bytes, where: str, profile: Profile) -> int:
-    """Check a SRCE; return its source format."""
-    fields = parse(payloads.Srce, payload, where)
-    check(f"{where}: bytes", fields.size, profile.text_bytes)
-    decoded(fields.data, fields.flags, fields.size, where)
-    return int(fields.format)
 
 
 def _check_source(

@@ -33,7 +33,7 @@ from mcz.container.directory import (
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
 from mcz.container.metadata import Record, build_metas
-from mcz.container.packed import smallest
+from mcz.container.packed import chunk_id, plain_id, smallest
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -55,11 +55,6 @@ ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
 
 class Sink(Protocol):
     def write(self, data: bytes, /) -> int | None: ...
-
-
-def payload_id(payload: bytes) -> bytes:
-    """The id of a shared chunk: the first 16 bytes of its payload's SHA-256."""
-    return hashlib.sha256(payload).digest()[:16]
 
 
 def build_head(profile: Profile) -> bytes:
@@ -125,7 +120,7 @@ class Writer:
 
     def shared(self, kind: bytes, payload: bytes) -> bytes:
         """Write a SKEL, MODL or SRCE unless the file has it already; return its id."""
-        id_ = payload_id(payload)
+        id_ = chunk_id(kind, payload, self.profile)
         if (kind, id_) not in self.directory.shared:
             self._between_clips(kind.decode())
             self.directory.shared[kind, id_] = self.chunk(kind, payload)
@@ -134,8 +129,12 @@ class Writer:
     def template(self, format_id: int, template: bytes) -> bytes:
         """Write a SRCE and return its id."""
         check("template: bytes", len(template), self.profile.text_bytes)
-        flags, data = smallest(template, short=self.short, plain=self.profile.is_plain)
-        record = payloads.Srce(format=format_id, flags=flags, size=len(template), data=data)
+        record = payloads.Srce(format=format_id, size=len(template), data=template)
+        id_ = plain_id(ChunkType.SRCE, build(record, "SRCE"))
+        if (ChunkType.SRCE, id_) in self.directory.shared:
+            return id_
+        plain = self.profile.is_plain
+        record.flags, record.data = smallest(template, short=self.short, plain=plain)
         return self.shared(ChunkType.SRCE, build(record, "SRCE"))
 
     def attachment(self, name: str, data: bytes) -> None:

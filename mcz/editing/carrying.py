@@ -25,9 +25,9 @@ from mcz.container.feeding import end_of
 from mcz.container.index import segment_rows
 from mcz.container.index_reader import parse_segments
 from mcz.container.metadata import Record, as_one
-from mcz.container.packed import parse_skel
+from mcz.container.packed import chunk_id, parse_skel
 from mcz.container.reader import Container
-from mcz.container.writer import Writer, payload_id
+from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import build, parse, parse_until
 
@@ -69,7 +69,7 @@ class Carrier:
         if chunk is None:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
         payload = self.container.payload(chunk)
-        if payload_id(payload) != id_:
+        if chunk_id(kind, payload, self.container.profile) != id_:
             raise ChecksumError(f"its id is not {id_.hex()}", where=f"chunk {chunk.label}")
         return payload
 

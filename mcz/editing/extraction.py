@@ -16,9 +16,10 @@ from mcz.brief import brief
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType, read_chunk
 from mcz.container.directory import ClipRow
+from mcz.container.packed import chunk_id
 from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
-from mcz.container.writer import Writer, payload_id
+from mcz.container.writer import Writer
 from mcz.editing.ancillary import inside
 from mcz.editing.anew import (
     OF_JOINTS,
@@ -231,7 +232,7 @@ class Copier:
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         record = self.record_of(cut)
         payload = self.skeleton(clip.skeleton_id)
-        skeleton = payload_id(payload)
+        skeleton = chunk_id(ChunkType.SKEL, payload, self.container.profile)
         if cut.joints is not None:
             payload = cut_skeleton(payload, skeleton, cut.joints, self.container.profile)
             skeleton = self.writer.shared(ChunkType.SKEL, payload)

@@ -16,8 +16,7 @@ from typing import BinaryIO
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
-from mcz.container.packed import parse_skel
-from mcz.container.writer import payload_id
+from mcz.container.packed import chunk_id, parse_skel
 from mcz.editing.cutting import ClipCut, note_source
 from mcz.editing.extraction import Copier, Extraction
 from mcz.editing.recovering import Recovery
@@ -212,7 +211,7 @@ class Repairer(Copier):
         fields = self.container.skeleton_fields(id_)
         kept = {base: self._skeletons.get(base) for base in [fields.base] if base}
         try:
-            if any(payload is None or payload_id(payload) != id_ for id_, payload in kept.items()):
+            if any(skel is None or _skel_id(skel) != id_ for id_, skel in kept.items()):
                 raise FormatError("its base is not what it was")
             if fields.source:
                 self.file.skeleton_bytes(id_)
@@ -220,7 +219,7 @@ class Repairer(Copier):
         except FormatError as error:
             self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
         stored, where = self.carrier.stored(ChunkType.SKEL, id_), f"SKEL {id_.hex()}"
-        bases = [payload_id(payload) for payload in kept.values() if payload is not None]
+        bases = [_skel_id(payload) for payload in kept.values() if payload is not None]
         record = parse_skel(stored, where, self.container.profile)
         record.base, record.source = (bases[0] if bases else None), None
         payload = build(record, "skeleton")
@@ -270,3 +269,7 @@ class Repairer(Copier):
         note_source(new, NOTE)
         _, hashes = super().finish_record(cut, new)
         return b"", hashes
+
+
+def _skel_id(payload: bytes) -> bytes:
+    return chunk_id(ChunkType.SKEL, payload)

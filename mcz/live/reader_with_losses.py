@@ -17,10 +17,10 @@ from mcz.container import payloads
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.directory import parse_head
 from mcz.container.limits import check
+from mcz.container.packed import chunk_id
 from mcz.container.packets import END, SEGMENT, Packet, implied_by
 from mcz.container.segments import FRESH, SegmentHeader, mask_of, parse_header
 from mcz.container.walk_with_losses import Fault, Piece, WalkerWithLosses, repeated
-from mcz.container.writer import payload_id
 from mcz.errors import (
     ChecksumError,
     FormatError,
@@ -159,7 +159,8 @@ class FramesWithLosses:
             yield from self._leave("the file ended")
 
     def _keep(self, piece: Piece) -> None:
-        self._shared.setdefault((piece.type, payload_id(piece.payload or b"")), piece.data)
+        id_ = chunk_id(piece.type, piece.payload or b"")
+        self._shared.setdefault((piece.type, id_), piece.data)
         kept = sum(map(len, self._shared.values()))
         check("SKEL and MODL: bytes", kept, 2 * self._walker.profile.model_bytes)
 

@@ -18,11 +18,11 @@ from mcz.container.chunks import ChunkType, build_foot
 from mcz.container.directory import SegmentRow
 from mcz.container.events import ChunkEvent, PacketEvent
 from mcz.container.feeding import Stream
+from mcz.container.packed import chunk_id
 from mcz.container.reader import Container
 from mcz.container.scanner import Scanner
 from mcz.container.segments import FRESH
 from mcz.container.source import ByteSource
-from mcz.container.writer import payload_id
 from mcz.errors import FormatError, OptionError
 from mcz.live.clip_state import ClipState, LiveClip, Shared, begin, opening
 from mcz.reading.clip import Clip
@@ -79,7 +79,7 @@ class StrictFrames:
             if kind == ChunkType.HEAD:
                 head = event.data
             elif kind in SHARED:
-                shared.setdefault((kind, payload_id(event.payload)), event.data)
+                shared.setdefault((kind, chunk_id(kind, event.payload)), event.data)
             elif kind == ChunkType.CLIP:
                 row = self.scanner.clip
                 assert row is not None

@@ -18,10 +18,9 @@ import numpy as np
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
-from mcz.container.packed import pack_skeleton
+from mcz.container.packed import chunk_id, pack_skeleton
 from mcz.container.reader import Container
 from mcz.container.skeletons import build_skeleton
-from mcz.container.writer import payload_id
 from mcz.errors import MczError
 from mcz.formats import FORMATS, format_by_id
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, Source
@@ -72,7 +71,7 @@ def _without_joints(container: Container, row: ClipRow) -> None:
         joints = [Joint("", channels=tuple(islice(names, size))) for size in sizes]
         payload = build_skeleton(Skeleton(tuple(joints), unit_cm=None), None)
         container.add_shared(ChunkType.SKEL, payload)
-        other = replace(row, skeleton=payload_id(payload), damage=[LOST])
+        other = replace(row, skeleton=chunk_id(ChunkType.SKEL, payload), damage=[LOST])
         if _has_its_hashes(Clip(container, other), container.strictly()):
             row.skeleton = other.skeleton
             row.damage.append(LOST)
@@ -109,7 +108,7 @@ def _restore(
 ) -> None:
     """Let the file have those of the candidates that are what it lost."""
     for payload in candidates:
-        id_ = payload_id(payload)
+        id_ = chunk_id(ChunkType.SKEL, payload)
         if id_ in lost:  # SALV-09
             container.add_shared(ChunkType.SKEL, payload)
             container.damage.append(f"SKEL {id_.hex()} is lost; it is made again from {origin}")

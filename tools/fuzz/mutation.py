@@ -12,9 +12,9 @@ from typing import Any
 
 from mcz.codecs import HOMES
 from mcz.container import payloads
+from mcz.container.packed import decoded
 from mcz.container.packets import FRAME, SEGMENT, Packet
 from mcz.container.segments import parse_header
-from mcz.container.strict import decoded
 from mcz.errors import MczError
 from mcz.schema import MAX_COUNT, build, parse
 from tools.fuzz.repair import (

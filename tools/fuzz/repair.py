@@ -37,10 +37,10 @@ from mcz.container.scan import scan
 from mcz.container.segments import SegmentHeader, mask_of, parse_header
 from mcz.container.source import open_source
 from mcz.container.value_hash import value_hash
-from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
 from mcz.schema import build, deflate, inflate, parse, read_varint, varint
+from tools.records import id_of
 
 SHARED = (b"SKEL", b"SRCE", b"MODL")  # chunks with an id
 MOST_TABLE = 4096  # bytes of a stream table that is looked for
@@ -182,7 +182,7 @@ def with_payload(pieces: Sequence[Piece], which: int, payload: bytes) -> Pieces:
     changed = [*pieces[:which], replace(old, payload=payload), *pieces[which + 1 :]]
     if old.type not in SHARED:
         return changed
-    before, after = payload_id(old.payload), payload_id(payload)
+    before, after = id_of(old.type, old.payload), id_of(old.type, payload)
     for n, piece in enumerate(changed):
         if n != which and before in piece.payload:
             # SKEL, MODL and SRCE may name each other, so that an id changes another.

@@ -15,9 +15,9 @@ const MOST_ENTRIES = 2 ** 22;
 
 /** Models that a clip may name although the file does not have them: id -> annex file. */
 const WELL_KNOWN = new Map([
-  ["9e21518cd57da5564b2362dd3e394e29", "bases_cmu31.bin"],
-  ["3aba5ed6cd44d0a7641f88dae9d78f4b", "bases_cmu31_virtual.bin"],
-  ["70c0977dda6720bd2f4c06329e8542a4", "bases_cmu38.bin"],
+  ["8ba043dba87bdaa23d508e7f71a66aca", "bases_cmu31.bin"],
+  ["70a11d1d1a46e604175c47c3ad8f5188", "bases_cmu31_virtual.bin"],
+  ["5fd0fcb2fc33f89b40c3d6561d482249", "bases_cmu38.bin"],
 ]);
 
 /** Bases that were decoded last, by data; together at most so many entries. */

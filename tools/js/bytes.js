@@ -46,6 +46,14 @@ export function sameBytes(a, b) {
   return true;
 }
 
+/** One byte array behind the other. */
+export function joined(a, b) {
+  const out = new Uint8Array(a.length + b.length);
+  out.set(a);
+  out.set(b, a.length);
+  return out;
+}
+
 /** Bytes in lower case hexadecimal; ids are compared in this form. */
 export function hex(bytes) {
   let out = "";

@@ -18,11 +18,11 @@ import { COPIED, copiesIn } from "./copies.js";
 import { Damage } from "./damage.js";
 import { Refused } from "./errors.js";
 import { readNeeds } from "./head.js";
+import { idOf } from "./ids.js";
 import { within } from "./limits.js";
 import { supplied } from "./missing.js";
 import { Packets } from "./packets.js";
 import { resynchronize } from "./resynchronize.js";
-import { sha256 } from "./sha256.js";
 import { frameNumbers } from "./time-base.js";
 import { Walk } from "./walk.js";
 
@@ -172,8 +172,18 @@ export class Scan extends Walk {
     if (!this.clip || !REPEATED.has(type)) return false;
     if (type === "HEAD") return this.file.head !== null && sameBytes(payload, this.file.head);
     if (type === "CLIP") return sameBytes(payload, this.clip.payload);
-    const id = hex(sha256(payload).subarray(0, ID_SIZE));
+    const id = this.idOf(type, payload);
     return this.file[type === "SKEL" ? "skeletons" : "models"].has(id);
+  }
+
+  /** The id of a SKEL or MODL; null where it cannot be told. */
+  idOf(type, payload) {
+    try {
+      return idOf(type, payload, this.file.limits, this.inflateLimit);
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      return null;
+    }
   }
 
   readAncillary(chunk) {
@@ -201,8 +211,7 @@ export class Scan extends Walk {
     const chunks = chunksIn(payload, offset + HEADER_SIZE, this.file.limits.payloadBytes);
     for (const chunk of chunks) {
       if (chunk.type !== "SKEL" && chunk.type !== "MODL") continue;
-      const id = hex(sha256(chunk.payload).subarray(0, ID_SIZE));
-      this.repeated.set(`${chunk.type} ${id}`, chunk);
+      this.repeated.set(`${chunk.type} ${this.idOf(chunk.type, chunk.payload)}`, chunk);
     }
     if (this.isInDoubt) this.settle(chunks);
     if (this.clip !== null) return;

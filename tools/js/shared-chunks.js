@@ -4,13 +4,12 @@
 import { hex } from "./bytes.js";
 import { wellKnownModel } from "./bases.js";
 import { Refused, Unsupported } from "./errors.js";
+import { plainId, plainPayload } from "./ids.js";
 import { Missing, supplied } from "./missing.js";
 import { checkSourceFormat } from "./registry.js";
-import { sha256 } from "./sha256.js";
 import { readModel, readTemplate } from "./shared.js";
 import { readSkeleton } from "./skel.js";
 
-const ID_SIZE = 16;
 const MOST_SKELETONS = 256; // that are kept
 
 export class SharedChunks {
@@ -98,10 +97,13 @@ export class SharedChunks {
     const place = this.directory.shared.get(`${type} ${id}`);
     if (place === undefined) throw new Refused(`${type} ${id} is lost`);
     const payload = await this.ranges.payload(place, this.limits.payloadBytes);
-    if (hex(sha256(payload).subarray(0, ID_SIZE)) !== id) {
+    const plain = await supplied(() =>
+      plainPayload(type, payload, this.limits, this.inflateLimit),
+    );
+    if (hex(plainId(type, plain)) !== id) {
       throw new Refused(`${type} at ${place.offset}: its id is not ${id}`);
     }
-    return payload;
+    return plain;
   }
 }
 

@@ -7,7 +7,7 @@ import { within } from "./limits.js";
 import { Sha256 } from "./sha256.js";
 import { inflateAfterWords } from "./words.js";
 
-const ENCODING = 3; // mask of the bits of flags: 0 stored
+export const ENCODING = 3; // mask of the bits of flags: 0 stored
 const RAW_DEFLATE = 1;
 const AFTER_WORDS = 2;
 

@@ -1,6 +1,6 @@
 // SPEC.md, "SKEL": skeletons, joints and channels.
 
-import { ByteReader, EXTENDED, hex } from "./bytes.js";
+import { ByteReader, EXTENDED, hex, joined } from "./bytes.js";
 import { within } from "./limits.js";
 import { checkSourceFormat } from "./registry.js";
 import { inflateAfterWords } from "./words.js";
@@ -56,18 +56,16 @@ const ID_SIZE = 16;
  */
 
 /**
- * @param {Uint8Array} payload of SKEL
+ * @param {Uint8Array} payload of SKEL, not packed
  * @param {Uint8Array} id of the chunk
  * @param {{limits: object, skeletons: Map, templates: Map}} file what comes before it in the file
  * @returns {Skeleton}
  * @throws {Refused}
  */
 export function readSkeleton(payload, id, file) {
-  const head = new ByteReader(payload, "SKEL");
-  const name = head.text();
-  const flags = head.flags(FLAG_INTRINSIC | FLAG_PACKED);
-  const intrinsic = (flags & FLAG_INTRINSIC) !== 0;
-  const reader = flags & FLAG_PACKED ? unpack(head, file.limits) : head;
+  const reader = new ByteReader(payload, "SKEL");
+  const name = reader.text();
+  const intrinsic = (reader.flags(FLAG_INTRINSIC) & FLAG_INTRINSIC) !== 0;
   const unitCm = reader.optional(() => reader.f64());
   if (unitCm !== null && !(unitCm > 0 && unitCm < Infinity)) reader.refuse(`unit_cm is ${unitCm}`);
   const angleUnit = upTo(MAX_ANGLE_UNIT, reader, "angle_unit");
@@ -93,11 +91,23 @@ function readAxes(reader) {
   return { upAxis, forwardAxis, handedness };
 }
 
-/** The fields behind the flags, packed. */
-function unpack(reader, limits) {
+/**
+ * @param {Uint8Array} payload of SKEL
+ * @param {object} limits of the profile
+ * @returns {Uint8Array} the payload that says the same and is not packed
+ * @throws {Refused}
+ */
+export function plainSkeleton(payload, limits) {
+  const reader = new ByteReader(payload, "SKEL");
+  reader.text();
+  const { at } = reader;
+  const flags = reader.flags(FLAG_INTRINSIC | FLAG_PACKED);
+  if ((flags & FLAG_PACKED) === 0) return payload;
   const size = reader.varint();
   within(size, limits.templateBytes, "bytes of a skeleton"); // SKEL-09
-  return new ByteReader(inflateAfterWords(reader.rest(), size, "SKEL"), "SKEL");
+  const head = payload.slice(0, at + 1);
+  head[at] = flags & ~FLAG_PACKED;
+  return joined(head, inflateAfterWords(reader.rest(), size, "SKEL"));
 }
 
 function upTo(greatest, reader, field) {

@@ -9,17 +9,16 @@ import { COPIED, checkCopies } from "./copies.js";
 import { addSegment, readSegment } from "./data.js";
 import { Refused, Unsupported } from "./errors.js";
 import { readHead } from "./head.js";
+import { plainId, plainPayload } from "./ids.js";
 import { checkIndex } from "./index.js";
 import { profile, within } from "./limits.js";
 import { checkPlainChunk } from "./plain.js";
 import { apply, readRecords } from "./metadata.js";
 import { readQuality } from "./qual.js";
-import { sha256 } from "./sha256.js";
 import { Attachment, readAlias, readModel, readTemplate } from "./shared.js";
 import { readSkeleton } from "./skel.js";
 import { frameNumbers } from "./time-base.js";
 
-const ID_SIZE = 16;
 const BASE_PROFILE = 0;
 
 /**
@@ -148,17 +147,17 @@ export class Walk {
   readInBody(chunk) {
     switch (chunk.type) {
       case "SKEL":
-        this.addShared(chunk, this.file.skeletons, (id) =>
-          readSkeleton(chunk.payload, id, this.references),
+        this.addShared(chunk, this.file.skeletons, (plain, id) =>
+          readSkeleton(plain, id, this.references),
         );
         break;
       case "MODL":
         this.countModel(chunk.payload);
-        this.addShared(chunk, this.file.models, () => this.readModel(chunk.payload));
+        this.addShared(chunk, this.file.models, (plain) => this.readModel(plain));
         break;
       case "SRCE":
-        this.addShared(chunk, this.file.templates, () =>
-          readTemplate(chunk.payload, this.file.limits, this.inflateLimit),
+        this.addShared(chunk, this.file.templates, (plain) =>
+          readTemplate(plain, this.file.limits, this.inflateLimit),
         );
         break;
       case "ATTA":
@@ -180,11 +179,12 @@ export class Walk {
 
   /** SKEL, MODL and SRCE: the first of each id counts. */
   addShared(chunk, map, read) {
-    const id = sha256(chunk.payload).subarray(0, ID_SIZE);
+    const { type, offset, payload } = chunk;
+    const plain = plainPayload(type, payload, this.file.limits, this.inflateLimit);
+    const id = plainId(type, plain);
     const key = hex(id);
     if (map.has(key)) return;
-    map.set(key, read(id));
-    const { type, offset, payload } = chunk;
+    map.set(key, read(plain, id));
     this.file.shared.push({ type, id, offset, length: payload.length });
   }
 

@@ -45,14 +45,14 @@ from mcz.container.packets import (
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
 from mcz.container.value_hash import canonical, value_hash
 from mcz.container.versions import FORMAT_NAME
-from mcz.container.writer import Writer, payload_id
+from mcz.container.writer import Writer
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import deflate, parse, varint
 from mcz.writing.clip_check import ClipCopy, Decoded
 from mcz.writing.clip_writer import write_plan, write_skeleton
 from mcz.writing.planning import SignalPlan, plan_clip
 from mcz.writing.prepare import Prepared
-from tools.records import built, update
+from tools.records import built, id_of, update
 from tools.vectors.build.edits import Edit, Made, put
 from tools.vectors.build.motions import dance, puppet
 
@@ -185,7 +185,7 @@ class Crafter(Writer):
 
     def shared(self, kind: bytes, payload: bytes) -> bytes:
         payload = self.edited(kind.decode(), payload)
-        id_ = payload_id(payload)
+        id_ = id_of(kind, payload)
         if (kind, id_) not in self.directory.shared:
             self.directory.shared[kind, id_] = self.plain_chunk(kind, payload)
         return id_

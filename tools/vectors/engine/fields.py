@@ -8,8 +8,7 @@ from typing import Any
 
 from mcz.container import copy_records, index_records, note_records, payloads
 from mcz.container.index_records import Index
-from mcz.container.packed import words
-from mcz.container.strict import decoded
+from mcz.container.packed import decoded, words
 from mcz.formats import notes
 from mcz.formats.c3d_layout import C3dDetail, C3dTemplate
 from mcz.formats.layout import Detail, Template

@@ -41,9 +41,9 @@ from mcz.container.packets import (
 from mcz.container.segments import SegmentHeader, build_segment, mask_of
 from mcz.container.segments import parse_header as parse_segment
 from mcz.container.source import open_source
-from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
 from mcz.schema import EXTENDED, build, deflate, parse, read_varint
+from tools.records import id_of
 
 SHARED = (b"SKEL", b"MODL", b"SRCE")
 REFER = (b"SKEL", b"CLIP", b"ALIA")  # chunks that name shared ones
@@ -184,7 +184,9 @@ class Layout:
     def __init__(self, data: bytes) -> None:
         self.parts = list(parts_of(data))
         self.data, self.signature = data, data[: len(SIGNATURE)]
-        self.ids = {part: payload_id(part.payload) for part in self.parts if part.type in SHARED}
+        self.ids = {
+            part: id_of(part.type, part.payload) for part in self.parts if part.type in SHARED
+        }
         self.headers = {part: part.taken_apart().header for part in self.parts if has_segment(part)}
         self.payloads = {part: part.payload for part in self.parts}
 
@@ -208,7 +210,7 @@ class Layout:
                 for old, new in renamed.items():
                     part.payload = part.payload.replace(old, new)
             if part in self.ids:
-                new = payload_id(part.payload)
+                new = id_of(part.type, part.payload)
                 if new != self.ids[part]:
                     renamed[self.ids[part]] = new
         self.renamed = renamed

@@ -45,6 +45,7 @@ from tools.vectors.build.source_files import (
     take,
 )
 from tools.vectors.build.spatial_clips import CLIP, Plan, basis_of, file_with
+from tools.vectors.build.words import after_words, packed
 
 LATER = b"more, from a later version"
 
@@ -87,21 +88,27 @@ def _appended_without_index(shelf: Whole) -> None:
 
 def _repeated_template(shelf: Whole) -> None:
     plain = take(PLAIN, "plain")
-    crafter = Crafter()
-    crafter.clip(plain)
-    for kind in (b"SRCE", b"SKEL"):
-        places = crafter.directory.shared.items()
-        place = next(chunk for (other, _), chunk in places if other == kind)
-        assert place.length is not None
-        crafter.plain_chunk(kind, crafter.data[place.payload_offset :][: place.length])
     again = replace(plain, name="again", source=None)
-    data = finished(crafter, again)
-    purpose = "The same SRCE and SKEL twice: INDX lists the first."
-    sources = (("plain.bvh", PLAIN),)
-    shelf.hold(
-        "repeated-template", "Grammar; INDX", purpose, data, plain, again,
-        sources=sources, modes=BOTH,
-    )  # fmt: skip
+    edits = {b"SRCE": after_words, b"SKEL": packed}
+    cases = {
+        "repeated-template": ({}, "The same SRCE and SKEL twice: INDX lists the first."),
+        "one-id": (edits, "SRCE and SKEL twice, the second time with other compression: one id."),
+    }
+    for name, (others, purpose) in cases.items():
+        crafter = Crafter()
+        crafter.clip(plain)
+        for kind in (b"SRCE", b"SKEL"):
+            places = crafter.directory.shared.items()
+            place = next(chunk for (other, _), chunk in places if other == kind)
+            assert place.length is not None
+            payload = crafter.data[place.payload_offset :][: place.length]
+            crafter.plain_chunk(kind, others[kind](payload) if others else payload)
+        data = finished(crafter, again)
+        sources = (("plain.bvh", PLAIN),)
+        shelf.hold(
+            name, "Grammar; INDX; Conventions", purpose, data, plain, again,
+            sources=sources, modes=BOTH,
+        )  # fmt: skip
 
 
 def _packets(shelf: Whole) -> None:
