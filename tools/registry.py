@@ -46,19 +46,19 @@ def registry(text: str) -> dict[str, Any]:
         "identification": _keyed(
             rows_after(text, "**Identification**"), "what", "value", "meaning"
         ),
-        "chunk_types": _keyed(rows_after(text, "**Chunk types**"), "type", "flags", "meaning"),
+        "chunk_types": _keyed(rows_after(text, "**Chunk types.**"), "type", "flags", "meaning"),
         "profiles": [
             {"id": id_, "name": name, "limits": {row[0]: _number(row[at]) for row in limits}}
             for id_, name, at in ((0, "base", 2), (1, "large", 3), (2, "small", 1))
         ],
         "codecs": _keyed(
             rows_after(text, "## Codecs\n"),
-            *("id", "name", "version", "decodes", "groups", "resolutions"),
+            *("id", "name", "version", "decodes", "groups", "resolutions", "presets"),
         ),
         "presets": [
-            {"codec": int(codec), "id": id_, "preset": name}
-            for codec, names in rows_after(text, "**Presets.**")
-            for id_, name in enumerate(names.split(", "), 1)
+            {"codec": int(row[0]), "id": id_, "preset": name}
+            for row in rows_after(text, "## Codecs\n")
+            for id_, name in enumerate(filter(None, row[6].split(", ")), 1)
         ],
         "point_sets": _keyed(rows_after(text, "**Points.**"), "id", "of", "points"),
         "source_formats": _keyed(
