@@ -120,6 +120,18 @@ def column_of(axis: str) -> int:
     return "xyz".index(axis[-1])
 
 
+def signs_of(axis: str) -> NDArray[np.float64]:
+    """Signs of x, y and z that make an axis positive, by half a turn about the one before it.
+
+    >>> signs_of("z").tolist(), signs_of("-z").tolist()
+    ([1.0, 1.0, 1.0], [-1.0, 1.0, -1.0])
+    """
+    signs, column = np.ones(3), column_of(axis)
+    if axis.startswith("-"):
+        signs[[column, (column + 1) % 3]] = -1.0
+    return signs
+
+
 SKELETON = {
     "joints": several(of_type(Joint, "a joint"), "joints"),
     "name": NAME,

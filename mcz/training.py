@@ -17,6 +17,7 @@ from mcz.codecs.gaps import fill_gaps
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import point_names, positions
 from mcz.motion import Motion
+from mcz.skeleton import column_of
 from mcz.transforms.dct import dct_matrix
 from mcz.transforms.lsdt import GROWTH, ITERATIONS, SPARSITY, Learned, learn_bases
 from mcz.types import JsonObject
@@ -24,7 +25,6 @@ from mcz.types import JsonObject
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
-AXES = "xyz"
 KINDS = ("frames", "steps", "windows")
 STEP_FRAMES = 8  # of a step: short against a movement, long against the noise of a capture
 WINDOW_FRAMES, WINDOW_KEPT = 120, 12  # of a window; its later coefficients hold next to nothing
@@ -35,7 +35,7 @@ SIDES = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", 
 class TrainingSet:
     """Clips of one set of points, each float64 (n_frames, J, 3), without missing points.
 
-    ``up`` is "x", "y" or "z"; ``unit`` is "cm", or "" where the clips do not say theirs.
+    ``up`` is "x" to "-z"; ``unit`` is "cm", or "" where the clips do not say theirs.
     ``n_filled`` counts the frames in which a point was missing; it lies on a straight line there,
     as the codecs fill gaps.
     """
@@ -112,7 +112,7 @@ def mirrored(found: TrainingSet) -> TrainingSet:
     order = mirror_order(found.names)
     if order == list(range(len(order))):
         raise OptionError("no two points have names that differ in left and right alone")
-    axis = 2 if found.up == "x" else 0
+    axis = 2 if column_of(found.up) == 0 else 0
     images = []
     for clip in found.clips:
         image = clip[:, order]
@@ -143,7 +143,7 @@ def turned(found: TrainingSet, n_turns: int) -> TrainingSet:
     """
     if n_turns < 1:
         raise OptionError(f"{n_turns} headings; at least one is needed")
-    up = AXES.index(found.up)
+    up = column_of(found.up)
     a, b = (up + 1) % 3, (up + 2) % 3
     clips = []
     for turn in range(n_turns):

@@ -153,6 +153,8 @@ def test_what_nobody_says_is_guessed_and_said() -> None:
         assert (found.up_axis, found.up_guessed) == (axis, True)
         assert (found.frame_rate, found.rate_assumed) == (120.0, True)
         assert found.runs == known.runs
+    upside_down = contacts(markers("lfoot body", places * [1, -1, -1], up_axis="-y"))
+    assert (upside_down.up_axis, upside_down.runs) == ("-y", known.runs)
     nothing = contacts(markers("lfoot", np.full((20, 1, 3), np.nan), up_axis=""))
     assert (nothing.up_axis, nothing.runs) == ("y", ())
 

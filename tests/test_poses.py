@@ -170,6 +170,8 @@ def test_headings_count_turns() -> None:
     values = np.stack([spin, np.full(50, 20.0)], axis=1)
     motion = Motion(Skeleton((joint,), up_axis="y"), (Signal(values),))
     np.testing.assert_allclose(mcz.root(motion).headings, np.radians(spin), atol=1e-9)
+    down = replace(motion, skeleton=Skeleton((joint,), up_axis="-y"))
+    np.testing.assert_allclose(mcz.root(down).headings, np.radians(-spin), atol=1e-9)
     with pytest.raises(mcz.OptionError, match="points up is unknown"):
         _ = mcz.root(replace(motion, skeleton=Skeleton((joint,)))).headings
 

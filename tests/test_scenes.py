@@ -36,6 +36,9 @@ TO_Y_UP = {
     "x": np.array([(0, -1, 0), (1, 0, 0), (0, 0, 1)]),
     "y": np.eye(3),
     "z": np.array([(1, 0, 0), (0, 0, 1), (0, -1, 0)]),
+    "-x": np.array([(0, 1, 0), (-1, 0, 0), (0, 0, 1)]),
+    "-y": np.diag((1, -1, -1)),
+    "-z": np.array([(1, 0, 0), (0, 0, -1), (0, 1, 0)]),
 }
 
 
@@ -71,7 +74,7 @@ def check(motion: Motion, **options: object) -> SceneFile:
     return made
 
 
-@given(skeletons(), st.integers(0, 2**32), st.sampled_from(["", *"xyz"]), st.booleans())
+@given(skeletons(), st.integers(0, 2**32), st.sampled_from([*TO_Y_UP]), st.booleans())
 def test_any_skeleton(skeleton: Skeleton, seed: int, up: str, known: bool) -> None:
     """Scales, lengths, quaternions, axes and radians included."""
     skeleton = replace(skeleton, up_axis=up, unit_cm=2.5 if known else None)

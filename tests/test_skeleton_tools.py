@@ -15,6 +15,7 @@ from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Si
 from mcz.kinematics import origins_of, shell_points_of
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.scaling import Scaling
+from mcz.reading.source_options import SourceOptions
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth, stored
 from tests.skeletons import skeletons, values_for
@@ -264,3 +265,22 @@ def test_joints_of_real_clips_stay_where_they_are(data: Path) -> None:
         print(path, selected, f"apart by {missed:.1e}")
         assert selected.skeleton.joint_names == tuple(joints)
         assert missed < 1e-12
+
+
+def test_axes_have_signs_and_are_not_parallel(tmp_path: Path) -> None:
+    said = SourceOptions(up="-y", forward="+z", handedness="left")
+    motion = said.applied_to(bvh_walk())
+    found = motion.skeleton
+    assert (found.up_axis, found.forward_axis, found.handedness) == ("-y", "z", "left")
+    mcz.write(motion, tmp_path / "walk.mcz")
+    again = mcz.read(tmp_path / "walk.mcz")
+    assert again.skeleton == found
+    assert (again.values == bvh_walk().values).all()
+    assert SourceOptions(up="x", forward="y").completing(motion).skeleton == found
+    assert mcz.Skeleton((), up_axis="+y").up_axis == "y"
+    with pytest.raises(mcz.MotionError, match="parallel"):
+        mcz.Skeleton((), up_axis="y", forward_axis="-y")
+    with pytest.raises(mcz.OptionError, match="parallel"):
+        SourceOptions(up="y", forward="y")
+    with pytest.raises(mcz.OptionError, match="neither right nor left"):
+        SourceOptions(handedness="both")

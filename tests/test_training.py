@@ -272,10 +272,10 @@ def test_mirrored_copies() -> None:
         mirrored(replace(small(), names=("a", "b", "c")))
 
 
-@pytest.mark.parametrize("up", ["x", "y", "z"])
+@pytest.mark.parametrize("up", ["x", "y", "z", "-y"])
 def test_headings_turn_about_the_up_axis(up: str) -> None:
     found = turned(small(up), 3)
-    axis = "xyz".index(up)
+    axis = "xyz".index(up[-1])
     assert len(found.clips) == 3
     assert found.clips[0] == pytest.approx(small(up).clips[0])
     for clip in found.clips:

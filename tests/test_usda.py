@@ -54,6 +54,15 @@ def test_a_sample_a_frame() -> None:
     assert "timeSamples" not in mcz.to_usda(still).data.decode()
 
 
+@pytest.mark.parametrize(
+    ("up", "turn"),
+    [("x", (0, 0, 90)), ("-x", (0, 0, -90)), ("-y", (180, 0, 0)), ("-z", (90, 0, 0))],
+)
+def test_other_axes_are_turned_to_y(up: str, turn: tuple[int, int, int]) -> None:
+    text = mcz.to_usda(replace(BVH, skeleton=replace(BVH.skeleton, up_axis=up))).data.decode()
+    assert f"float3 xformOp:rotateXYZ = {turn}\n" in text and 'upAxis = "Y"' in text
+
+
 def test_what_cannot_be_said() -> None:
     with pytest.raises(OptionError, match="its frame rate is unknown, and USDA states times"):
         mcz.to_usda(replace(AMC, frame_rate=None))

@@ -15,6 +15,7 @@ from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.numbers import Grid, GridKind
 from mcz.poses import point_names, positions
 from mcz.reading.source_options import SourceOptions
+from mcz.skeleton import AXES
 from mcz.types import JsonObject, Reals, Values
 from mcz.units import UNIT_CM
 
@@ -106,7 +107,7 @@ def from_movement(
     rate, numbers = _frames(dataset, times, name)
     facts = dataset.attrs
     unit = unit or (facts.get("length_unit") if facts.get("length_unit") in UNIT_CM else None)
-    up = up or (facts.get("up_axis") if facts.get("up_axis") in ("x", "y", "z") else None)
+    up = up or (facts.get("up_axis") if facts.get("up_axis") in AXES[1:] else None)
     skeleton = Skeleton(joints, angle_unit="")
     motion = Motion(skeleton, tuple(signals), None, name=name, frame_numbers=numbers)
     motion = SourceOptions(unit=unit, up=up).applied_to(replace(motion, frame_rate=rate))

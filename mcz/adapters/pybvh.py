@@ -33,7 +33,7 @@ def from_pybvh(bvh: Any, *, unit: str | None = None, up: str | None = None) -> M
     """The motion in a ``pybvh.Bvh``, its numbers as they are: angles in radians.
 
     The root's positions replace its offset, as they do in pybvh. ``unit`` ("cm", "m", ...) and
-    ``up`` ("x", "y", "z") say what it does not. Raises OptionError for another one.
+    ``up`` ("x" to "-z") say what it does not. Raises OptionError for another one.
     """
     if not hasattr(bvh, "joint_angles"):
         raise OptionError(f"a {type(bvh).__name__} is no pybvh.Bvh; mcz.read reads files")
@@ -94,13 +94,13 @@ def to_pybvh(motion: Motion) -> Any:
             site = pybvh.bvhnode.BvhEndSite(end, np.array(tail), made[joint])
             made[joint].children = [*made[joint].children, site]
             nodes.append(site)
-    up = motion.skeleton.up_axis
+    up = motion.skeleton.up_axis or "auto"
     return pybvh.Bvh(
         nodes,
         tree.root_places(),
         angles,
         float(1 / motion.frame_rate) if motion.frame_rate else 0,
-        world_up=f"+{up}" if up else "auto",
+        world_up=f"+{up}" if len(up) == 1 else up,
         warn_on_disagreement=False,
     )
 

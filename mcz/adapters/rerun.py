@@ -110,9 +110,11 @@ class _Log:
     def _still(self) -> None:
         """What does not change: axes, names, colors, events."""
         rerun, log = self.rerun, self.recording.log
-        up = self.moving.skeleton.up_axis
-        if up:
-            axes = getattr(rerun.ViewCoordinates, f"RIGHT_HAND_{up.upper()}_UP")
+        skeleton = self.moving.skeleton
+        if up := skeleton.up_axis:
+            hand = (skeleton.handedness or "right").upper()
+            end = "DOWN" if up.startswith("-") else "UP"
+            axes = getattr(rerun.ViewCoordinates, f"{hand}_HAND_{up[-1].upper()}_{end}")
             log(str(self.path()), axes, static=True)
         if self.figure is not None:
             for name, side in zip(self.figure.names, self.figure.sides, strict=True):

@@ -192,7 +192,7 @@ def unit_option(what: str) -> Callable[[Function], Function]:
 
 def up_option(what: str) -> Callable[[Function], Function]:
     """``--up``, as the argument ``up``; ``what`` is its help."""
-    return click.option("--up", type=click.Choice(("x", "y", "z")), help=what)
+    return click.option("--up", type=click.Choice(("x", "y", "z", "-x", "-y", "-z")), help=what)
 
 
 ARRAYS = ("positions", "rotation-vectors", "quaternions-wxyz", "quaternions-xyzw")

@@ -26,7 +26,9 @@ from mcz.numbers.scaling import Scaling
 
 Vector = tuple[float, float, float]
 UNSIGNED = b"UNSIGNED"
-UP = {"+X": "x", "+Y": "y", "+Z": "z", "X": "x", "Y": "y", "Z": "z"}
+UP = {sign + axis.upper(): axis for sign in ("+", "") for axis in "xyz"} | {
+    f"-{axis.upper()}": f"-{axis}" for axis in "xyz"
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,14 +101,13 @@ class Recording:
 
     @property
     def up_axis(self) -> str:
-        """The axis that points up: "x", "y", "z", or "" while that is unknown.
+        """The axis that points up: "x" to "-z", or "" while that is unknown.
 
-        It is that of POINT:Y_SCREEN, the axis that points up on a screen, where it has no minus. A
-        skeleton names the axis whose positive end is up, so that "-Z" remains unknown; so does an
-        axis that is X_SCREEN's as well.
+        It is that of POINT:Y_SCREEN, the axis that points up on a screen. An axis that is
+        X_SCREEN's as well remains unknown.
         """
         up = UP.get(self.y_screen.upper(), "")
-        return "" if up and self.x_screen.upper().endswith(up.upper()) else up
+        return "" if up and self.x_screen.upper().endswith(up[-1].upper()) else up
 
     @property
     def scaling(self) -> Scaling | None:

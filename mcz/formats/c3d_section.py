@@ -19,7 +19,14 @@ from mcz.numbers.scaling import Scaling
 LABELS_PER_PARAMETER = 255
 LABELS_SIZE = 30_000  # bytes of a parameter of labels; its length must fit 15 bits
 MAX_LABEL = 255
-SCREENS = {"x": ("+Y", "+X"), "y": ("+X", "+Y"), "z": ("+X", "+Z")}  # to the right, up
+SCREENS = {  # to the right, up
+    "x": ("+Y", "+X"),
+    "y": ("+X", "+Y"),
+    "z": ("+X", "+Z"),
+    "-x": ("+Y", "-X"),
+    "-y": ("+X", "-Y"),
+    "-z": ("+X", "-Z"),
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from mcz.kinematics.chain import Floats
 from mcz.kinematics.feet import feet_of
 from mcz.kinematics.points import first_points, positions_of
 from mcz.motion import Motion, Skeleton
+from mcz.skeleton import column_of, signs_of
 
 Flags = NDArray[np.bool_]
 
@@ -64,7 +65,7 @@ class Contacts:
     """All contacts of a motion, joint by joint in the order of the skeleton, each in time order.
 
     ``joints`` are those that were looked at, as ``Skeleton.addresses`` names them. ``up_axis`` is
-    "x", "y" or "z", and ``up_guessed`` where the skeleton does not say it; ``rate_assumed`` where
+    "x" to "-z", and ``up_guessed`` where the skeleton does not say it; ``rate_assumed`` where
     ``frame_rate`` is 120 because nobody says it. Raises MotionError where a run is of another
     joint or beyond the frames.
     """
@@ -179,15 +180,15 @@ class FootTracks:
         frame_rate = rate or USUAL_RATE
         parts = runs or [(0, self.feet.shape[1])]
         with np.errstate(over="ignore"):  # what overflows is unknown
-            places = self.feet * self.unit_cm
+            places = self.feet * (self.unit_cm * signs_of(up))
         return Contacts(
             runs=tuple(
                 Contact(joint, start + first, n_frames)
                 for joint, track in zip(self.joints, places, strict=True)
-                for floor in [floor_of(track, AXES.index(up), rule)]
+                for floor in [floor_of(track, column_of(up), rule)]
                 for start, stop in parts
                 for first, n_frames in runs_of(
-                    track[start:stop], frame_rate, AXES.index(up), rule, floor
+                    track[start:stop], frame_rate, column_of(up), rule, floor
                 )
             ),
             joints=self.joints,

@@ -92,7 +92,7 @@ def begin_live(
         metadata[SKELETON_NOTE] = "; ".join(filter(None, found))
     writer = LiveWriter(
         sink,
-        facing(in_unit(arriving.skeleton, options.unit), options.up),
+        facing(in_unit(arriving.skeleton, options.unit), *options.axes),
         encoding.codec,
         encoding.params,
         frame_rate=arriving.frame_rate if options.rate is None else Fraction(options.rate),

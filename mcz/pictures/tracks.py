@@ -28,6 +28,7 @@ from mcz.pictures.bodies import (
     size_of,
 )
 from mcz.poses.moving import Moving, values_of
+from mcz.skeleton import signs_of
 from mcz.units import unit_cm_of
 
 BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
@@ -88,7 +89,7 @@ def track_of(moving: Moving, frames: Ints, unit: str | None, up: str | None) -> 
     if not known_places(seen).any():
         raise unknown(moving)
     axis = skeleton.up_axis or up or guessed_up(body, seen)
-    seen = seen[:, :, TURNS[axis]]
+    seen = _turned(seen, axis)
     body = fitted(body, seen)
     size = size_of(seen[:, body.shown])
     track = Track(
@@ -149,13 +150,18 @@ def _blocks(
         stop = max(at + 1, int(np.searchsorted(frames, frames[at] + longest)))
         first, last = int(frames[at]), int(frames[stop - 1]) + 1
         values = values_of(moving, (first, last), every)[::per_frame][frames[at:stop] - first]
-        places = body.places(values)[:, :, TURNS[up]]
+        places = _turned(body.places(values), up)
         with np.errstate(all="ignore"):
             places *= scale
             unseen = ~(np.abs(places) < FARTHEST)
         places[unseen] = np.nan
         yield frames[at:stop], places
         at = stop
+
+
+def _turned(places: Floats, up: str) -> Floats:
+    found: Floats = (places * signs_of(up))[:, :, TURNS[up[-1]]]
+    return found
 
 
 def _samples_per_frame(moving: Moving) -> int:

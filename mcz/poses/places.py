@@ -26,7 +26,7 @@ from mcz.poses.moving import (
     scale_to,
     values_of,
 )
-from mcz.skeleton import Joints, joint_list
+from mcz.skeleton import Joints, column_of, joint_list, signs_of
 from mcz.types import Reals
 
 
@@ -159,8 +159,8 @@ class Root:
     """Where the root is and how it is turned, frame by frame.
 
     ``positions`` (n_frames, 3) in length units (or the unit that was asked for), ``rotations``
-    (n_frames, 4), quaternions in the world, w first, ``joint`` its name, ``up_axis`` "x", "y", "z",
-    or "" while unknown.
+    (n_frames, 4), quaternions in the world, w first, ``joint`` its name, ``up_axis`` "x" to
+    "-z", or "" while unknown.
     """
 
     joint: str
@@ -179,7 +179,9 @@ class Root:
         """
         if not self.up_axis:
             raise OptionError(f"root {self.joint!r}: the axis that points up is unknown (up=)")
-        twist = self.rotations[:, 1 + "xyz".index(self.up_axis)].astype(np.float64)
+        column = column_of(self.up_axis)
+        sign = float(signs_of(self.up_axis)[column])
+        twist = self.rotations[:, 1 + column].astype(np.float64) * sign
         angles = 2.0 * np.arctan2(twist, self.rotations[:, 0].astype(np.float64))
         known = np.isfinite(angles)
         angles[known] = np.unwrap(angles[known])

@@ -34,7 +34,7 @@ def read(
     An AMC finds its ASF beside it, or takes ``skeleton``, a path, a Skeleton or "none"; how it was
     found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
-    ("x", "y", "z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
+    ("x" to "-z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
     NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". ``model``
     is a model file of SMPL and its kin, which says how long the bones of such a body in an NPZ are
     ("{gender}" and "{body}" in it: those of the take). Of an MCZ file ``clip`` is read, with

@@ -17,8 +17,9 @@ from mcz.units import facing, in_unit, unit_cm_of
 class SourceOptions:
     """What the caller says of a source file.
 
-    ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit`` and
-    ``up``, the axis that points up, say what the file does not; ``force_rate``: the rate holds also
+    ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit``,
+    ``up``, the axis that points up ("y", "-z"), ``forward``, the one that a figure faces, and
+    ``handedness`` ("right", "left") say what the file does not; ``force_rate``: the rate holds also
     where the file states one. ``arrays`` says what plain arrays are, ``model`` how long the bones
     of bodies are, see ``mcz.read``. ``verbatim``: a file that cannot be parsed is kept as an
     attachment. ``keep_skeleton``: an ASF is restored as well, under its own name. ``flat``: a file
@@ -36,15 +37,22 @@ class SourceOptions:
     verbatim: bool = False
     keep_skeleton: bool = False
     flat: bool = False
+    forward: str | None = None
+    handedness: str | None = None
 
     def __post_init__(self) -> None:
         if self.rate is not None:
             checked_rate(self.rate)
         if self.unit is not None:
             unit_cm_of(self.unit)
-        facing(Skeleton(()), self.up)
+        facing(Skeleton(()), *self.axes)
         if self.arrays is not None:
             kinds_of(self.arrays)
+
+    @property
+    def axes(self) -> tuple[str | None, str | None, str | None]:
+        """What is said of axes, as ``facing`` takes it."""
+        return self.up, self.forward, self.handedness
 
     def applied_to(self, motion: Motion) -> Motion:
         """``motion`` with the facts that are stated; raises MotionError for arrays that differ."""
@@ -57,8 +65,8 @@ class SourceOptions:
             motion = motion.at_rate(rate)
         if self.unit is not None:
             motion = replace(motion, skeleton=in_unit(motion.skeleton, self.unit))
-        if self.up is not None:
-            motion = replace(motion, skeleton=facing(motion.skeleton, self.up))
+        if any(self.axes):
+            motion = replace(motion, skeleton=facing(motion.skeleton, *self.axes))
         return motion
 
     def completing(self, motion: Motion) -> Motion:
@@ -69,6 +77,8 @@ class SourceOptions:
             force_rate=False,
             unit=self.unit if skeleton.unit_cm is None else None,
             up=None if skeleton.up_axis else self.up,
+            forward=None if skeleton.forward_axis else self.forward,
+            handedness=None if skeleton.handedness else self.handedness,
         )
         return unknown.applied_to(motion)
 

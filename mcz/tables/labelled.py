@@ -102,6 +102,10 @@ def _facts(motion: Motion) -> Settings:
     """Texts and numbers alone, which every store of xarray keeps."""
     skeleton, rate = motion.skeleton, motion.frame_rate
     facts: Settings = {"name": motion.name, "up_axis": skeleton.up_axis or "unknown"}
+    if skeleton.forward_axis:
+        facts["forward_axis"] = skeleton.forward_axis
+    if skeleton.handedness:
+        facts["handedness"] = skeleton.handedness
     if rate is not None:
         facts |= {"frame_rate": float(rate), "frame_rate_exact": str(rate)}
     if skeleton.unit_cm is not None:

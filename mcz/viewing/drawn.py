@@ -14,6 +14,7 @@ from mcz.kinematics.points import first_points, listed_points
 from mcz.motion import Motion, Skeleton
 from mcz.reading.clip import Clip
 from mcz.retargeting.sides import sides_of
+from mcz.skeleton import column_of, signs_of
 
 MOST_POINTS = 4096
 MOST_READ = 3000  # frames of a clip that are decoded to show some of them
@@ -22,7 +23,6 @@ RATE = 30.0  # frames a second that are enough; the player draws what lies betwe
 MISSING = -32768  # the word of a coordinate that is not known
 LARGEST = 32767
 FAR = 1e100  # what is farther away is missing: nothing else would be seen beside it
-AXES = {"x": 0, "y": 1, "z": 2}
 Words = NDArray[np.int16]
 Moving: TypeAlias = Motion | Clip
 
@@ -72,8 +72,10 @@ def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
     every = max(every, -(-n_read // max(1, most_frames)))
     places = positions_of(skeleton, _values(moving, n_read, every))
     places[~(np.abs(places) < FAR).all(axis=2)] = np.nan
+    axis = skeleton.up_axis or "y"
+    places *= signs_of(axis)
     words, step, middle = _words(places)
-    up = AXES[skeleton.up_axis or "y"]
+    up = column_of(axis)
     known = places[np.isfinite(places).all(axis=2)] - middle
     floor = float(known[:, up].min(initial=0.0))
     return Drawn(words, step, every, n_read, up, floor, float(np.abs(known).max(initial=0.0)))

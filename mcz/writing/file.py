@@ -95,7 +95,7 @@ def encode(
 
     ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
-    up ("x", "y", "z"). ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``, ``copies``
+    up ("x" to "-z"). ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``, ``copies``
     and ``threads`` are those of ``mcz.write``. Raises SourceError, OptionError, MotionError or
     LimitError; nothing is left under the final name then. A target that is the source or its
     skeleton is refused, even with ``force``.

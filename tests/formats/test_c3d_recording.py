@@ -193,7 +193,7 @@ def test_a_plain_file_says_what_words_mean(size: int) -> None:
         ("-X", "+Z", "z"),
         ("", "+z", "z"),
         ("", "Z", "z"),
-        ("-X", "-Z", ""),  # a skeleton has no word for it
+        ("-X", "-Z", "-z"),
         ("+Z", "+Z", ""),
         ("+X", "up", ""),
         ("+X", "", ""),

@@ -115,7 +115,7 @@ def to_glb(
     Keys are left out where interpolation keeps every joint, end of a bone and marker within
     ``key_error_mm`` in every frame, by default 0.1 mm; where the length unit is unknown, within
     1/20,000 of the figure's size. 0: a key in every frame. ``rate``, ``unit`` ("cm", "m", ...) and
-    ``up`` ("x", "y", "z") are used in place of the motion's own; where the last two are unknown, a
+    ``up`` ("x" to "-z") are used in place of the motion's own; where the last two are unknown, a
     unit becomes a meter and y points up, and ``notes`` say so.
 
     Raises OptionError where the frame rate is unknown, and where float32 numbers cannot keep the

@@ -62,7 +62,7 @@ class Node:
 class Scene:
     """The nodes, parents before children; lengths in meters, or units where these are unknown.
 
-    ``up_axis`` is "x", "y" or "z"; ``size`` that of the figure; ``times`` (n_frames,) in seconds
+    ``up_axis`` is "x" to "-z"; ``size`` that of the figure; ``times`` (n_frames,) in seconds
     from the first frame on, float32 numbers as float64; ``start``: the time of the first frame;
     ``codes`` (n_frames,): the times on the clock of the recording, in frames of ``rate``. ``notes``
     say in words what is unknown and what was left out.

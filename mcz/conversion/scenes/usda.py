@@ -20,7 +20,12 @@ from mcz.conversion.scenes.solids import COLORS, MARKER, SIDES, Solid, solid_of
 from mcz.kinematics.chain import Floats
 from mcz.types import JsonObject
 
-X_UP = "(0, 0, 90)"  # degrees about x, y and z: the axis x becomes y
+UP_TURNS = {  # degrees about x, y and z: that axis becomes y
+    "x": "(0, 0, 90)",
+    "-x": "(0, 0, -90)",
+    "-y": "(180, 0, 0)",
+    "-z": "(90, 0, 0)",
+}
 IDENTIFIER = re.compile(r"[^A-Za-z0-9_]")
 
 
@@ -68,9 +73,9 @@ def _named(scene: Scene) -> Iterator[str]:
 
 
 def _turned_up(scene: Scene) -> Iterator[str]:
-    """USD knows y and z as up; x is turned there."""
-    if scene.up_axis == "x":
-        yield f"float3 xformOp:rotateXYZ = {X_UP}"
+    """USD knows y and z as up; another axis is turned to y."""
+    if scene.up_axis in UP_TURNS:
+        yield f"float3 xformOp:rotateXYZ = {UP_TURNS[scene.up_axis]}"
         yield 'uniform token[] xformOpOrder = ["xformOp:rotateXYZ"]'
 
 

@@ -8,7 +8,7 @@ import { SourceError, clipOf, skeletonOf } from "./lines.js";
 const BLOCK = 512;
 const MAGIC = 0x50;
 const UNITS = { mm: 0.1, cm: 1, m: 100, in: 2.54 };
-const AXES = { "+X": 1, X: 1, "+Y": 2, Y: 2, "+Z": 3, Z: 3 };
+const AXES = { "+X": 1, X: 1, "+Y": 2, Y: 2, "+Z": 3, Z: 3, "-X": 4, "-Y": 5, "-Z": 6 };
 const TX = 1;
 
 /**

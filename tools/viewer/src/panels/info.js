@@ -83,17 +83,18 @@ function aliasFacts(aliases) {
 }
 
 function skeletonFacts(clip) {
-  const { points, bones, isMarkers, channels, unitCm, upAxis, upGuess } = clip;
+  const { points, bones, isMarkers, channels, unitCm, upAxis, isDown, upGuess } = clip;
   const n = points.length;
   const lines = counted(bones.length, isMarkers ? "line" : "bone");
   const guess = Number.isInteger(upGuess) ? `; taken as ${AXES[upGuess]}` : "";
+  const up = isDown ? `-${AXES[upAxis]}, shown upside down` : AXES[upAxis];
   return [
     ["Name", clip.skeleton],
     ["Joints", clip.joints && count(clip.joints.length)],
     ["Points", isMarkers ? `${counted(n, "marker")}, ${lines}` : `${counted(n, "point")}, ${lines}`],
     ["Channels", Array.isArray(channels) ? count(channels.length) : channels && count(channels)],
     ["Length unit", unitCm ? `${figure(unitCm)} cm` : "the file does not say"],
-    ["Up", AXES[upAxis] ?? `the file does not say${guess}`],
+    ["Up", up ?? `the file does not say${guess}`],
   ];
 }
 
