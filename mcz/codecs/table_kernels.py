@@ -1,4 +1,4 @@
-"""Compiled: a table of integers coded as residuals, row by row: bases, and the means of codec 4.
+"""Compiled: a table of integers coded as residuals, row by row: bases, and the means of pca.
 
 SPEC.md, "Numbers in a row" and "Bases", are normative. Imported on first use only.
 """

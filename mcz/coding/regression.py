@@ -1,6 +1,6 @@
 """Compiled: weighted recursive least squares, a regression that is learned while it is used.
 
-SPEC.md, "Codec 12: best", is normative. All is binary64 in the order written, nothing fused, so
+SPEC.md, "Codec 2: best", is normative. All is binary64 in the order written, nothing fused, so
 that every machine computes the same bits. Imported on first use only.
 
 Source: S. Haykin, *Adaptive Filter Theory*, 1986, in the covariance form; rows weigh less where

@@ -1,6 +1,6 @@
 """Compiled: the control points of one joint in one segment, coded as residuals, and the curves.
 
-SPEC.md, "Codec 3: qbc", is normative and has the steps below in the same order. One function
+SPEC.md, "Codec 17: qbc", is normative and has the steps below in the same order. One function
 serves encoder and decoder. Imported on first use only.
 """
 

@@ -1,6 +1,6 @@
-"""Compiled: the rows of one group, coded by codec 12, ``best``.
+"""Compiled: the rows of one group, coded by ``best``.
 
-SPEC.md, "Codec 12: best", is normative and has the steps below in the same order. One function
+SPEC.md, "Codec 2: best", is normative and has the steps below in the same order. One function
 serves encoder and decoder. Imported on first use only.
 """
 

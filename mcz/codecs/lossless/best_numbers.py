@@ -1,6 +1,6 @@
-"""Compiled: one number of codec 12, ``best``, coded against what is predicted.
+"""Compiled: one number of ``best``, coded against what is predicted.
 
-SPEC.md, "Codec 12: best", is normative. A number of digits is counted in units of its class or of
+SPEC.md, "Codec 2: best", is normative. A number of digits is counted in units of its class or of
 the one above, so that its class need not be coded; digits below the unit come after it.
 """
 

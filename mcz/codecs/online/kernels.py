@@ -1,6 +1,6 @@
 """Compiled: frames of a group, each predicted, quantized with a step of its own, and coded.
 
-SPEC.md, "Codec 11: online", is normative and has the steps below in the same order. One function
+SPEC.md, "Codec 21: online", is normative and has the steps below in the same order. One function
 serves encoder and decoder. Imported on first use only.
 """
 

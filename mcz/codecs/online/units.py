@@ -1,6 +1,6 @@
 """The stream of a segment of ``online``: units, each a group of frames or a part of one.
 
-SPEC.md, "Codec 11: online", is normative.
+SPEC.md, "Codec 21: online", is normative.
 """
 
 from __future__ import annotations

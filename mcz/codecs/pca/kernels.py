@@ -1,7 +1,7 @@
 """Compiled: the coefficients of one segment, coded as residuals, and what they sum up to.
 
-SPEC.md, "Codec 4: pca", is normative and has the steps below in the same order. One function serves
-encoder and decoder. Imported on first use only.
+SPEC.md, "Codec 18: pca", is normative and has the steps below in the same order. One function
+serves encoder and decoder. Imported on first use only.
 """
 
 from __future__ import annotations

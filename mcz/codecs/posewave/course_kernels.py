@@ -1,6 +1,6 @@
 """Compiled: the approximations of a segment, row after row, each at the pose of the one before.
 
-SPEC.md, "Codec 13: posewave", is normative and has the steps below in the same order. Imported on
+SPEC.md, "Codec 3: posewave", is normative and has the steps below in the same order. Imported on
 first use only.
 """
 

@@ -1,6 +1,6 @@
 """Compiled: the head of a segment, which channels change and where all of them begin.
 
-SPEC.md, "Codec 13: posewave", is normative. One function serves encoder and decoder. Imported on
+SPEC.md, "Codec 3: posewave", is normative. One function serves encoder and decoder. Imported on
 first use only.
 """
 

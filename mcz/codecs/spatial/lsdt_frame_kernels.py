@@ -1,6 +1,6 @@
 """Compiled: frames one after the other, each as what it adds to the one before.
 
-SPEC.md, "Codec 7: lsdt-frame", is normative. One function serves encoder and decoder. Imported on
+SPEC.md, "Codec 19: lsdt-frame", is normative. One function serves encoder and decoder. Imported on
 first use only.
 """
 

@@ -1,7 +1,7 @@
 """Compiled: the quantized coefficients of one window, coded as residuals, and their way back.
 
-SPEC.md, "Windows", is normative and has the steps below in the same order. One function serves
-encoder and decoder. Imported on first use only.
+SPEC.md, "Codec 20: lsdt-clip", is normative and has the steps below in the same order. One function
+serves encoder and decoder. Imported on first use only.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Compiled: simulated annealing of how many coefficients each channel keeps.
 
-SPEC.md, "Codec 6: awt", says what is sought; nothing here binds a decoder. Imported on first use
-only.
+mcz/codecs/wavelet/README.md says what is sought; nothing here binds a decoder. Imported on first
+use only.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Compiled: wavelet coefficients of one channel and one band, coded as residuals.
 
-SPEC.md, "Codec 2: mrdwt", is normative and has the steps below in the same order. One function
+SPEC.md, "Codec 16: wavelet", is normative and has the steps below in the same order. One function
 serves encoder and decoder. Imported on first use only.
 """
 

@@ -1,6 +1,6 @@
-"""Compiled: the rows of one group, coded by codec 1, ``lossless``.
+"""Compiled: the rows of one group, coded by ``lossless``.
 
-SPEC.md, "Codec 1: lossless", is normative and has the steps below in the same order. One
+SPEC.md, "Codec 128: lossless", is normative and has the steps below in the same order. One
 function serves encoder and decoder. Imported on first use only.
 """
 

@@ -1,4 +1,4 @@
-"""Compiled: how an encoder of codec 14, ``fast``, chooses lattice and predictor of a channel.
+"""Compiled: how an encoder of ``fast``, chooses lattice and predictor of a channel.
 
 Nothing here is normative: any plan decodes.
 """

@@ -1,6 +1,6 @@
-"""Compiled: the values of channels, as codec 14, ``fast``, decodes them.
+"""Compiled: the values of channels, as ``fast``, decodes them.
 
-SPEC.md, "Codec 14: fast", is normative and has the steps below in the same order. Imported on first
+SPEC.md, "Codec 1: fast", is normative and has the steps below in the same order. Imported on first
 use only.
 """
 

@@ -1,4 +1,4 @@
-"""Compiled: what codec 14, ``fast``, codes of a column, and how that becomes words and bits.
+"""Compiled: what ``fast``, codes of a column, and how that becomes words and bits.
 
 The inverse of ``kernels``, in the same order.
 """

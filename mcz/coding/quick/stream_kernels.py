@@ -1,6 +1,6 @@
-"""Compiled: the streams of a segment, as codec 14, ``fast``, decodes them.
+"""Compiled: the streams of a segment, as ``fast``, decodes them.
 
-SPEC.md, "Codec 14: fast", is normative. Imported on first use only.
+SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
 """
 
 from __future__ import annotations
