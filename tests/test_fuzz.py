@@ -111,7 +111,7 @@ def test_seeds_pass(name: str) -> None:
         try:
             decoded += target.check(seeds[key])
         except mcz.MczError:
-            harmless = "invalid", "uncommon", "long", "table-odd", "arrays-"  # long: decoded
+            harmless = "invalid", "uncommon", "long", "table-odd", "arrays-", "sections-numbers"
             assert any(word in key for word in harmless)
     assert decoded > 0
 

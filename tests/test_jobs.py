@@ -95,7 +95,7 @@ def outcomes(report: mcz.Report) -> list[tuple[Any, ...]]:
 CASES: list[dict[str, Any]] = [
     {},
     {"verbatim": True, "copies": False},
-    {"keep_all": True, "archive": True, "unit": "cm"},
+    {"keep_all": True, "profile": "large", "unit": "cm"},
     {"codec": "lsdt-clip", "up": "y", "rate": 60.0},
 ]
 
