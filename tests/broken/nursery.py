@@ -32,6 +32,7 @@ def main() -> None:
     for module in sorted({place.module for row in marks.places().values() for place in row}):
         importlib.import_module(module)
         variants.whole(module)
+    install.forget_known_answers()
     answers.vectors()
     functions = install.live()
     signal.signal(signal.SIGPROF, _hang)
