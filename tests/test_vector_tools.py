@@ -81,7 +81,6 @@ def test_stored_files_made_at_random_have_everything() -> None:
     said = " ".join(row["purpose"] for row in stored)
     for trait in (
         "packets of kind 2",
-        "packets of kind 3",
         "REPT",
         "unknown chunks in a clip",
         "unknown ancillary chunks",
@@ -149,7 +148,7 @@ def test_facts_are_those_of_the_files() -> None:
     for name, codecs in (
         ("valid/container/minimal", []),
         ("valid/mrdwt/signals", ["lossless", "wavelet"]),
-        ("valid/pca-rdo/clips", ["pca-rdo", "raw"]),
+        ("valid/pca-rdo/clips", ["lsdt-clip", "raw"]),
         ("invalid/numbers/kind-12", []),
         ("invalid/lossless/kind-3", ["lossless"]),
     ):
