@@ -7,15 +7,18 @@ mappings, which become the records of ``mcz.schema``.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
+import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from io import BytesIO
 from typing import Any, TypeVar
 
 import construct
 import numpy as np
 
-from mcz.container.packed import chunk_id
+from mcz.annexes import annex_bytes
+from mcz.container.packed import chunk_id, plain_id
+from mcz.container.payloads import AFTER_WORDS, ENCODING
 from mcz.errors import MczError
 from mcz.schema import EXTENDED, Record, build, read_varint, varint
 from mcz.schema.columns import Columns, read_column, read_varints
@@ -145,11 +148,26 @@ def extend(kind: Any, payload: bytes, path: str, more: bytes) -> bytes:
 
 
 def id_of(kind: bytes, payload: bytes) -> bytes:
-    """The id of a shared chunk; of one that cannot be inflated any."""
+    """The id of a shared chunk; of a faulty one what a lenient reader takes for it."""
     try:
         return chunk_id(kind, payload)
     except MczError:
-        return hashlib.sha256(payload).digest()[:16]
+        with suppress(MczError, IndexError):
+            payload = _leniently(payload) if kind == b"SRCE" else payload
+        return plain_id(kind, payload)
+
+
+def _leniently(payload: bytes) -> bytes:
+    """A SRCE with its template as far as it can be inflated, whatever is behind it."""
+    flags, (_, at) = payload[1], read_varint(payload, 2)
+    if not flags & ENCODING:
+        return payload
+    words = annex_bytes("words.bin") if flags & ENCODING == AFTER_WORDS else b""
+    inflater = zlib.decompressobj(-15, zdict=words[-(2**15) :])
+    text = b""
+    with suppress(zlib.error):
+        text = inflater.decompress(payload[at:])
+    return payload[:1] + b"\0" + payload[2:at] + text
 
 
 def update(record: Record, changes: Mapping[str, Any]) -> None:

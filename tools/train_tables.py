@@ -167,7 +167,7 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
         sizes = []
         for setting in plan.settings:
             options = plan.codec.options(setting)
-            source = MemorySource(given(plan.codec, options, motion), 0, plan.codec, SEGMENT_BYTES)
+            source = MemorySource(given(plan.codec, setting, motion), 0, plan.codec, SEGMENT_BYTES)
             encoded = plan.codec.encode(source, options)
             sizes.append(sum(len(s) for part in encoded.segments for s in part.streams))
             if number >= len(motions):
@@ -178,9 +178,9 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
     return [total // rounds for total in totals]
 
 
-def given(codec: Codec, options: Mapping[str, Any], motion: Motion) -> Motion:
+def given(codec: Codec, params: Mapping[str, Any], motion: Motion) -> Motion:
     """What the codec is given of a clip."""
-    return prepare(motion, codec, options).motion
+    return prepare(motion, codec, params).motion
 
 
 if __name__ == "__main__":

@@ -151,7 +151,7 @@ def work_of(
     """Encoding and decoding by the codec alone, of values in the domain that it wants."""
     codec = by_name(name)
     options = codec.options(params)
-    wanted = prepare(motion, codec, options).motion
+    wanted = prepare(motion, codec, params).motion
 
     def encode() -> tuple[Encoded, list[Segment]]:
         source = MemorySource(wanted, 0, codec, BASE.segment_bytes, options)

@@ -72,9 +72,13 @@ class Codecs(MutableMapping[str, Codec]):
 
     def find(self, id_: int, preset: int) -> str | None:
         """The name of the codec of these ids, or of the first that decodes ``id_``."""
-        names = [name for name, home in self._homes.items() if home.id == id_]
-        own = (name for name in names if self._homes[name].preset == preset)
-        return next(own, names[0] if names else None)
+        return self._first(id_, preset) or self._first(id_)  # CODEC-07
+
+    def _first(self, id_: int, preset: int | None = None) -> str | None:
+        for name, home in self._homes.items():
+            if home.id == id_ and preset in (home.preset, None):
+                return name
+        return None
 
 
 CODECS = Codecs()
@@ -117,7 +121,7 @@ def by_id(id_: int, version: int, preset: int) -> Codec:
     codec = CODECS[name]
     if version > codec.version:  # CODEC-04, HEAD-05
         raise UnsupportedError(f"codec {codec.name}: version {version}, known is {codec.version}")
-    if preset != codec.preset:  # CODEC-07
+    if preset != codec.preset:
         codec = replace(codec, preset=preset, name=bitstream(id_) or codec.name)
     if version < codec.version:
         return replace(codec, version=version, decode=codec.earlier.get(version, codec.decode))

@@ -54,7 +54,17 @@ BASE = Profile(
 LARGE = Profile(1, "large", 2**20, 2**18, 2**34, 2**31, 2**40, 64 * 1024, 2**31, 2**20, 2**31)
 KIB = 2**10
 SMALL = Profile(
-    *(2, "small", 256, 256, 2 * MIB, 0, 64 * KIB, 64 * KIB, 64 * KIB, 16, 1024),
+    2,
+    "small",
+    channels=256,
+    joints=256,
+    segment_bytes=2 * MIB,
+    model_bytes=0,
+    chunk_bytes=64 * KIB,  # LIMIT-07
+    packet_bytes=64 * KIB,
+    text_bytes=64 * KIB,
+    signals=16,
+    rows=1024,
     is_plain=True,
     coded_bytes=48 * KIB,
 )

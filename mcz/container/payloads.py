@@ -340,9 +340,7 @@ class Clip(Record):
         Int8ul, "least format version that reads the clip, major", default=FORMAT[0]
     )
     needs_minor: int = field(
-        NEEDS_MINOR,  # CLIP-23
-        "least format version that reads the clip, minor",
-        default=FORMAT[1],
+        NEEDS_MINOR, "least format version that reads the clip, minor", default=FORMAT[1]
     )
     name: str = field(TEXT, "name of the clip, unique in the file, not empty")
     flags: int = field(

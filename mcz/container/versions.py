@@ -19,7 +19,7 @@ def _is_read(needs_minor: int, record: Container) -> bool:
     """Return true, or raise UnsupportedError where a file or clip needs another reader."""
     needed = record.needs_major, needs_minor  # HEAD-04
     words = f"it needs format {needed[0]}.{needed[1]}, this reader knows {FORMAT_NAME}"
-    if needed > FORMAT:  # HEAD-01
+    if needed > FORMAT:  # HEAD-01, CLIP-23
         raise UnsupportedError(words)
     if not needed[0] and needed != FORMAT:  # HEAD-03
         raise UnsupportedError(words, hint=Hint.OLD_FORMAT)

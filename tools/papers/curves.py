@@ -185,7 +185,7 @@ def speeds_beside(case: Case, settings: Sequence[tuple[Variant, float]]) -> list
         codec = by_name(variant.codec)
         if codec.live is not None and params.get("preset") is None:
             options = codec.options(params)
-            seconds = live_seconds(prepare(motion, codec, options).motion, codec, options)
+            seconds = live_seconds(prepare(motion, codec, params).motion, codec, options)
             live = row | {"live": True}
             rows.append(live | {f"{k}_fps": motion.n_frames / v for k, v in seconds.items()})
     return rows

@@ -255,12 +255,12 @@ def extended() -> bytes:
 
 
 @base
-def segments_of_zeros(n_rows: int, n_segments: int, padding: int = 0) -> bytes:
+def segments_of_zeros(n_rows: int, n_segments: int, padding: int = 0, n_channels: int = 1) -> bytes:
     """Zeros in segments of one byte of data, and an ancillary chunk of so many bytes."""
-    stream = raw_stream([[0]], [0])
+    stream = raw_stream([[0]] * n_channels, [0] * n_channels)
     edges = [n_rows * i // n_segments for i in range(n_segments + 1)]
     most = 2**24
-    hashed = [rehash(np.zeros((n_rows, 1)))] if n_rows <= most else []
+    hashed = [rehash(np.zeros((n_rows, n_channels)))] if n_rows <= most else []
 
     def many(_: Made) -> Made:
         pairs = zip(edges, edges[1:], strict=False)
@@ -272,7 +272,10 @@ def segments_of_zeros(n_rows: int, n_segments: int, padding: int = 0) -> bytes:
         CEND=both(put(payloads.Cend, "n_frames", varint(n_rows)), *hashed),
         row=indexed(n_frames=n_rows),
     )
-    crafter.clip(motions.column([0.0], Grid(GridKind.FIXED, 0)))
+    zeros = motions.column([0.0], Grid(GridKind.FIXED, 0))
+    if n_channels > 1:
+        zeros = motions.panel([[0.0]] * n_channels, [Grid(GridKind.FIXED, 0)] * n_channels)
+    crafter.clip(zeros)
     if padding:
         crafter.ancillary(b"xtra", bytes(padding))
     return finished(crafter)

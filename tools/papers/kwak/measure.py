@@ -240,7 +240,7 @@ def speeds(clip: Clip, variants: Sequence[tuple[Variant, Params]]) -> list[Recor
         rows.append(row | _per_second(motion, seconds))
         if codec.live is not None:
             options = codec.options(params)
-            seconds = live_seconds(prepare(motion, codec, options).motion, codec, options)
+            seconds = live_seconds(prepare(motion, codec, params).motion, codec, options)
             rows.append(row | {"live": True} | _per_second(motion, seconds))
     rows.append(_filter_speed(motion_in_positions(clip)))
     return rows

@@ -23,7 +23,7 @@ from mcz.container import payloads
 from mcz.errors import FormatError
 from mcz.motion import Joint, Skeleton
 from mcz.schema import varint
-from tools.vectors.build.edits import all_integers, headed, plus, put, says, stream, two_rows
+from tools.vectors.build.edits import all_integers, both, headed, plus, put, says, stream, two_rows
 from tools.vectors.build.files import Broken, Vector, rehash
 from tools.vectors.build.motions import channels
 from tools.vectors.build.pose_clips import (
@@ -184,7 +184,8 @@ def _signal(shelf: Broken) -> None:
 def _own_channels(count: int) -> Callable[[bytes], bytes]:
     """As many rotations in the place of the skeleton's channels."""
     flags = bytes([payloads.OWN_CHANNELS])
-    return put(payloads.Clip, "signals.0.flags", flags + varint(count) + b"\4\0\0" * count)
+    own = put(payloads.Clip, "signals.0.channels", varint(count) + b"\0\4" * count)
+    return both(own, put(payloads.Clip, "signals.0.flags", flags))
 
 
 def _nothing(shelf: Broken) -> None:

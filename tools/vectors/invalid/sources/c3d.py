@@ -183,6 +183,7 @@ def _parts_and_signals(shelf: Unrestorable) -> None:
         (Grid(GridKind.INTEGER),) * 17,
         "rotations",
         channels=tuple(Channel("", f"turn {c}") for c in range(17)),
+        role="rotations",
     )
     whole = c3d_file(size=2).build() + rotations.values.astype("<i2").tobytes()
     motion = replace(integers, signals=(*integers.signals, rotations))
