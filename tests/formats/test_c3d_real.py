@@ -180,7 +180,8 @@ def test_events_platforms_and_axes_are_what_ezc3d_reads() -> None:
         counts["events"] += _same_events(found, parameters.get("EVENT", {}))
         counts["platforms"] += _same_platforms(found, parameters.get("FORCE_PLATFORM", {}))
         stated = parameters["POINT"].get("Y_SCREEN", {"value": [""]})["value"]
-        up = {"+X": "x", "+Y": "y", "+Z": "z"}.get(stated[0] if stated else "", "")
+        signed = {"+X": "x", "+Y": "y", "+Z": "z", "-X": "-x", "-Y": "-y", "-Z": "-z"}
+        up = signed.get(stated[0] if stated else "", "")
         assert motion.skeleton.up_axis == up, path
         counts["up"] += bool(up)
     print(counts)
