@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from pathlib import Path
 
 import pytest
 
 import mcz
 from mcz.errors import MczError
+from tests.test_spec import SPEC
 from tools.vectors.bases import base_bytes
+from tools.vectors.build import by_hand
 from tools.vectors.engine import tables
 from tools.vectors.engine.edits import edited
 from tools.vectors.engine.notation import read_bytes
@@ -87,3 +90,8 @@ def test_tables_that_are_none(text: str, tmp_path: Path) -> None:
     table.write_text(text)
     with pytest.raises(ValueError, match="fault|nobody"):
         list(tables.rows_of(table))
+
+
+def test_each_structure_stands_in_a_file_that_was_written_by_hand() -> None:
+    shown = [structure for name in by_hand.HELD for structure in by_hand.structures_of(name)]
+    assert sorted(shown) == sorted(set(re.findall(r"<!-- table: (\w+) -->", SPEC)))

@@ -21,6 +21,7 @@ from mcz.container.segments import SegmentHeader
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
+from tools.vectors.build import by_hand as written
 from tools.vectors.build import extensions, motions
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.edits import Made, both, indexed, put, raw_stream
@@ -71,6 +72,13 @@ for _make in (
     motions.with_mask,
 ):
     base(_make)
+
+
+@base
+def by_hand(name: str) -> Base:
+    """A file that was written as hex, see ``build/by_hand.py``."""
+    held, sources = written.HELD[name]
+    return Base(held, written.bytes_of(name), sources)
 
 
 @base
