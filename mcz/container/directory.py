@@ -62,12 +62,12 @@ class SignalRow:
         return self.skip + n_frames + self.spare
 
 
-def signal_rows(clip: Any, where: str) -> tuple[SignalRow, ...]:
+def signal_rows(clip: payloads.Clip, where: str) -> tuple[SignalRow, ...]:
     """What the index says of the signals, from the fields of CLIP; raises FormatError."""
     return tuple(_signal_row(signal, clip, where) for signal in clip.signals)
 
 
-def _signal_row(signal: Any, clip: Any, where: str) -> SignalRow:
+def _signal_row(signal: payloads.Signal, clip: payloads.Clip, where: str) -> SignalRow:
     cut = signal.skip, signal.spare
     if clip.flags & payloads.OPEN_CLIP and any(cut):  # CLIP-19
         raise FormatError(f"n_frames is open, but a signal has skip and spare {cut}", where=where)

@@ -114,7 +114,7 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
     return RowNotes(patterns, tuple(texts))
 
 
-def checked_runs(runs: Sequence[Any], n_rows: int, where: str) -> list[tuple[int, int, int]]:
+def checked_runs(runs: Sequence[PatternRun], n_rows: int, where: str) -> list[tuple[int, int, int]]:
     """(start, stop, pattern) of PATTERN_RUNs of ``n_rows`` rows; raises FormatError."""
     found, row = [], 0
     for run in runs:
@@ -128,7 +128,7 @@ def checked_runs(runs: Sequence[Any], n_rows: int, where: str) -> list[tuple[int
     return found
 
 
-def checked_texts(texts: Sequence[Any], n_rows: int, where: str) -> list[tuple[int, bytes]]:
+def checked_texts(texts: Sequence[NumberText], n_rows: int, where: str) -> list[tuple[int, bytes]]:
     """(row, text) of NUMBER_TEXTs of ``n_rows`` rows; raises FormatError."""
     rows = _rows([entry.row for entry in texts], n_rows, where)
     wrong = [entry.text for entry in texts if not FRAME_NUMBER_TEXT.fullmatch(entry.text)]

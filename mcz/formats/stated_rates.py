@@ -24,6 +24,7 @@ from mcz.formats.table_layout import (
     PHRASES,
     Clock,
     ClockFields,
+    SectionFields,
     TableTemplate,
     parsed_clock,
     with_phrases,
@@ -137,7 +138,7 @@ def restate_table(template: bytes, rate: Fraction) -> Restated | None:
     return Restated(stated, build(TableTemplate(sections=sections), WHERE))
 
 
-def _text(section: Any) -> bytes:
+def _text(section: SectionFields) -> bytes:
     """The header with its phrases, but for the other marks."""
     header = bytes(section.header)
     if not section.marks:
@@ -145,7 +146,7 @@ def _text(section: Any) -> bytes:
     return _PHRASE_MARKS.sub(lambda mark: PHRASES[mark[0][0]], header)
 
 
-def _vicon_rate(section: Any) -> Fraction | None:
+def _vicon_rate(section: SectionFields) -> Fraction | None:
     found = _VICON.search(_text(section))
     return stated_rate(found[1].decode("latin-1")) if found else None
 

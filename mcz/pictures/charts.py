@@ -120,7 +120,7 @@ def legend(axes: Axes, theme: Theme, **options: Any) -> None:
         text.set_parse_math(False)
 
 
-def name_ticks(axes: Axes, places: Any, names: Sequence[str], most: int) -> None:
+def name_ticks(axes: Axes, places: Sequence[float], names: Sequence[str], most: int) -> None:
     """Names of bars at their places, long ones cut; none is mathematics."""
     shown = [printable(name) for name in names]
     shown = [name if len(name) <= most else f"{name[: most - 1]}…" for name in shown]
@@ -160,7 +160,7 @@ def rows_of(rows: Sequence[Sequence[object]]) -> list[list[str]]:
     return [[_cell(cell) for cell in row] for row in rows]
 
 
-def _cell(cell: Any) -> str:
+def _cell(cell: object) -> str:
     if isinstance(cell, str):
         return cell
     return f"{cell:,}" if isinstance(cell, int) else number(cell)
