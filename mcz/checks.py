@@ -21,7 +21,7 @@ class Rule(NamedTuple):
     form: Callable[[Any], Any]
 
 
-def check_fields(thing: Any, rules: Mapping[str, Rule]) -> None:
+def check_fields(thing: object, rules: Mapping[str, Rule]) -> None:
     """Give fields of a frozen dataclass the form of their rules; MotionError names the field."""
     for name, rule in rules.items():
         value = getattr(thing, name)
@@ -35,13 +35,13 @@ def check_fields(thing: Any, rules: Mapping[str, Rule]) -> None:
             object.__setattr__(thing, name, found)
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if not isinstance(value, str):
         raise TypeError
     return str(value)
 
 
-def _name(value: Any) -> str:
+def _name(value: object) -> str:
     text = _text(value)
     text.encode()  # UnicodeEncodeError, a ValueError, of half a surrogate pair
     return text
@@ -53,19 +53,19 @@ def _integer(value: Any) -> int:
     return operator.index(value)
 
 
-def _truth(value: Any) -> bool:
+def _truth(value: object) -> bool:
     if not isinstance(value, (bool, np.bool_)):
         raise TypeError
     return bool(value)
 
 
-def _data(value: Any) -> bytes:
+def _data(value: object) -> bytes:
     if not isinstance(value, (bytes, bytearray, memoryview)):
         raise TypeError
     return bytes(value)
 
 
-def _hash(value: Any) -> bytes:
+def _hash(value: object) -> bytes:
     data = _data(value)
     if len(data) not in (0, 32):
         raise ValueError
@@ -86,11 +86,11 @@ def _vector(value: Any) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _texts(value: Any) -> tuple[bytes, ...]:
+def _texts(value: object) -> tuple[bytes, ...]:
     return tuple(map(_data, _items(value)))
 
 
-def _text_map(value: Any) -> Mapping[str, str]:
+def _text_map(value: object) -> Mapping[str, str]:
     if not isinstance(value, Mapping):
         raise TypeError
     for pair in value.items():
@@ -98,7 +98,7 @@ def _text_map(value: Any) -> Mapping[str, str]:
     return value
 
 
-def _items(value: Any) -> tuple[Any, ...]:
+def _items(value: object) -> tuple[object, ...]:
     if isinstance(value, tuple):
         return value
     if not isinstance(value, list):
@@ -109,7 +109,7 @@ def _items(value: Any) -> tuple[Any, ...]:
 def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
     """The rule of a field that is a ``kind``."""
 
-    def form(value: Any) -> Any:
+    def form(value: object) -> Any:
         if not isinstance(value, kind):
             raise TypeError
         return value
@@ -131,7 +131,7 @@ def one_of(choices: Collection[str]) -> Rule:
 def several(rule: Rule, words: str) -> Rule:
     """The rule of a tuple, or a list, of what another rule is of."""
 
-    def form(value: Any) -> tuple[Any, ...]:
+    def form(value: object) -> tuple[object, ...]:
         items = _items(value)
         formed = tuple(map(rule.form, items))
         same = items is value and all(map(operator.is_, formed, items))
@@ -151,7 +151,7 @@ def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
     A masked array counts as one only where nothing is masked.
     """
 
-    def form(value: Any) -> Items:
+    def form(value: object) -> Items:
         if np.ma.is_masked(value):
             raise ValueError
         array = np.asarray(value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from typing import Any
+from typing import TYPE_CHECKING
 
 from mcz.conversion import convert
 from mcz.errors import MotionError, OptionError
@@ -12,8 +12,11 @@ from mcz.formats import FORMATS
 from mcz.formats.c3d_layout import FORMAT, OUTPUTS_FORMAT
 from mcz.motion import Motion
 
+if TYPE_CHECKING:
+    from c3d import Reader
 
-def from_c3d(reader: Any, *, name: str = "motion") -> Motion:
+
+def from_c3d(reader: Reader, *, name: str = "motion") -> Motion:
     """The motion in the file of a ``c3d.Reader``, or in what a ``c3d.Writer`` would write.
 
     It is all that the file says, with its source. Raises SourceError for what is no C3D,
@@ -35,7 +38,7 @@ def from_c3d(reader: Any, *, name: str = "motion") -> Motion:
     return motion
 
 
-def to_c3d(motion: Motion) -> Any:
+def to_c3d(motion: Motion) -> Reader:
     """``motion`` as a ``c3d.Reader``; needs c3d (``mcz[c3d]``).
 
     It reads the C3D file of the motion, its source's where it has one, from memory; its

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,16 @@ from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.recording import ANALOG, recording
 
+if TYPE_CHECKING:
+    from ezc3d import c3d
+
 Held = dict[str | None, tuple[NDArray[np.float64], NDArray[np.bool_]]]
 OUTPUTS = "outputs"  # the role of the signal of what models gave, which ezc3d has among the points
 REFUSED = (OSError, ValueError, RuntimeError, LookupError)  # what ezc3d raises
 NOTE = "numbers that binary32 cannot hold: without the events and parameters of its C3D"
 
 
-def from_ezc3d(c3d: Any, *, name: str = "motion") -> Motion:
+def from_ezc3d(c3d: object, *, name: str = "motion") -> Motion:
     """The motion in an ``ezc3d.c3d``: points, residuals, outputs of models, analog, events.
 
     It is that of the file which ezc3d writes, with its source. Where points or analog samples are
@@ -49,7 +52,7 @@ def from_ezc3d(c3d: Any, *, name: str = "motion") -> Motion:
     return replace(motion, signals=signals, metadata=metadata).without_source()
 
 
-def to_ezc3d(motion: Motion) -> Any:
+def to_ezc3d(motion: Motion) -> c3d:
     """``motion`` as an ``ezc3d.c3d``; needs ezc3d (``mcz[ezc3d]``).
 
     It has what the C3D file of the motion says (``mcz.to_c3d``), with points and analog samples in
@@ -81,14 +84,14 @@ def to_ezc3d(motion: Motion) -> Any:
     return made
 
 
-def _held(c3d: Any, motion: Motion) -> Held:
+def _held(held: c3d, motion: Motion) -> Held:
     """By the roles of signals of ``motion``, an array of ezc3d, time last, and which rows count.
 
     Residuals are none of them: they are as ezc3d has read or written them.
     """
     told = recording(motion)
     is_point = np.array([not point.groups for point in told.points] if told else [], np.bool_)
-    places, samples = c3d["data"]["points"][:3].transpose(1, 0, 2), c3d["data"]["analogs"][0]
+    places, samples = held["data"]["points"][:3].transpose(1, 0, 2), held["data"]["analogs"][0]
     if len(places) != len(is_point):
         raise MotionError(
             f"ezc3d has {len(places)} points, and the C3D {len(is_point)}", clip=motion.name

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from mcz.skeleton import AXES
 from mcz.types import JsonObject, Reals, Values
 from mcz.units import UNIT_CM
 
+if TYPE_CHECKING:
+    from xarray import DataArray, Dataset
+
 Floats = NDArray[np.float64]
 DIMS = ("time", "space", "keypoints", "individuals")
 SINGULAR = {"keypoint": "keypoints", "individual": "individuals"}  # as other versions call them
@@ -27,7 +30,7 @@ SEPARATOR = ":"  # of an individual and its keypoint, as labels of C3D have it
 SLACK = 1e-3  # frames by which a time may be off
 
 
-def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
+def to_movement(motion: Motion, *, unit: str | None = None) -> Dataset:
     """The points of a motion as a poses dataset of ``movement``; needs xarray (``mcz[xarray]``).
 
     ``position`` (time, space, keypoints, individuals) in length units or ``unit``, NaN where
@@ -53,7 +56,7 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
     length = unit or next((name for name, cm in UNIT_CM.items() if cm == unit_cm), "")
     facts |= {"length_unit": length} if length else {}
     facts |= {"up_axis": motion.skeleton.up_axis} if motion.skeleton.up_axis else {}
-    return xarray.Dataset(
+    made: Dataset = xarray.Dataset(
         {
             "position": (DIMS, places.transpose(0, 3, 2, 1)),
             "confidence": (
@@ -69,10 +72,11 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
         },
         facts,
     )
+    return made
 
 
 def from_movement(
-    dataset: Any, *, name: str = "motion", unit: str | None = None, up: str | None = None
+    dataset: Dataset, *, name: str = "motion", unit: str | None = None, up: str | None = None
 ) -> Motion:
     """A poses dataset of ``movement``, or any of its layout, as markers.
 
@@ -136,7 +140,7 @@ def _confidence(motion: Motion, places: Reals) -> Floats:
     return np.asarray(np.isfinite(places).all(axis=3), np.float64)
 
 
-def _ordered(array: Any, dims: tuple[str, ...]) -> Any:
+def _ordered(array: DataArray, dims: tuple[str, ...]) -> DataArray:
     """The array with its axes in this order; raises OptionError where it has others."""
     array = array.rename({old: new for old, new in SINGULAR.items() if old in array.dims})
     if set(array.dims) != set(dims):
@@ -161,13 +165,13 @@ def _signal(values: Values, name: str, channels: tuple[Channel, ...] | None) -> 
     )
 
 
-def _frames(dataset: Any, times: Floats, name: str) -> tuple[Any, NDArray[np.int64] | None]:
+def _frames(dataset: Dataset, times: Floats, name: str) -> tuple[Any, NDArray[np.int64] | None]:
     """The rate, None while unknown, and the frame numbers, None for 1, 2, 3, ..."""
     fps = dataset.attrs.get("fps")
     in_seconds = dataset.attrs.get("time_unit", "seconds" if fps else "frames") == "seconds"
-    if in_seconds and fps is None:
+    if fps is None and in_seconds:
         raise OptionError("times in seconds, and no attribute 'fps' that says how many frames")
-    counted = times * float(fps) if in_seconds else times
+    counted = times if fps is None or not in_seconds else times * float(fps)
     numbers = np.rint(counted)
     if not (np.abs(counted - numbers) <= SLACK).all():
         counted = counted - counted[:1]

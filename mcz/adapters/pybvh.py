@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,14 @@ from mcz.motion import (
 )
 from mcz.reading.source_options import SourceOptions
 
+if TYPE_CHECKING:
+    from pybvh import Bvh
+    from pybvh.bvhnode import BvhJoint
+
 Floats = NDArray[np.float64]
 
 
-def from_pybvh(bvh: Any, *, unit: str | None = None, up: str | None = None) -> Motion:
+def from_pybvh(bvh: Bvh, *, unit: str | None = None, up: str | None = None) -> Motion:
     """The motion in a ``pybvh.Bvh``, its numbers as they are: angles in radians.
 
     The root's positions replace its offset, as they do in pybvh. ``unit`` ("cm", "m", ...) and
@@ -64,7 +68,7 @@ def from_pybvh(bvh: Any, *, unit: str | None = None, up: str | None = None) -> M
     return SourceOptions(unit=unit, up=up).applied_to(motion)
 
 
-def to_pybvh(motion: Motion) -> Any:
+def to_pybvh(motion: Motion) -> Bvh:
     """``motion`` as a ``pybvh.Bvh``; needs pybvh (``mcz[pybvh]``).
 
     Angles in radians are kept as they are, those in degrees are converted; another skeleton becomes
@@ -75,8 +79,8 @@ def to_pybvh(motion: Motion) -> Any:
     check_poses(motion.name, motion.signals[0])
     tree = _Tree(motion)
     order = list(tree.depth_first())
-    nodes: list[Any] = []
-    made: dict[int, Any] = {}
+    nodes: list[BvhJoint] = []
+    made: dict[int, BvhJoint] = {}
     angles = np.empty((motion.n_frames, len(order), 3))
     for number, joint in enumerate(order):
         axes, angles[:, number] = tree.turns(joint)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,10 @@ from mcz.reading.clip import Clip
 from mcz.reading.recording import recording as recording_of
 from mcz.tables.files import channel_names, channel_units
 
+if TYPE_CHECKING:
+    from rerun import ComponentColumnList, RecordingStream
+    from rerun.blueprint import Horizontal
+
 APPLICATION = "mcz"
 BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
 SIDES = {
@@ -31,7 +36,9 @@ SIDES = {
 }
 
 
-def to_rerun(moving: Moving, recording: Any = None, *, entity: str | None = None) -> Any:
+def to_rerun(
+    moving: Moving, recording: RecordingStream | None = None, *, entity: str | None = None
+) -> RecordingStream:
     """Log a Motion or Clip to a ``rerun.RecordingStream``; needs rerun-sdk (``mcz[rerun]``).
 
     Below ``entity``, by default the clip's name: ``points/NAME`` for every point of
@@ -52,18 +59,18 @@ def to_rerun(moving: Moving, recording: Any = None, *, entity: str | None = None
     return recording
 
 
-def view_of(moving: Moving, entity: str) -> Any:
+def view_of(moving: Moving, entity: str) -> Horizontal:
     """How the viewer of rerun is to show what ``to_rerun`` logs: a figure, and curves beside it.
 
     Residuals are there, and not shown: there are as many as points.
     """
     blueprint = import_extra("rerun.blueprint", "rerun")
     log = _Log(import_extra("rerun", "rerun"), None, moving, entity)
-    origin = str(log.path())
+    origin = log.path()
     figure = [blueprint.Spatial3DView(origin=origin, name=entity)] if log.figure else []
     residuals = {each.name for each in moving.signals if each.role == "residuals"}
     curves = [
-        blueprint.TimeSeriesView(origin=str(log.path(signal)), name=f"{entity} {signal}")
+        blueprint.TimeSeriesView(origin=log.path(signal), name=f"{entity} {signal}")
         for signal, _, _, _ in log.series
         if signal not in residuals
     ]
@@ -74,7 +81,7 @@ def view_of(moving: Moving, entity: str) -> Any:
 class _Log:
     """One motion on its way into a recording."""
 
-    def __init__(self, rerun: Any, recording: Any, moving: Moving, entity: str) -> None:
+    def __init__(self, rerun: ModuleType, recording: Any, moving: Moving, entity: str) -> None:
         self.rerun, self.recording, self.moving = rerun, recording, moving
         self.parts = [part for part in entity.split("/") if part] or ["motion"]
         self.timeline = moving.timeline
@@ -93,10 +100,12 @@ class _Log:
         for start in range(0, self.moving.n_frames, step):
             self._frames(start, min(start + step, self.moving.n_frames))
 
-    def path(self, *parts: str) -> Any:
-        return self.rerun.new_entity_path([*self.parts, *parts])
+    def path(self, *parts: str) -> str:
+        return str(self.rerun.new_entity_path([*self.parts, *parts]))
 
-    def _send(self, path: Any, start: int, stop: int, per_frame: int, columns: Any) -> None:
+    def _send(
+        self, path: str, start: int, stop: int, per_frame: int, columns: ComponentColumnList
+    ) -> None:
         """Columns of ``per_frame`` rows each at frames start <= f < stop."""
         numbers = np.repeat(self.numbers[start:stop], per_frame)
         times = [self.rerun.TimeColumn("frame", sequence=numbers)]
@@ -105,7 +114,7 @@ class _Log:
                 self.seconds[per_frame] = self.timeline.samples(per_frame)
             seconds = self.seconds[per_frame][start * per_frame : stop * per_frame]
             times.append(self.rerun.TimeColumn("time", duration=seconds))
-        self.rerun.send_columns(str(path), times, columns, recording=self.recording)
+        self.rerun.send_columns(path, times, columns, recording=self.recording)
 
     def _still(self) -> None:
         """What does not change: axes, names, colors, events."""
@@ -115,13 +124,13 @@ class _Log:
             hand = (skeleton.handedness or "right").upper()
             end = "DOWN" if up.startswith("-") else "UP"
             axes = getattr(rerun.ViewCoordinates, f"{hand}_HAND_{up[-1].upper()}_{end}")
-            log(str(self.path()), axes, static=True)
+            log(self.path(), axes, static=True)
         if self.figure is not None:
             for name, side in zip(self.figure.names, self.figure.sides, strict=True):
                 about = rerun.Points3D.from_fields(
                     labels=[name], show_labels=self.figure.is_markers, colors=[SIDES[side][1]]
                 )
-                log(str(self.path("points", name)), about, static=True)
+                log(self.path("points", name), about, static=True)
             for side in self.figure.bones:
                 name, color = SIDES[side]
                 about = rerun.LineStrips3D.from_fields(colors=[color])

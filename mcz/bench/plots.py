@@ -124,7 +124,7 @@ def _panel(
             continue
         number = codecs.index(curve.variant.codec if curve.variant else curve.label)
         published = bool(curve.variant and curve.variant.published)
-        style: Any = PUBLISHED if published else "-" if curve.variant else PEER
+        style: object = PUBLISHED if published else "-" if curve.variant else PEER
         axes.plot(
             *zip(*pairs, strict=True),
             linestyle=style,

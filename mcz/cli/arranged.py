@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from functools import wraps
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -22,7 +22,7 @@ def output_option(function: Function) -> Function:
     """``-o``, without which a file is rewritten in its own place."""
 
     @wraps(function)
-    def command(*, file: str, output: str | None, **options: Any) -> object:
+    def command(*, file: str, output: str | None, **options: object) -> object:
         existing(file)
         return function(file=file, output=output and file_in(output, file), **options)
 

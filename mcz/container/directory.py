@@ -12,7 +12,6 @@ from collections.abc import (
 )
 from copy import copy
 from dataclasses import dataclass, field, fields
-from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk, ChunkType

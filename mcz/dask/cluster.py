@@ -7,13 +7,16 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from mcz.errors import MczError, OptionError, WorkerError
 from mcz.extras import import_extra
-from mcz.jobs import Answer
+from mcz.jobs import Answer, Item, Result
 from mcz.threads import limited
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
 
 AHEAD = 3  # tasks for each thread of the cluster: what waits there and here is bounded
 TRIES = 3  # of a task that the machines were lost with
@@ -26,7 +29,7 @@ class Cluster:
     Each task has a key of its own, so that one that is done again gives one answer all the same.
     """
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: Client) -> None:
         self._client = client
 
     @property
@@ -38,8 +41,8 @@ class Cluster:
         return int(n_threads)
 
     def in_order(
-        self, function: Callable[[Any, Any], Any], items: Iterable[Any], state: object
-    ) -> Generator[Answer[Any] | None, None, None]:
+        self, function: Callable[[Any, Item], Result], items: Iterable[Item | None], state: object
+    ) -> Generator[Answer[Result] | None, None, None]:
         """What gives ``function(state, item)`` for each item, in order; for None, None."""
         import cloudpickle
 
@@ -63,11 +66,11 @@ class Cluster:
 class Task:
     """One call, in work on the cluster from now on."""
 
-    def __init__(self, client: Any, key: str, packed: bytes, item: object) -> None:
+    def __init__(self, client: Client, key: str, packed: bytes, item: object) -> None:
         self._client, self._key, self._call = client, key, (done, packed, item)
         self.future = self._submitted(0)
 
-    def _submitted(self, again: int) -> Any:
+    def _submitted(self, again: int) -> Future:
         return self._client.submit(*self._call, key=f"{self._key}-{again}", retries=RETRIES)
 
     def answer(self) -> Any:
@@ -104,7 +107,7 @@ def _answer(task: Task | None) -> Answer[Any] | None:
     return None if task is None else task.answer
 
 
-def done(packed: bytes, item: object) -> tuple[bool, Any]:
+def done(packed: bytes, item: object) -> tuple[bool, object]:
     """On a worker: whether the call went well, and its result or its MczError."""
     function, state = _unpacked(packed)
     try:
@@ -121,7 +124,7 @@ def _unpacked(packed: bytes) -> Any:
 
 
 @contextmanager
-def connected(client: Any) -> Iterator[Any]:
+def connected(client: Client | str | None) -> Iterator[Client]:
     """The client itself, or one of the scheduler at an address ("tcp://host:8786").
 
     None: the client that the process has. Raises OptionError where there is none, or no Dask.

@@ -177,7 +177,7 @@ class Dataset:
         start = (number - before) * self._settings.stride
         return member, start, start + self._settings.window
 
-    def __getitem__(self, index: Any) -> dict[str, Reals]:
+    def __getitem__(self, index: object) -> dict[str, Reals]:
         """One window, or a batch of those that ``index`` chooses, as NumPy indexes an axis.
 
         A slice, a list, an array of integers or a mask gives arrays (n, window, ...); an array of

@@ -20,6 +20,7 @@ LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has s
 LEAST_STORED = 2_000_000  # the same, of an MCZ file
 ONE = 1  # in a library nobody expects processes that were not asked for
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 Answer = Callable[[], Result]  # gives a result, or raises what the function has raised
 
@@ -31,8 +32,8 @@ class Engine(Protocol):
     def jobs(self) -> int: ...
 
     def in_order(
-        self, function: Callable[[Any, Any], Any], items: Iterable[Any], state: object
-    ) -> Generator[Answer[Any] | None, None, None]: ...
+        self, function: Callable[[Any, Item], Result], items: Iterable[Item | None], state: object
+    ) -> Generator[Answer[Result] | None, None, None]: ...
 
 
 _ENGINE: ContextVar[Engine | None] = ContextVar("engine", default=None)

@@ -17,16 +17,13 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
 from queue import SimpleQueue
 from threading import Lock
-from typing import Any, BinaryIO, TypeVar, cast
+from typing import Any, BinaryIO, cast
 
 from mcz.errors import WorkerError
 from mcz.hints import Hint
-from mcz.jobs import Answer, engine, threads_each
+from mcz.jobs import Answer, Item, Result, engine, threads_each
 from mcz.jobs.worker import receive, send
 from mcz.types import Settings
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 AHEAD = 2  # items in work or done, for each process: what waits is bounded
 TRIES = 2

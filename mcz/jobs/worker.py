@@ -56,7 +56,7 @@ class State:
 
     def __init__(self, packed: bytes) -> None:
         self._packed: bytes | None = packed
-        self._value: Any = None
+        self._value: object = None
 
     def __call__(self) -> Any:
         if self._packed is not None:

@@ -121,7 +121,7 @@ def markers(names: Sequence[str]) -> Skeleton:
 
 
 def stream_decode(
-    source: Any,
+    source: object,
     *,
     lost: Lost = "refuse",
     join: bool = False,
@@ -146,7 +146,7 @@ def stream_decode(
     return LiveReader(_stream_of(source), lost, join, rate, post_filter=post_filter)
 
 
-def _stream_of(source: Any) -> Any:
+def _stream_of(source: object) -> Any:
     if hasattr(source, "read"):
         return source
     if isinstance(source, bytes | bytearray | memoryview):

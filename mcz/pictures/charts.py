@@ -23,6 +23,7 @@ from mcz.writing.atomic import replacing
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 SUFFIXES = (".png", ".svg", ".html")
 MOST_POINTS = 3000  # of a line: of more the least and the greatest of neighbors
@@ -120,7 +121,7 @@ def legend(axes: Axes, theme: Theme, **options: Any) -> None:
         text.set_parse_math(False)
 
 
-def name_ticks(axes: Axes, places: Sequence[float], names: Sequence[str], most: int) -> None:
+def name_ticks(axes: Axes, places: ArrayLike, names: Sequence[str], most: int) -> None:
     """Names of bars at their places, long ones cut; none is mathematics."""
     shown = [printable(name) for name in names]
     shown = [name if len(name) <= most else f"{name[: most - 1]}…" for name in shown]
@@ -161,6 +162,6 @@ def rows_of(rows: Sequence[Sequence[object]]) -> list[list[str]]:
 
 
 def _cell(cell: object) -> str:
-    if isinstance(cell, str):
-        return cell
-    return f"{cell:,}" if isinstance(cell, int) else number(cell)
+    if isinstance(cell, int):
+        return f"{cell:,}"
+    return number(cell) if cell is None or isinstance(cell, float) else str(cell)

@@ -27,7 +27,10 @@ PACKAGE = "mcz."
 
 @contextmanager
 def shared_out(
-    function: Callable[[Shared, Item], Result], file: File, items: Sequence[Item], said: Any = None
+    function: Callable[[Shared, Item], Result],
+    file: File,
+    items: Sequence[Item],
+    said: object = None,
 ) -> Iterator[Iterator[Answer[Result]]]:
     """What gives ``function((file, said), item)`` for each item, in order.
 

@@ -76,7 +76,7 @@ class ClipValues:
         return np.asarray(self._clip.read(), dtype=dtype)
 
 
-def _is_one_axis(key: Any) -> bool:
+def _is_one_axis(key: object) -> bool:
     """False for an index that adds an axis, or takes more than one."""
     if key is None or key is Ellipsis or isinstance(key, (bool, np.bool_)):
         return False

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from mcz.errors import OptionError
 from mcz.extras import import_extra
@@ -12,6 +14,9 @@ from mcz.skeleton import Joints
 from mcz.tables.files import channel_names
 from mcz.tables.labelled import COMPONENTS, row_times
 from mcz.types import Items
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 PLACES = {"positions": positions, "velocities": velocities, "accelerations": accelerations}
 
@@ -23,7 +28,7 @@ def to_pandas(
     joints: Joints = None,
     unit: str | None = None,
     flat: bool = False,
-) -> Any:
+) -> DataFrame:
     """A table of a motion as a ``pandas.DataFrame``; needs pandas (``mcz[pandas]``).
 
     ``what``: "positions", "velocities", "accelerations"; local rotations as "quat", "rotvec", "6d"
@@ -37,18 +42,18 @@ def to_pandas(
     signals = {signal.name: signal for signal in motion.signals[1:]}
     if what in PLACES:
         array = PLACES[what](motion, joints, unit=unit)
-        pairs = _pairs(point_names(motion.skeleton, joints), ["x", "y", "z"])
-        return _table(pandas, motion, motion.signals[0], array, pairs, flat)
+        pairs = _pairs(pandas, point_names(motion.skeleton, joints), ["x", "y", "z"], flat)
+        return _table(pandas, motion, motion.signals[0], array, pairs)
     if what in COMPONENTS:
         array = rotations(motion, what, joints=joints)
         every = motion.skeleton.joint_names
         names = every if joints is None else _names(motion, joints)
-        pairs = _pairs(names, COMPONENTS[what][1])
-        return _table(pandas, motion, motion.signals[0], array, pairs, flat)
+        pairs = _pairs(pandas, names, COMPONENTS[what][1], flat)
+        return _table(pandas, motion, motion.signals[0], array, pairs)
     if what == "channels" or what in signals:
         signal = motion.signals[0] if what == "channels" else signals[what]
         names = tuple(channel_names(motion.skeleton, signal.channels))
-        return _table(pandas, motion, signal, signal.masked(), names, True)
+        return _table(pandas, motion, signal, signal.masked(), names)
     known = [*PLACES, *COMPONENTS, "channels", *signals]
     raise OptionError(f"a table of {what!r}: one of {', '.join(known)}")
 
@@ -60,18 +65,21 @@ def _names(motion: Motion, joints: Joints) -> tuple[str, ...]:
     return tuple(every[joint] for joint in joint_numbers(motion.skeleton, joints))
 
 
-def _pairs(names: tuple[str, ...], components: list[str]) -> list[tuple[str, str]]:
-    return [(name, component) for name in names for component in components]
+def _pairs(
+    pandas: ModuleType, names: tuple[str, ...], components: list[str], flat: bool
+) -> Sequence[object]:
+    pairs = [(name, component) for name in names for component in components]
+    if flat or not pairs:
+        return [".".join(pair) for pair in pairs]
+    columns: Sequence[object] = pandas.MultiIndex.from_tuples(pairs, names=["point", "component"])
+    return columns
 
 
 def _table(
-    pandas: Any, motion: Motion, signal: Signal, array: Items, names: Any, flat: bool
-) -> Any:
-    columns = names
-    if names and isinstance(names[0], tuple):
-        columns = pandas.MultiIndex.from_tuples(names, names=["point", "component"])
-        if flat:
-            columns = [".".join(pair) for pair in names]
+    pandas: ModuleType, motion: Motion, signal: Signal, array: Items, columns: Sequence[object]
+) -> DataFrame:
     times, units = row_times(motion, signal)
     index = pandas.Index(times, name="time" if units == "s" else "frame")
-    return pandas.DataFrame(array.reshape(len(array), len(columns)), index=index, columns=columns)
+    array = array.reshape(len(array), len(columns))
+    table: DataFrame = pandas.DataFrame(array, index=index, columns=columns)
+    return table

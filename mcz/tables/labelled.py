@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -15,6 +15,9 @@ from mcz.poses import point_names, positions, rotations
 from mcz.tables.files import channel_names, channel_units
 from mcz.types import Settings
 
+if TYPE_CHECKING:
+    from xarray import Dataset
+
 COMPONENTS = {
     "quat": ("rotation", ["w", "x", "y", "z"]),
     "rotvec": ("rotation", ["x", "y", "z"]),
@@ -25,7 +28,7 @@ COMPONENTS = {
 
 def to_xarray(
     motion: Motion, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
-) -> Any:
+) -> Dataset:
     """A motion as an ``xarray.Dataset``; needs xarray (``mcz[xarray]``).
 
     ``positions`` (time, point, axis) in length units or ``unit``; ``rotations`` (time, joint,
@@ -64,7 +67,8 @@ def to_xarray(
     for signal in motion.signals[1:]:
         if signal.role != TIMES:  # that is the coordinate
             _add_signal(motion, signal, variables, coordinates)
-    return xarray.Dataset(variables, coordinates, _facts(motion))
+    made: Dataset = xarray.Dataset(variables, coordinates, _facts(motion))
+    return made
 
 
 def _add_signal(motion: Motion, signal: Signal, variables: Settings, coordinates: Settings) -> None:
@@ -86,7 +90,7 @@ def row_times(motion: Motion, signal: Signal) -> tuple[NDArray[np.float64], str]
     return timeline.samples(signal.samples_per_frame), "s"
 
 
-def _times(motion: Motion, signal: Signal) -> tuple[Any, Settings]:
+def _times(motion: Motion, signal: Signal) -> tuple[NDArray[np.float64], Settings]:
     times, units = row_times(motion, signal)
     facts: Settings = {"units": units}
     if units == "s" and motion.frame_rate is not None:

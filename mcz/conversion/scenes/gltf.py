@@ -215,7 +215,7 @@ class _Document:
         return len(self.views) - 1
 
     def _accessor(
-        self, data: Items, code: int, bounds: bool = False, view: int = 0, **more: Any
+        self, data: Items, code: int, bounds: bool = False, view: int = 0, **more: object
     ) -> int:
         """Add rows of numbers to the last buffer view, which is number ``view``."""
         start = self.views[view]["byteOffset"]
