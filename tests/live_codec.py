@@ -1,10 +1,12 @@
-"""A codec for tests alone that works frame by frame: steps from the frame before.
+"""A codec for tests alone that works frame by frame, steps from the frame before; a slow stream.
 
 A stream holds, for each of its frames, the zigzag varint of each channel's difference to the frame
 before in steps; one of zeros alone is empty. Every so many frames one starts fresh.
 """
 
 from __future__ import annotations
+
+import io
 
 import numpy as np
 
@@ -128,3 +130,19 @@ CODEC = Codec(
         Parameter("domain", "channels", "channels or positions", str),
     ),
 )
+
+
+class Trickle(io.RawIOBase):
+    """A stream that gives a byte at a time and knows how many were taken."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data, self.at = data, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def read(self, size: int = -1) -> bytes:
+        self.at += 1
+        return self.data[self.at - 1 : self.at]
+
+    read1 = read

@@ -48,12 +48,6 @@ def near(found: object, wanted: object) -> None:
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)  # type: ignore[call-overload]
 
 
-def test_frame_1_is_at_0() -> None:
-    near(markers(3).times, [0, 0.01, 0.02])
-    near(markers(3, frame_numbers=np.array([101, 102, 150])).times, [1, 1.01, 1.49])
-    near(mcz.times(markers(5), slice(-2, None)), [0.03, 0.04])
-
-
 def test_a_signal_of_times_comes_first() -> None:
     motion = markers(4, first_time=9.0)
     motion = replace(motion, signals=(*motion.signals, times_signal([500, 510, 700, 705], "ms")))
@@ -198,24 +192,6 @@ def test_a_decimated_clip_keeps_its_times(tmp_path: Path) -> None:
         assert np.abs(stored(thin).times - clip.times[3:60:2]).max() <= 1e-6
 
 
-@pytest.mark.parametrize("digits", [2, 3, 6])
-def test_a_table_with_a_gap_has_a_rate(tmp_path: Path, digits: int) -> None:
-    rows = [*range(100, 130), *range(300, 330), *range(1000, 1003)]
-    lines = "".join(f"{n / 100:.{digits}f}\t{n}\n" for n in rows)
-    (tmp_path / "w.sto").write_text(f"w\nversion=1\nendheader\ntime\tx\n{lines}")
-    motion = mcz.read(tmp_path / "w.sto")
-    assert motion.frame_rate == 100
-    near(motion.times, np.array(rows) / 100)
-
-
-def test_irregular_times_have_no_rate(tmp_path: Path) -> None:
-    steps = np.random.default_rng(1).uniform(0.005, 0.03, 40).cumsum()
-    (tmp_path / "w.sto").write_text(
-        "w\nversion=1\nendheader\ntime\tx\n" + "".join(f"{t:.4f}\t1\n" for t in steps)
-    )
-    assert mcz.read(tmp_path / "w.sto").frame_rate is None
-
-
 def test_one_missing_frame_is_a_gap_however_few_digits_are_printed() -> None:
     times = np.array([0.0, 0.01, 0.02, 0.04, 0.05])
     line = Timeline(times, Fraction(100), rounding=0.005)
@@ -223,13 +199,6 @@ def test_one_missing_frame_is_a_gap_however_few_digits_are_printed() -> None:
     near(line.steps, [0.01, 0.01, np.nan, 0.01])
     coarse = np.round(np.arange(50) / 60, 2)
     near(Timeline(coarse, Fraction(60), rounding=0.005).steps, np.full(49, 1 / 60))
-
-
-def test_steps_are_nan_across_gaps() -> None:
-    line = Timeline(np.array([0.0, 0.1, 0.2, 0.9, 1.0]), Fraction(10))
-    near(line.steps, [0.1, 0.1, np.nan, 0.1])
-    assert line.runs == [(0, 3), (3, 5)]
-    assert np.ptp(Timeline(np.arange(9) / 7.0, Fraction(7)).steps) < 1e-10
 
 
 def moving(numbers: list[int], rate: int = 100, **facts: object) -> Motion:

@@ -284,18 +284,6 @@ def test_joints_that_cannot_be_cut() -> None:
         extracted(written(replace(smooth(4), signals=(signal,))), joints=["spine"])
 
 
-def test_a_failed_extraction_leaves_nothing(tmp_path: Path) -> None:
-    whole = written(motion_for("lossless"), "lossless")
-    with pytest.raises(mcz.OptionError, match="copies"):
-        mcz.extract(whole, tmp_path / "a.mcz", joints=["knee"])
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "a.mcz").write_bytes(b"mine")
-    with pytest.raises(mcz.OptionError, match="exists"):
-        mcz.extract(whole, tmp_path / "a.mcz", frames=(0, 3))
-    mcz.extract(whole, tmp_path / "a.mcz", frames=(0, 3), force=True)
-    assert mcz.read(tmp_path / "a.mcz").n_frames == 3
-
-
 def test_damage_is_found_and_not_copied() -> None:
     whole = bytearray(written(rich()))
     with mcz.open(bytes(whole)) as file:

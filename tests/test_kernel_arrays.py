@@ -334,19 +334,6 @@ def motion_of(values: Array) -> Motion:
     return Motion(Skeleton((joint,)), (Signal(values),), frame_rate=Fraction(60), name="clip")
 
 
-@pytest.mark.parametrize("layout", [layout.__name__ for layout in LAYOUTS])
-@pytest.mark.parametrize("codec", ["fast", "mrdwt"])
-def test_motions_of_strange_arrays(codec: str, layout: str, tmp_path: Path) -> None:
-    clean = np.round(np.cumsum(np.sin(np.arange(120.0)).reshape(40, 3), axis=0), 3)
-    mcz.write(motion_of(clean), tmp_path / "clean.mcz", codec=codec)
-    strange, memory = next(f for f in LAYOUTS if f.__name__ == layout)(clean)
-    before = memory.tobytes()
-    mcz.write(motion_of(strange), tmp_path / "strange.mcz", codec=codec)
-    read = [mcz.read(tmp_path / f"{name}.mcz").values for name in ("clean", "strange")]
-    assert read[0].tobytes() == read[1].tobytes()
-    assert memory.tobytes() == before
-
-
 def test_decoded_arrays_stay(tmp_path: Path) -> None:
     """What was decoded keeps its numbers while more is decoded and what was used for it goes."""
     path = tmp_path / "clip.mcz"

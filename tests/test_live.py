@@ -42,8 +42,7 @@ from mcz.reading.sizes import packet_framing
 from mcz.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth
-from tests.repair import flipped, use, with_packets
-from tests.test_container import parts_of
+from tests.repair import flipped, parts_of, use, with_packets
 
 ROOT = Path(mcz.__file__).parent.parent
 
@@ -152,26 +151,12 @@ def test_any_number_of_frames(n: int, every: int, seed: int) -> None:
         np.testing.assert_array_equal(file.clips["live"].read(), values)
 
 
-class Trickle(io.RawIOBase):
-    """A stream that gives a byte at a time and knows how many were taken."""
-
-    def __init__(self, data: bytes) -> None:
-        self.data, self.at = data, 0
-
-    def readable(self) -> bool:
-        return True
-
-    def read(self, size: int = -1) -> bytes:
-        self.at += 1
-        return self.data[self.at - 1 : self.at]
-
-
 def test_each_frame_comes_with_its_last_byte() -> None:
     values = frames()
     data = live(values)
     with mcz.open(data) as file:
         ends = [row.stop + CHECK_SIZE for row in file.clips["live"].signals[0].rows]
-    stream = Trickle(data)
+    stream = live_codec.Trickle(data)
     assert [stream.at for _ in live_frames(stream)] == ends
 
 

@@ -341,13 +341,6 @@ def test_a_lossy_clip_has_a_quality_record(lossy: None) -> None:
     assert mcz.verify(out.getvalue()) == []  # the flags of QUAL too
 
 
-def test_a_lossless_clip_has_none() -> None:
-    out = io.BytesIO()
-    mcz.write(smooth(), out)
-    with mcz.open(out.getvalue()) as file:
-        assert file.clips["smooth"].quality is None
-
-
 def test_values_are_decoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
 

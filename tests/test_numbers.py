@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from mcz import FormatError, OptionError, SourceError
 from mcz.numbers import (
-    GRID,
     Grid,
     GridFlag,
     GridKind,
@@ -25,7 +24,6 @@ from mcz.numbers import (
     scan,
     values_of,
 )
-from mcz.schema import Record, build, field, parse
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 PLAIN = [flag for flag in GridFlag if flag not in (GridFlag.POINT, GridFlag.EXPONENT1)]
@@ -503,65 +501,6 @@ def test_scaled_and_integer() -> None:
         Grid(GridKind.FIXED, 4).bits(np.array([1]))
 
 
-class OfGrid(Record):
-    """A structure that has a grid."""
-
-    grid: Grid = field(GRID, "the grid")
-
-
-@pytest.mark.parametrize("grid", GRIDS, ids=repr)
-def test_schema(grid: Grid) -> None:
-    data = build(OfGrid(grid=grid), "test")
-    assert data[:3] == bytes((grid.kind, grid.digits, grid.flags))
-    assert len(data) == (11 if grid.kind == GridKind.SCALED else 3)
-    assert parse(OfGrid, data, "test").grid == grid
-    for length in range(len(data)):
-        with pytest.raises(FormatError):
-            parse(OfGrid, data[:length], "test")
-
-
-@given(st.binary(min_size=3, max_size=11))
-def test_hostile_grids(data: bytes) -> None:
-    """Bytes are a grid that works at 0 and at its limit, or a FormatError."""
-    try:
-        grid = parse(OfGrid, data, "test").grid
-    except FormatError:
-        return
-    ends = np.array([0, grid.limit])
-    assert np.isfinite(grid.values(ends)[:1]).all()
-    if grid.is_text:
-        assert len(grid.texts(ends)) == 2
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"kind": GridKind.FIXED, "digits": 23},
-        {"kind": GridKind.FIXED, "flags": GridFlag.NO_ZERO},
-        {"kind": GridKind.FIXED, "digits": 2, "flags": GridFlag.POINT},
-        {"kind": GridKind.FIXED, "digits": 2, "flags": GridFlag.UPPER},
-        {"kind": GridKind.TRIMMED},
-        {"kind": GridKind.GENERAL},
-        {"kind": GridKind.GENERAL, "digits": 16},
-        {"kind": GridKind.GENERAL, "digits": 6, "flags": 3},
-        {"kind": GridKind.GENERAL, "digits": 6, "flags": 48},
-        {"kind": GridKind.GENERAL, "digits": 6, "flags": 128},
-        {"kind": GridKind.TEXT64, "digits": 2},
-        {"kind": GridKind.TEXT64, "digits": 73},
-        {"kind": GridKind.TEXT64, "digits": 84, "flags": 1},
-        {"kind": GridKind.TEXT32, "digits": 6},
-        {"kind": GridKind.INTEGER, "scale": 2.0},
-        {"kind": GridKind.SCALED, "scale": 0.0},
-        {"kind": GridKind.SCALED, "scale": math.nan},
-        {"kind": GridKind.BINARY32, "flags": 1},
-    ],
-    ids=str,
-)
-def test_grids_that_cannot_be(fields: dict[str, float]) -> None:
-    with pytest.raises(OptionError):
-        Grid(**fields)
-
-
 @pytest.mark.parametrize("grid", GRIDS, ids=repr)
 @given(data=st.data())
 def test_values_of_a_matrix_are_those_of_each_grid(grid: Grid, data: st.DataObject) -> None:
@@ -592,13 +531,6 @@ def test_ordinals_of_a_matrix_are_those_of_each_grid(grid: Grid, data: st.DataOb
         wanted, back = own.ordinals(np.ascontiguousarray(table[:, c]))
         assert ordinals[:, c].tolist() == wanted.tolist()
         assert exact[:, c].tolist() == back.tolist()
-
-
-def test_values_of_a_matrix_refuse_what_is_no_ordinal() -> None:
-    for grid in GRIDS:
-        if grid.limit < 2**63 - 1:
-            with pytest.raises(FormatError, match="not an ordinal"):
-                values_of(np.array([[0], [grid.limit + 1]], np.int64), [grid])
 
 
 @pytest.mark.parametrize(

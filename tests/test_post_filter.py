@@ -16,16 +16,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import mcz
-from conformance import run
-from mcz.cli import conformance
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Channel, Motion, Signal
-from mcz.reading.post_filtering import filtered_motion, filtered_part, live_filter
+from mcz.reading.post_filtering import filtered_motion, filtered_part
 from mcz.sample import acclaim_walk, marker_walk
 from mcz.transforms.post_filter import CUTOFFS, DELAY, SCALE, PostFilter, filter_rows
 from mcz.transforms.post_filter import filter_taps as taps_of
-from tools import make_vectors
-from tools.vectors.valid import filtered as filtered_vectors
 from tools.vectors.valid.filtered import plain_rows, plain_taps
 
 ROOT = Path(__file__).parents[1]
@@ -90,44 +86,6 @@ def test_row_by_row_is_the_same(
     assert same(streamed(stream, rows), filter_rows(rows, *settings))
     more = np.resize(more, (len(more), rows.shape[1])) if more.size else rows[:3]
     assert same(streamed(stream, more), filter_rows(more, *settings))  # it is as new
-
-
-@given(
-    st.floats(-(2.0**40), 2.0**40, exclude_min=True, exclude_max=True),
-    st.integers(0, 60),
-    SETTINGS,
-)
-def test_what_stands_still_stays(place: float, n_rows: int, settings: tuple[float, float]) -> None:
-    rows = np.full((n_rows, 2), place)
-    assert np.array_equal(filter_rows(rows, *settings), rows)
-
-
-@given(tables(), st.integers(1, 30), SETTINGS)
-def test_runs_are_filtered_by_themselves(
-    rows: np.ndarray, gap: int, settings: tuple[float, float]
-) -> None:
-    missing = np.full((gap, rows.shape[1]), np.nan)
-    alone = filter_rows(rows, *settings)
-    both = filter_rows(np.concatenate((missing, rows, missing, rows)), *settings)
-    assert same(both, np.concatenate((missing, alone, missing, alone)))
-
-
-@given(tables(), SETTINGS)
-def test_what_is_unknown_stays(rows: np.ndarray, settings: tuple[float, float]) -> None:
-    known = np.abs(rows) < 2.0**40
-    out = filter_rows(rows, *settings)
-    assert np.isfinite(out[known]).all()
-    assert same(np.where(known, 0.0, out), np.where(known, 0.0, rows))
-
-
-def test_noise_falls_and_slow_motion_stays() -> None:
-    seconds = np.arange(1200) / 120
-    slow = 300 * np.sin(seconds)[:, None] * np.ones(3)
-    coarse = np.rint(slow / 10 + np.random.default_rng(1).normal(size=slow.shape)) * 10
-    filtered = filter_rows(coarse, 120.0, 0.1)
-    middle = slice(20, -20)
-    error, before = (np.square(x - slow)[middle].mean() for x in (filtered, coarse))
-    assert error < before / 5
 
 
 def test_each_filter_is_used() -> None:
@@ -221,17 +179,6 @@ def test_what_cannot_be_filtered() -> None:
     assert given.frame_rate == 120
 
 
-def test_the_live_filter_of_a_clip() -> None:
-    motion = walk()
-    stream = live_filter(motion.skeleton, motion.frame_rate)
-    rows = motion.signals[0].masked()
-    assert same(streamed(stream, rows), mcz.post_filter(motion).signals[0].masked())
-    with pytest.raises(OptionError, match="clip 'live': its frame rate"):
-        live_filter(motion.skeleton, None)
-    with pytest.raises(MotionError):
-        live_filter(acclaim_walk().skeleton, Fraction(120))
-
-
 def written(motion: Motion, **params) -> io.BytesIO:
     stream = io.BytesIO()
     mcz.write(motion, stream, **params)
@@ -271,14 +218,3 @@ def test_resolutions_are_filtered_before_they_are_thinned() -> None:
 
 
 # Vectors
-
-
-@pytest.mark.parametrize("vector", filtered_vectors.vectors(), ids=lambda vector: vector.name)
-def test_vectors(vector) -> None:
-    row = make_vectors.row(vector)
-    asked = list(run.requests(row, conformance.OPTIONS))
-    assert any("--post-filter" in request.arguments for request in asked)
-    for request in asked:
-        answer = conformance.answer(vector.data, request.arguments)
-        assert run.judge(request, *answer) is None, request.arguments
-    assert len(list(run.requests(row, []))) == 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict
 from typing import Any
@@ -33,7 +32,6 @@ LIMITS = {
     "signals": "signals of a clip",
     "rows": "rows of a segment",
 }
-ANNEX = registry.REGISTRY.parent
 FOUND: dict[str, Any] = json.loads(registry.REGISTRY.read_text("utf-8"))
 
 
@@ -124,11 +122,3 @@ def test_wavelets() -> None:
     assert {name: (row["id"], row["taps"]) for name, row in rows.items()} == {
         name: (IDS[name], wavelet.n_taps) for name, wavelet in WAVELETS.items()
     }
-
-
-def test_annexes() -> None:
-    rows = by("file", "annexes")
-    files = {path.name for path in ANNEX.iterdir()} - {registry.REGISTRY.name}
-    assert set(rows) == files
-    for name, row in rows.items():
-        assert row["sha256"] == hashlib.sha256((ANNEX / name).read_bytes()).hexdigest()

@@ -15,20 +15,18 @@ import pytest
 
 import mcz
 import mcz.formats.restore as restore_module
-from mcz import Exceptions, Signal
+from mcz import Signal
 from mcz.cli.figures import figure_lines
 from mcz.cli.skeleton_lines import _tree
 from mcz.codecs import CODECS, by_name
 from mcz.container import payloads, strict
 from mcz.container.chunks import build_header
-from mcz.container.scan import scan
 from mcz.container.writer import Writer
 from mcz.formats import FORMATS, c3d
 from mcz.formats.cells import Cells
 from mcz.formats.hierarchy import write_hierarchy
 from mcz.formats.layout import MAX_RUNS, Layout, Pattern, Run
 from mcz.numbers import Grid, GridKind
-from mcz.reading.report import validate
 from mcz.sample import marker_walk, write_samples
 from mcz.schema import parse
 from mcz.transforms import dwt
@@ -36,7 +34,6 @@ from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import write_clip
 from tests.commands import run
 from tests.motions import smooth, written
-from tests.repair import with_index_content
 from tools.fuzz.repair import joined, pieces_of, with_payload
 from tools.records import built
 
@@ -44,17 +41,6 @@ BVH = (
     "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 3\n"
     "Frame Time: 0.01\n1.25\n1.23456789e-01\n2.50\n"
 )
-
-
-@pytest.mark.parametrize(
-    ("codec", "params"), [("lossless", {}), ("raw", {"segment_frames": 10**6})]
-)
-def test_segments_keep_the_decoded_limit(codec: str, params: dict[str, int]) -> None:
-    joints = tuple(mcz.Joint(f"j{n}", channels=(mcz.Channel("rx"),)) for n in range(300))
-    motion = mcz.Motion(mcz.Skeleton(joints), (Signal(np.zeros((66_000, 300))),))
-    with mcz.open(written(motion, codec=codec, **params), max_decoded=2**40) as file:
-        assert len(file.clips["motion"].signals[0].rows) > 1
-        assert not file.clips["motion"].read((0, 5)).any()
 
 
 def test_exceptions_do_not_outlive_their_values(tmp_path: Path) -> None:
@@ -65,14 +51,6 @@ def test_exceptions_do_not_outlive_their_values(tmp_path: Path) -> None:
     changed = motion.with_values(motion.values + 1)
     with mcz.open(written(changed)) as file:
         np.testing.assert_array_equal(file.clips["a"].read(), motion.values + 1)
-
-
-def test_exceptions_that_are_no_numbers_are_not_written() -> None:
-    motion = smooth(3)
-    odd = Exceptions(np.array([1]), np.array([2]), (b"foo",))
-    signal = replace(motion.signals[0], exceptions=odd)
-    with mcz.open(written(replace(motion, signals=(signal,)))) as file:
-        np.testing.assert_array_equal(file.clips["smooth"].read(), motion.values)
 
 
 def test_salvage_of_integers() -> None:
@@ -98,21 +76,6 @@ def test_templates_keep_their_limit() -> None:
 def test_reserved_metadata() -> None:
     with pytest.raises(mcz.MotionError, match="frame-numbers"):
         written(smooth(3, metadata={"frame-numbers": "zzz"}))
-
-
-def test_indexed_attachment_without_parts() -> None:
-    out = io.BytesIO()
-    writer = Writer(out)
-    writer.attachment("note", b"kept")
-    writer.finish()
-
-    def without_parts(content: bytes) -> bytes:
-        at = content.index(b"\x04note") + 6  # behind name and size: the number of parts
-        return content[:at] + b"\0" + content[at + 3 :]
-
-    data = with_index_content(out.getvalue(), without_parts)
-    with pytest.raises(mcz.FormatError), mcz.open(data) as file:
-        validate(file)
 
 
 @pytest.fixture
@@ -178,42 +141,10 @@ def test_names_with_colons(tmp_path: Path) -> None:
     assert mcz.read(tmp_path / "a::b.mcz").n_frames == 3
 
 
-def test_ramps_are_coded() -> None:
-    values = np.round(np.arange(200)[:, None] * np.linspace(-2, 2, 10), 4)
-    with mcz.open(written(smooth(200).with_values(values))) as file:
-        np.testing.assert_array_equal(file.clips["smooth"].read(), values)
-
-
-def test_changed_and_cut_motions_have_sources_of_their_own(tmp_path: Path) -> None:
-    path = tmp_path / "a.bvh"
-    path.write_text(BVH)
-    motion = mcz.read(path)
-    for changed in (motion.with_values(motion.values + 1), None):
-        if changed is None:
-            with mcz.open(written(motion)) as file:
-                changed = file.clips["a"].motion((1, 3))
-        data = written(changed)
-        assert mcz.verify(data) == []
-
-
 def test_a_base_in_another_file_is_forgotten() -> None:
     motion = smooth(3)
     bones = replace(motion.skeleton, base=b"a" * 16)
     assert mcz.verify(written(replace(motion, skeleton=bones))) == []
-
-
-def test_least_int64_is_refused() -> None:
-    bones = mcz.Skeleton((mcz.Joint("m", channels=(mcz.Channel("", "n"),)),))
-    signal = Signal(np.array([[-(2**63)]], np.int64))
-    with pytest.raises(mcz.MotionError, match="beyond"):
-        written(mcz.Motion(bones, (signal,)))
-
-
-def test_unsafe_source_paths_are_not_written(tmp_path: Path) -> None:
-    path = tmp_path / "back\\slash.bvh"
-    path.write_text(BVH)
-    with pytest.raises(mcz.MotionError, match="plain"):
-        mcz.encode(path, tmp_path / "a.mcz")
 
 
 @pytest.mark.parametrize("through", ["walk.mcz", "walk.amc", "clip"])
@@ -230,13 +161,6 @@ def test_a_skeletons_own_file_survives(tmp_path: Path, through: str) -> None:
     assert not mcz.unpack(tmp_path / "again.mcz", tmp_path / "out").failures
     for name in ("walk.amc", "walk.asf"):
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / name).read_bytes()
-
-
-def test_a_channel_without_kind_and_name() -> None:
-    bones = mcz.Skeleton((mcz.Joint("m", channels=(mcz.Channel("", ""),)),))
-    motion = mcz.Motion(bones, (Signal(np.zeros((2, 1))),))
-    with mcz.open(written(motion)) as file:
-        assert file.clips["motion"].skeleton == bones
 
 
 def test_joints_by_numpy_numbers() -> None:
@@ -269,14 +193,6 @@ def test_rates_of_other_kinds(rate: object, expected: Fraction) -> None:
 def test_rates_that_are_none(rate: object) -> None:
     with pytest.raises(mcz.MotionError, match="frame rate"):
         replace(smooth(3), frame_rate=rate)
-
-
-@pytest.mark.parametrize("offset", [(1.0, 2.0), (1.0, 2.0, float("nan")), "abc", 5, (1, 2, None)])
-def test_vectors_that_are_none(offset: object) -> None:
-    with pytest.raises(mcz.MotionError, match="three finite numbers"):
-        mcz.Joint("m", offset=offset)  # type: ignore[arg-type]
-    with pytest.raises(mcz.MotionError, match="three finite numbers"):
-        mcz.Joint("m", tails=((0.0, 0.0, 0.0), offset))  # type: ignore[arg-type]
 
 
 def test_runs_are_limited_when_written() -> None:
@@ -470,23 +386,6 @@ def edited_clip(data: bytes, edit: Any) -> bytes:
     fields = parse(payloads.Clip, pieces[which].payload, "CLIP")
     edit(fields)
     return joined(with_payload(pieces, which, built(payloads.Clip, fields, "CLIP")))
-
-
-def test_source_of_a_clip_is_none_of_a_skeleton(tmp_path: Path) -> None:
-    (tmp_path / "a.bvh").write_text(BVH)
-    out = io.BytesIO()
-    mcz.encode(tmp_path / "a.bvh", out)
-    pieces = pieces_of(out.getvalue())
-    (which,) = (n for n, piece in enumerate(pieces) if piece.type == b"SRCE")
-    asf = bytes((FORMATS["asf"].id,)) + pieces[which].payload[1:]
-    data = joined(with_payload(pieces, which, asf))
-
-    def of_skeletons(fields: Any) -> None:
-        fields.source.format = FORMATS["asf"].id
-
-    data = edited_clip(data, of_skeletons)
-    with mcz.open(data) as file, pytest.raises(mcz.FormatError, match="other sort"):
-        scan(file.container.source, whole=True)
 
 
 def test_sorts_of_source_formats_are_those_of_the_registry() -> None:

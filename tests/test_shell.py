@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 
 import numpy as np
@@ -22,9 +21,7 @@ from mcz.kinematics import (
 )
 from mcz.sample import acclaim_walk, bvh_walk
 from tests.motions import motions, smooth
-from tests.test_metrics import hinge, markers
-
-SHIFTS = st.lists(st.floats(-100, 100), min_size=3, max_size=3)
+from tests.test_metrics import hinge
 
 
 def noisy(motion: Motion, size: float = 0.5, seed: int = 1) -> Motion:
@@ -124,27 +121,6 @@ def test_where_shells_cannot_be_compared() -> None:
     assert any("1 and 2 joints: no errors" in note for note in found.notes)
 
 
-def test_the_shell_of_a_marker_moves_with_it() -> None:
-    a, b = markers([[0, 0, 0, 1, 1, 1]]), markers([[0, 3, 4, 1, 1, 1]])
-    found = mcz.compare(a, b)
-    assert (found.shell_max_cm, found.shell_mean_cm) == (pytest.approx(50), pytest.approx(25))
-    assert found.shell_where == (0, "left")
-
-
-@given(SHIFTS)
-def test_a_moved_root_moves_every_shell(shift: list[float]) -> None:
-    motion = smooth(7)
-    values = motion.values.copy()
-    values[:, :3] += shift
-    found = mcz.compare(motion, motion.with_values(values))
-    distance = float(np.linalg.norm(shift)) * 2.5
-    assert found.shell_mean_cm == pytest.approx(distance, abs=1e-9)
-    for joint in found.by_joint:
-        assert joint.shell_mean_cm == pytest.approx(distance, abs=1e-9)
-        assert joint.shell_max_cm == pytest.approx(distance, abs=1e-9)
-        assert joint.entries()["mean_position_error_cm"] == pytest.approx(distance, abs=1e-9)
-
-
 @given(motions(), st.floats(0.5, 20))
 def test_beside_plain_sums(motion: Motion, radius: float) -> None:
     """Any values, masks and gaps: the figures by joint and over all, from arrays of points."""
@@ -190,23 +166,6 @@ def same_figures(
     return True
 
 
-def test_figures_by_joint_are_parts_of_those_of_all() -> None:
-    walk = acclaim_walk()
-    found = mcz.compare(walk, noisy(walk))
-    assert [joint.joint for joint in found.by_joint] == walk.skeleton.addresses()
-    shells = [joint.shell_mean_cm for joint in found.by_joint]
-    assert np.mean(shells) == pytest.approx(found.shell_mean_cm)
-    weights = [joint.points for joint in found.by_joint]
-    means = [joint.mean_position_error for joint in found.by_joint]
-    assert np.average(means, weights=weights) == pytest.approx(found.mean_position_error)
-    worst = max(found.by_joint, key=lambda joint: joint.shell_max_cm or 0)
-    assert (worst.shell_frame, worst.joint) == found.shell_where
-    assert worst.shell_max_cm == found.shell_max_cm
-    worst = max(found.by_joint, key=lambda joint: joint.max_position_error or 0)
-    assert found.where is not None
-    assert (worst.frame, worst.max_position_error) == (found.where[0], found.max_position_error)
-
-
 def test_frames_of_several_rows() -> None:
     motion = hinge([0.0] * 6)
     other = hinge([0.0, 0.0, 0.0, 0.0, 0.0, 90.0])
@@ -235,14 +194,3 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
             assert two.entries()[key] == (
                 pytest.approx(value, rel=1e-12) if isinstance(value, float) else value
             )
-
-
-def test_the_quality_record_has_the_shell() -> None:
-    file = io.BytesIO()
-    mcz.write(smooth(), file, codec="mrdwt", T_g=5.0)
-    with mcz.open(file.getvalue()) as opened:
-        quality = opened.only_clip().quality
-        found = mcz.compare(smooth(), opened.only_clip().motion())
-    assert float(quality["shell_mean_cm"]) == pytest.approx(found.shell_mean_cm)
-    assert float(quality["shell_max_cm"]) == pytest.approx(found.shell_max_cm)
-    assert not {"shell_radius_cm", "shell_max_joint", "contacts"} & set(quality)

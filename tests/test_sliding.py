@@ -55,14 +55,6 @@ def test_a_slide_by_hand() -> None:
     assert found.entries()["slide_max_frame"] == 60
 
 
-def test_what_the_original_moves_is_no_sliding() -> None:
-    slow = np.zeros((61, 1, 3))
-    slow[:, 0, 0] = np.arange(61) * 0.01
-    found = mcz.compare(markers("lfoot", slow), markers("lfoot", slow + 7), contacts=True).sliding
-    assert found.max_mm == pytest.approx(0, abs=1e-9)
-    assert found.path_mm == pytest.approx(found.path_original_mm) == pytest.approx(6.0)
-
-
 @given(SHIFTS, st.sampled_from([0.125, 1.0, 2.5]))
 def test_a_shift_of_all_is_no_sliding(shift: list[int], unit: float) -> None:
     motion, places = walk()

@@ -12,9 +12,6 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.codecs import CODECS, bitstream, by_name
-from mcz.formats import FORMATS
-from mcz.motion import CHANNEL_KINDS
 from tests.broken import find
 from tools import requirements
 
@@ -54,29 +51,6 @@ def test_named_readmes_exist() -> None:
     for path in (ROOT / "mcz").rglob("*.py"):
         named |= set(re.findall(r"\bmcz/[\w/]+/README\.md", path.read_text()))
     assert named == {str(path.relative_to(ROOT)) for path in (ROOT / "mcz").rglob("README.md")}
-
-
-def test_codec_registry() -> None:
-    rows = [row for row in rows_under("Codecs") if row[0].isdigit()]
-    found = {int(row[0]): (row[1], int(row[2]), row[3]) for row in rows}
-    assert found == {c.id: (bitstream(c.id), c.version, c.domain) for c in map(by_name, CODECS)}
-    assert {f"Codec {id_}: {name}" for id_, (name, _, _) in found.items()} <= HEADINGS
-
-
-def test_source_format_registry() -> None:
-    found = [(row[1], row[0], row[2]) for row in rows_under("Source reconstruction")]
-    known = sorted(FORMATS.values(), key=lambda source_format: source_format.id)
-    assert found == [(str(f.id), f.name, " ".join(f.suffixes)) for f in known]
-
-
-def test_channel_kinds() -> None:
-    kinds: list[str] = []
-    for numbers, names in re.findall(r"^\| (\d+(?:, \d+)*) \| ([a-z ]+) \| ", SPEC, re.M):
-        if not names.strip() or names.split()[0] not in CHANNEL_KINDS:
-            continue
-        kinds += names.split()
-        assert [int(n) for n in numbers.split(", ")][-1] == len(kinds)
-    assert tuple(kinds) == CHANNEL_KINDS
 
 
 def test_worked_example_is_the_smallest_clip() -> None:

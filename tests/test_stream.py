@@ -44,7 +44,7 @@ from mcz.live.reader_with_losses import MOST_MADE_UP
 from mcz.reading.report import info, layout
 from mcz.schema import build, parse
 from tests import live_codec
-from tests.repair import flipped, flips, parts_of, use
+from tests.repair import flipped, parts_of, use
 from tools.records import built
 
 NAMES = ("a", "b", "c")
@@ -390,23 +390,6 @@ def test_lines_wait_for_the_next_frame_and_end_with_the_stream() -> None:
     assert summary.is_cut
 
 
-@CODEC
-def test_datagrams_lost(codec: str) -> None:
-    """All bytes of a frame are lost: with a fresh one the beginning of its DATA, too."""
-    parts = pieces(codec)
-    whole, _ = read(b"".join(parts))
-    random = np.random.default_rng(5)
-    for _ in range(40):
-        kept = random.random(60) < random.choice([0.6, 0.9, 0.97])
-        middle = [part for part, keep in zip(parts[1:-1], kept, strict=True) if keep]
-        data = b"".join([parts[0], *middle, parts[-1]])
-        for how in ("missing", "hold", "linear"):
-            found, _ = read(data, lost=how)
-            assert [frame.number for frame in found] == list(range(60))
-            check_decoded(found, whole)
-            assert not [f.number for f in found if f.state == "decoded" and not kept[f.number]]
-
-
 def test_a_lost_beginning_is_made_up_by_the_first_repetition() -> None:
     parts = pieces()
     whole, _ = read(b"".join(parts))
@@ -498,20 +481,6 @@ def test_cut_at_every_byte(codec: str, lost: str) -> None:
             assert not reader.summary.is_checked or size >= len(data) - 1000
         assert states(got) == "d" * sum(end <= size for end in ends)
         check_decoded(got, whole)
-
-
-@pytest.mark.parametrize("codec", ["stairs", "online"])
-def test_every_flipped_bit(codec: str) -> None:
-    data = b"".join(pieces(codec, n=13))  # a whole run of ten, and the start of another
-    whole, _ = read(data)
-    for byte, bit in flips(len(data), 400, 3):
-        try:
-            found, _ = read(flipped(data, byte, bit), lost="hold")
-        except mcz.MczError as error:
-            assert str(error)
-            continue
-        check_decoded(found, whole)
-        assert [frame.number for frame in found] == list(range(len(found)))
 
 
 @pytest.mark.parametrize("lost", ["missing", "linear"])
@@ -809,22 +778,6 @@ def test_looking_for_what_is_whole_is_bounded() -> None:
         read(opening + b"\xff" + head * 20_000 + bytes(70_000), lost="hold")
 
 
-class Slow(io.RawIOBase):
-    """A stream that gives a byte at a time and knows how many were taken."""
-
-    def __init__(self, data: bytes) -> None:
-        self.data, self.at = data, 0
-
-    def readable(self) -> bool:
-        return True
-
-    def read(self, size: int = -1) -> bytes:
-        self.at += 1
-        return self.data[self.at - 1 : self.at]
-
-    read1 = read
-
-
 def test_a_damaged_length_holds_nothing_up() -> None:
     """It says 15,000 bytes: frames behind it come long before these have."""
     data = b"".join(pieces(n=600))
@@ -834,7 +787,7 @@ def test_a_damaged_length_holds_nothing_up() -> None:
     assert body - start == 3
     bad = bytearray(data)
     bad[body - 1 : body + 1] = b"\x98\x75"
-    stream = Slow(bytes(bad))
+    stream = live_codec.Trickle(bytes(bad))
     found, came = [], {}
     for frame in mcz.stream_decode(stream, lost="missing"):
         found.append(frame)
@@ -858,16 +811,6 @@ def test_what_a_stream_may_repeat() -> None:
         found, summary = read(data, lost="hold")
         assert states(found) == "d" * 60
         assert summary.n_faults == 1
-
-
-def test_codecs_that_need_all_frames() -> None:
-    out = io.BytesIO()
-    skeleton = mcz.Skeleton((mcz.Joint("a", channels=tuple(map(mcz.Channel, ("tx", "ty", "tz")))),))
-    motion = mcz.Motion(skeleton, (mcz.Signal(rows()[:, :3]),), name="live")
-    mcz.write(motion, out, codec="raw")
-    assert len(read(out.getvalue())[0]) == 60  # strictly, when the clip has ended
-    with pytest.raises(mcz.UnsupportedError, match="all of its frames"):
-        read(out.getvalue(), lost="hold")
 
 
 def test_critical_chunks_that_are_not_known() -> None:

@@ -10,7 +10,7 @@ import pywt
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz import FormatError, OptionError
+from mcz import OptionError
 from mcz.transforms import dwt
 from mcz.transforms.wavelets import IDS, INLINE, MAX_TAPS, WAVELETS, Wavelet, by_id, by_name
 
@@ -124,27 +124,3 @@ def test_a_wavelet_with_too_many_taps_is_refused() -> None:
     assert pywt.Wavelet("db38").rec_len > MAX_TAPS
     with pytest.raises(OptionError, match="wavelet 'db38': .*76"):
         by_name("db38")
-
-
-@pytest.mark.parametrize(
-    ("lo", "hi", "words"),
-    [
-        ((), (), "0 and 0 taps"),
-        ((1.0,), (1.0,), "1 and 1"),
-        ((1.0, 1.0), (1.0, 1.0, 1.0, 1.0), "2 and 4"),
-        ((1.0,) * 3, (1.0,) * 3, "3 and 3"),
-        ((0.1,) * 66, (0.1,) * 66, "66 and 66"),
-        ((1.0, 16.5), (1.0, 1.0), "a tap beyond 16"),
-        ((1.0, 1.0), (float("nan"), 1.0), "a tap beyond 16"),
-        ((1.0, float("-inf")), (1.0, 1.0), "a tap beyond 16"),
-    ],
-)
-def test_bad_filters_are_refused(lo: tuple[float, ...], hi: tuple[float, ...], words: str) -> None:
-    with pytest.raises(FormatError, match=words):
-        Wavelet(lo, hi)
-
-
-@pytest.mark.parametrize("id_", [-1, 0, len(WAVELETS) + 1, 255])
-def test_unknown_ids_are_refused(id_: int) -> None:
-    with pytest.raises(FormatError, match=f"wavelet {id_} is not one of 1 to 10"):
-        by_id(id_)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -88,25 +87,6 @@ def test_damage_later_in_a_run_leaves_what_is_before(name: str) -> None:
             np.testing.assert_array_equal(found, whole[first.first : first.stop])
             with pytest.raises(ChecksumError):
                 clip.read((last.header.first, last.header.stop))
-
-
-def test_threads_share_a_file() -> None:
-    with mcz.open(FILES["lossless"]) as file:
-        clip = file.only_clip()
-        whole = clip.read()
-        wrong: list[int] = []
-
-        def look(seed: int) -> None:
-            starts = np.random.default_rng(seed).integers(0, LENGTH - 9, 60).tolist()
-            found = {a: clip.read((a, a + 9)) for a in starts}
-            wrong.extend(a for a in starts if not np.array_equal(found[a], whole[a : a + 9]))
-
-        threads = [threading.Thread(target=look, args=(seed,)) for seed in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert not wrong
 
 
 def test_segments_that_no_channel_needs_are_checked() -> None:
