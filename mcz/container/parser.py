@@ -96,8 +96,6 @@ class Parser:
     candidate = re.compile(  # looks like the beginning of a chunk, or is that of a FOOT
         rb"(?=[A-Za-z]{4}[\x00-\x03]\x00|\x00{4}.{20}" + re.escape(END_MAGIC) + b")", re.DOTALL
     )
-    overlap = FOOT.size - 1  # bytes in which a candidate may begin that is not there as a whole
-    rescans = False  # what follows is looked for in what is not whole, too
 
     def __init__(
         self,
@@ -193,7 +191,7 @@ class Parser:
             if self.size is not None and end >= self.size:
                 self._is_lost, self.at = False, self.size
                 return self._thing()
-            self.at = max(begin, end - self.overlap)
+            self.at = max(begin, end - FOOT.size + 1)  # one may begin there that is not all there
             raise Short(end + 1)
 
     def _spend(self, begin: int) -> Fault | None:
@@ -213,8 +211,8 @@ class Parser:
             self._stop = at + 1
 
     def _pass(self, chunk: Chunk) -> None:
-        """Go on behind a chunk that is not right, unless something is looked for in it."""
-        if self.rescans or self._is_lost:
+        """Go on behind a chunk that is not right."""
+        if self._is_lost:
             return
         self._go_to(chunk.offset + chunk.size)  # SALV-01
         rows = GRAMMAR[NAMED.get(chunk.type, OTHER)]
@@ -357,18 +355,21 @@ class Parser:
             self._position(at, self._start + len(data) + 1)
             raise
         first, sequence, start, stop = head
-        if sequence != self._sequence:  # PACK-02
+        skipped, kind = sequence - self._sequence, first & KIND
+        if not self._may_skip(kind, skipped):  # PACK-02
             raise FormatError(f"packet {sequence} where {self._sequence} is due")
         end = stop + CHECK_SIZE
         if end > len(data):
             self._position(at, self._start + end)
-        body, implied, kind = data[start:stop], b"", first & KIND
+        self._tried = end - pos
+        body, implied = data[start:stop], b""
         if kind == FRAME:
-            implied = implied_by(self._due(), self._mask())
+            implied = implied_by(self._due() + skipped, self._mask())
         # INDX-03, PACK-04, PACK-15
         if packet_check(data[pos:start], body, implied) != data[stop:end]:
-            due = f", or it is not frame {self._number}" if implied else ""
+            due = f", or it is not frame {self._number + skipped}" if implied else ""
             raise ChecksumError(f"crc of packet {sequence} is wrong{due}")
+        self._skip(skipped)
         packet = Packet(kind, sequence, body, first >= FRESH_PACKET, implied)
         assert self._chunk is not None
         event = PacketEvent(self._chunk, packet, at, self._start + start)
@@ -379,6 +380,13 @@ class Parser:
         except FormatError as error:
             return Fault(at, error, event.chunk, event)
         return event
+
+    def _may_skip(self, kind: int, count: int) -> bool:
+        """Return whether a packet of this kind may come so many too early."""
+        return count == 0
+
+    def _skip(self, count: int) -> None:
+        """Pass over so many packets that did not come; raises FormatError."""
 
     def _due(self) -> int:
         if not self._is_told:  # PACK-14

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 
 from mcz.brief import brief
 from mcz.container import payloads
-from mcz.container.chunks import Chunk, ChunkType
+from mcz.container.chunks import ChunkType
 from mcz.container.directory import parse_head
+from mcz.container.events import ChunkEvent, Fault, FootEvent, PacketEvent
+from mcz.container.feeding import Stream
 from mcz.container.limits import check
 from mcz.container.packed import chunk_id
-from mcz.container.packets import END, SEGMENT, Packet, implied_by
-from mcz.container.segments import FRESH, SegmentHeader, mask_of, parse_header
-from mcz.container.walk_with_losses import Fault, Piece, WalkerWithLosses, repeated
+from mcz.container.repeats import chunks_in
+from mcz.container.segments import FRESH, SegmentHeader, parse_header
+from mcz.container.tolerant_parser import TolerantParser
 from mcz.errors import (
     ChecksumError,
     FormatError,
@@ -70,30 +72,16 @@ class StreamSummary:
             self.remarks.append(text)
 
 
-class _Open:
-    """An open DATA: the packet and the frame that are due in it.
-
-    ``number`` is None until a packet has told it, ``mask`` is what packets of kind 2 imply then. No
-    frame of it comes before ``least``.
-    """
-
-    def __init__(self, least: int | None) -> None:
-        self.least = least
-        self.number: int | None = None
-        self.mask = b""
-        self.sequence = 0
-
-
 class FramesWithLosses:
     """The frames of a stream that survives losses; ``clip`` is the one that the last is of."""
 
     def __init__(self, stream: BinaryIO, lost: Lost, join: bool, summary: StreamSummary) -> None:
-        self._walker = WalkerWithLosses(stream, self._implied_of, join=join)
+        self._stream, self._parser = Stream(stream), TolerantParser()
         self._lost, self._summary = lost, summary
         self._joining = join  # until a frame has come whose number is known
         self._head, self._shared = b"", Shared()
         self._course: _Course | None = None
-        self._open = _Open(None)
+        self._least: int | None = None  # no frame of the open DATA comes before
         self._made_up = 0
         self._all_checked: bool | None = None
         self.clip: LiveClip | None = None
@@ -101,24 +89,39 @@ class FramesWithLosses:
     @property
     def size(self) -> int:
         """The bytes that came."""
-        return self._walker.size
+        return self._stream.size
 
     def frames(self) -> Iterator[LiveFrame]:
         """All frames that can be told; raises FormatError where there is no going on."""
-        for event in self._walker.events():
+        is_cut, cuts = True, list[Fault]()  # those are no faults where nothing follows
+        for event in self._stream.events(self._parser):
+            if isinstance(event, Fault) and isinstance(event.error, TruncatedError):
+                if self._lost == "refuse":
+                    raise event.error
+                cuts.append(event)
+                continue
+            is_cut = not isinstance(event, FootEvent)  # LIVE-11
+            while cuts:
+                self._note(cuts.pop())
+            found = event.event if isinstance(event, Fault) else event
             if isinstance(event, Fault):
-                if event.is_cut and self._lost == "refuse":
-                    raise TruncatedError(event.reason)
-                self._fault(f"at {event.offset}: {event.reason}")
-            elif isinstance(event, Packet):
+                self._note(event)
+            elif isinstance(event, PacketEvent):
                 yield from self._packet(event)
-            else:
-                yield from self._piece(event)
-        if self._walker.is_cut and self._lost == "refuse":
-            raise TruncatedError(f"the stream ended at {self.size}")
+            if isinstance(found, ChunkEvent):
+                yield from self._chunk(found)
+            elif isinstance(found, FootEvent):
+                yield from self._leave("the file ended")
         yield from self._leave("the stream ended")
-        self._summary.is_cut = self._walker.is_cut
+        self._summary.is_cut = is_cut
         self._summary.is_checked = bool(self._all_checked)
+
+    def _note(self, fault: Fault) -> None:
+        """Note what is not whole, or not right; that a chunk is not in its place means nothing."""
+        if isinstance(fault.error, UnsupportedError) or self._parser.is_done:
+            raise fault.error
+        if not fault.state:
+            self._fault(f"at {fault.offset}: {fault.error}")
 
     def _fault(self, text: str) -> None:
         if self._joining:  # what lies before the place where one joins is no loss
@@ -136,52 +139,44 @@ class FramesWithLosses:
         self._fault(f"{count} frames did not come, too many to show something in their place")
         return False
 
-    # Chunks ------------------------------------------------------------------
-
-    def _piece(self, piece: Piece) -> Iterator[LiveFrame]:
-        kind, payload = piece.type, piece.payload
+    def _chunk(self, event: ChunkEvent) -> Iterator[LiveFrame]:
+        kind = event.chunk.type
         if kind == ChunkType.HEAD:
-            self._walker.profile = parse_head(payload or b"")
-            self._head = piece.data
+            self._parser.profile = parse_head(event.payload)
+            self._head = event.data
         elif kind in (ChunkType.SKEL, ChunkType.MODL):
-            self._keep(piece)
+            self._shared.setdefault((kind, chunk_id(kind, event.payload)), event.data)
+            kept = sum(map(len, self._shared.values()))
+            check("SKEL and MODL: bytes", kept, 2 * self._parser.profile.model_bytes)
         elif kind == ChunkType.CLIP:
-            yield from self._begin(piece)
+            yield from self._begin(event)
         elif kind == ChunkType.REPT:  # REPT-04
-            yield from self._repeat(piece)
-        elif kind == ChunkType.DATA and payload is None:
-            self._open = _Open(None if self._course is None else self._course.frames.due)
+            yield from self._repeat(event)
+        elif kind == ChunkType.DATA and event.chunk.length is None:
+            is_single = self._parser.n_signals == 1
+            self._least = self._course.frames.due if self._course and is_single else None
         elif kind == ChunkType.DATA and self._course is not None:
-            yield from self._segment(payload or b"", 0, None)
+            yield from self._segment(self._course, event.payload)
         elif kind == ChunkType.CEND:
-            yield from self._close(piece)
-        elif kind == b"FOOT":
-            yield from self._leave("the file ended")
+            yield from self._close(event)
 
-    def _keep(self, piece: Piece) -> None:
-        id_ = chunk_id(piece.type, piece.payload or b"")
-        self._shared.setdefault((piece.type, id_), piece.data)
-        kept = sum(map(len, self._shared.values()))
-        check("SKEL and MODL: bytes", kept, 2 * self._walker.profile.model_bytes)
-
-    def _repeat(self, piece: Piece) -> Iterator[LiveFrame]:
+    def _repeat(self, event: ChunkEvent) -> Iterator[LiveFrame]:
         try:
-            pieces = repeated(piece)
+            events = chunks_in(event.payload, 0)
         except FormatError as error:
             self._fault(str(error))
             return
-        for inner in pieces:
-            yield from self._piece(inner)
+        for inner in events:
+            yield from self._chunk(inner)
 
-    def _begin(self, piece: Piece) -> Iterator[LiveFrame]:
+    def _begin(self, event: ChunkEvent) -> Iterator[LiveFrame]:
         """A clip begins, or is the one that has begun and is told once more."""
-        if self._course is not None and self._course.opening == piece.data:
+        if self._course is not None and self._course.opening == event.data:
             return
         yield from self._leave("another clip began")
         try:
-            chunk = Chunk(ChunkType.CLIP, 0, 0, len(piece.payload or b""))
-            fields = parse(payloads.Clip, piece.payload or b"", "CLIP")
-            followed = begin(self._head, self._shared, row_of(fields, chunk), fields)
+            fields = parse(payloads.Clip, event.payload, "CLIP")
+            followed = begin(self._head, self._shared, row_of(fields, event.chunk), fields)
         except (UnsupportedError, LimitError):
             raise
         except FormatError as error:
@@ -192,15 +187,15 @@ class FramesWithLosses:
                 f"clip {fields.name!r} needs all of its frames, and cannot be read with losses"
             )
         counts = followed.info.layout.n_channels, self._lost, followed.shown, self._spend
-        self._course = _Course(followed, piece.data, Concealer(*counts, join=self._joining))
-        self.clip = followed.clip
+        self._course = _Course(followed, event.data, Concealer(*counts, join=self._joining))
+        self.clip, self._parser.n_signals = followed.clip, followed.n_signals
 
-    def _close(self, piece: Piece) -> Iterator[LiveFrame]:
+    def _close(self, event: ChunkEvent) -> Iterator[LiveFrame]:
         course, self._course = self._course, None
         if course is None:
             return
         try:
-            fields = parse(payloads.Cend, piece.payload or b"", "CEND")
+            fields = parse(payloads.Cend, event.payload, "CEND")
         except FormatError as error:
             self._course = course
             self._fault(str(error))
@@ -229,67 +224,31 @@ class FramesWithLosses:
             self._all_checked = False  # LIVE-10
             self._fault(f"clip {course.followed.clip.name!r} has no end: {why}")
 
-    # Packets -----------------------------------------------------------------
-
-    def _frame_of(self, sequence: int) -> int | None:
-        """The number of the frame in that packet, of signal 0, of the open DATA, where known."""
-        course, data = self._course, self._open
-        gap = sequence - data.sequence  # LIVE-05
-        # LIVE-06
-        several = course is None or course.followed.n_signals > 1
-        if data.number is None or (gap and several):
-            return None  # of several signals it is not known whose frames the lost packets held
-        return data.number + gap
-
-    def _implied_of(self, sequence: int) -> bytes | None:
-        """What the check of that packet of kind 2 covers beside its bytes, where known."""
-        number = self._frame_of(sequence)
-        return None if number is None else implied_by(number, self._open.mask)  # PACK-20
-
-    def _packet(self, packet: Packet) -> Iterator[LiveFrame]:
-        course, data = self._course, self._open
-        number = data.number = self._frame_of(packet.sequence)
-        data.sequence = packet.sequence + 1
-        if packet.kind == SEGMENT:
-            yield from self._segment(packet.body, SEGMENT, packet.fresh)
-            return
-        if number is not None and packet.kind != END:
-            data.number = number + 1
+    def _packet(self, event: PacketEvent) -> Iterator[LiveFrame]:
+        course, packet, header = self._course, event.packet, event.header
         if course is None:
             return
-        if course.followed.n_signals > 1:
-            data.least = None
-        if number is None:
-            if data.least is not None:
-                yield from course.frames.reach(min(data.least + packet.sequence, MAX_COUNT))
-        elif number >= MAX_COUNT:
-            self._fault(f"packet {packet.sequence}: frame {number}")
-        elif packet.kind == END:
-            yield from course.frames.reach(number)
-        else:
-            header = SegmentHeader(0, number, 1, flags=FRESH if packet.fresh else 0)
-            yield from self._frame(course, header, packet.kind, packet.body)  # PACK-12
+        if header is not None:
+            if header.first >= MAX_COUNT:
+                self._fault(f"packet {packet.sequence}: frame {header.first}")
+            elif header.signal == 0:
+                yield from self._frame(course, header, packet.kind, packet.body)  # PACK-12
+            return
+        due = self._parser.frame_due
+        if due is None and self._least is not None:
+            due = self._least + packet.sequence
+        if due is not None:
+            yield from course.frames.reach(min(due, MAX_COUNT))
 
-    def _segment(self, payload: bytes, kind: int, fresh: bool | None) -> Iterator[LiveFrame]:
-        course = self._course
-        if course is not None and course.followed.n_signals > 1:
-            self._open.least = None
+    def _segment(self, course: _Course, payload: bytes) -> Iterator[LiveFrame]:
+        """The frame of a closed DATA."""
         try:
             header, _ = parse_header(payload)
-            mask = mask_of(payload) if kind and not header.signal else b""
         except FormatError as error:
-            self._open.number = None  # how many frames it had is not known either
             self._fault(str(error))
             return
-        if header.signal:
-            return
-        self._open.number, self._open.mask = header.stop, mask
-        if course is None:
-            return
-        if fresh in (None, bool(header.flags & FRESH)):
-            yield from self._frame(course, header, kind, payload)
-        else:
-            self._fault(f"frame {header.first}: its packet and its segment differ")
+        if header.signal == 0:
+            yield from self._frame(course, header, 0, payload)
 
     def _frame(
         self, course: _Course, header: SegmentHeader, kind: int, payload: bytes

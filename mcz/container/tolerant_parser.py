@@ -1,0 +1,177 @@
+"""The parser of streams of which parts are lost or damaged: what came whole, as it comes.
+
+SPEC.md, "Live streams with losses", is normative.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from itertools import chain
+
+from mcz.container.chunks import END_MAGIC, FOOT, REPEATED, Chunk, ChunkType, Foot
+from mcz.container.events import ChunkEvent, Event, Fault, FootEvent
+from mcz.container.grammar import CLIP, FILE, PACKETS
+from mcz.container.limits import BASE, MIB, check
+from mcz.container.packets import FRAME
+from mcz.container.parser import ALL, Parser, Short
+from mcz.errors import FormatError
+
+WANTED = frozenset((*REPEATED, ChunkType.CEND, ChunkType.DATA, ChunkType.REPT))
+SMALL = MIB  # what is not wanted is whole for a search up to this length
+LEAST_MOST = 256  # bytes that packets have as far as is known before one came
+PATIENCE = 4  # times as long as any before may a packet be without anything else being looked for
+
+_CHUNK = b"(?=" + b"|".join(sorted(kind.value for kind in ChunkType)) + b")"
+_ANY_CHUNK = re.compile(_CHUNK)
+_ANY_PACKET = re.compile(rb"[\x00-\x02\x80-\x82]|" + _CHUNK)
+_NAME_SIZE = 4
+
+
+class TolerantParser(Parser):
+    """A parser of a stream that survives what is lost, and may begin anywhere.
+
+    A chunk may follow a packet, and a packet one that came long before. Packets that do not come
+    whole are waited for no longer than until something behind is. ``profile`` is to be set as HEAD
+    says, ``n_signals`` as CLIP does. Memory is bounded by the largest chunk.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(want=lambda chunk: ALL * (chunk.type in WANTED))
+        self.n_signals = 1  # of the clip
+        self._most = LEAST_MOST  # bytes of the largest packet so far
+        self._searched = 0  # what begins before was tried
+        self._short: dict[int, int] = {}  # where such packets begin and end that have not all come
+        self._suspect: int | None = None  # where a packet begins that is very long
+        self._next: Event | None = None
+
+    @property
+    def frame_due(self) -> int | None:
+        """The number of the next frame of the open DATA, where it is known."""
+        return self._number if self._is_told else None
+
+    def next(self) -> Event | None:
+        event, self._next = self._next, None
+        return event or super().next()
+
+    def search(self, at: int) -> None:
+        state = self.state
+        super().search(at)
+        self.state = PACKETS if state == PACKETS else self.state
+        self._searched = at
+        self._short.clear()
+
+    def _signature(self) -> Event | None:
+        event = super()._signature()
+        if isinstance(event, Fault) and event.offset == 0:
+            self.search(0)
+        return event
+
+    def _thing(self) -> Event | None:
+        if self.state != PACKETS or self._parts is not None:
+            return super()._thing()
+        at = self.at
+        pos = self._position(at, at + 1)
+        if self._data[pos : pos + 1].isalpha():
+            return self._header(at)
+        try:
+            event = self._packet()
+        except Short:
+            is_long = self._start + len(self._data) - at > PATIENCE * self._most
+            if self._is_lost or not is_long:
+                raise
+            self.search(at)
+            self._suspect = at
+            return self._found()
+        self._most = max(self._most, self.at - at)
+        return event
+
+    def _found(self) -> Event | None:
+        """What is whole at ``at`` or behind it; a packet that was short is tried when it came."""
+        while True:
+            end = self._start + len(self._data)
+            pattern = _ANY_PACKET if self.state == PACKETS else _ANY_CHUNK
+            ahead = pattern.finditer(self._data, self._searched - self._start)
+            for at in chain(
+                [at for at, stop in self._short.items() if stop <= end],
+                (self._start + match.start() for match in ahead),
+            ):
+                event = self._tried_at(at)
+                if event is not None:
+                    return event
+                if self.state != PACKETS and pattern is _ANY_PACKET:  # a packet of another DATA
+                    self._searched = at
+                    break
+            else:
+                if self.size is not None and end >= self.size:
+                    self._is_lost, self.at = False, self.size
+                    self.state = CLIP if self.state == PACKETS else self.state
+                    return super()._thing()
+                self._searched = max(self._searched, end - _NAME_SIZE + 1)  # a name may have begun
+                self.at = min((self._searched, *self._short))
+                raise Short(max(end + 1, min(self._short.values(), default=0)))
+
+    def _tried_at(self, at: int) -> Event | None:
+        """What is whole at ``at``, or the end of a search that was given up."""
+        state, chunk = self.state, self._chunk
+        self.at, self._tried = at, 0
+        self._short.pop(at, None)
+        try:
+            event = self._thing()
+        except Short as short:
+            if self._data[at - self._start : at - self._start + 1].isalpha():
+                self._searched = at
+                self.at = min((at, *self._short))
+                raise
+            self._short[at] = short.stop
+            return None
+        except FormatError:
+            self._chunk = chunk
+            if self.state == CLIP and state == PACKETS:
+                self._short.clear()
+            else:
+                self.state = state
+            return self._spend(at)
+        self._is_lost = False
+        suspect, self._suspect = self._suspect, None
+        if suspect not in (None, at):
+            self._next = event
+            return Fault(suspect, FormatError(f"a packet that does not end before {at}"))
+        return event
+
+    def _pass(self, chunk: Chunk) -> None:
+        """Look for what is whole in a chunk that is not, too."""
+
+    def _payload(self, chunk: Chunk, wanted: int) -> Event:
+        most = self.profile.chunk_bytes
+        if wanted == ALL:
+            most = min(most, max(self.profile.model_bytes, BASE.model_bytes))
+        elif self._is_lost:
+            most = SMALL
+        check(f"chunk {chunk.label}: bytes", chunk.length or 0, most)
+        return super()._payload(chunk, wanted)
+
+    def _placed(self, event: ChunkEvent) -> Event:
+        self.state = CLIP if self.state == PACKETS else self.state
+        return super()._placed(event)
+
+    def _foot(self, at: int) -> Event:
+        """A FOOT, without the place of its index: that means nothing to who joined."""
+        pos = self._position(at, at + FOOT.size)
+        data = self._data[pos : pos + FOOT.size]
+        crc = int.from_bytes(data[4:8], "little")
+        if data[24:] != END_MAGIC or crc != zlib.crc32(data[:4] + data[8:]):
+            raise FormatError("neither a chunk nor a FOOT")
+        self.at, self.state = at + FOOT.size, FILE
+        return FootEvent(Foot(0, 0), at, None)
+
+    def _may_skip(self, kind: int, count: int) -> bool:
+        # LIVE-06: of several signals it is not known whose frames the lost packets held
+        return kind != FRAME or count == 0 or (count > 0 and self.n_signals == 1)
+
+    def _skip(self, count: int) -> None:
+        if count < 0:  # LIVE-07
+            self.state = CLIP
+            raise FormatError(f"packet {self._sequence + count} where {self._sequence} is due")
+        self._number += count  # LIVE-05
+        self._is_told = self._is_told and (count == 0 or self.n_signals == 1)  # LIVE-06
