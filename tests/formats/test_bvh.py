@@ -10,43 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.container.limits import BASE, LARGE
 from mcz.formats import amc, asf, bvh, hierarchy, likely_formats, limits
-from mcz.formats.notes import join_notes
 from mcz.numbers import Grid, GridKind
-from tests.formats.text_files import BVH, bvh_texts
-
-
-@given(bvh_texts(), st.data())
-def test_a_range_of_frames_can_be_written(data: bytes, draw: st.DataObject) -> None:
-    motion = bvh.read(data, "clip")
-    n_frames = motion.n_frames
-    start = draw.draw(st.integers(0, n_frames))
-    stop = draw.draw(st.integers(start, n_frames))
-    cut = bvh.read(bvh.write(cut_motion(motion, start, stop)), "clip")
-    assert cut.n_frames == stop - start
-    wanted = motion.signals[0].values[start:stop]
-    assert np.array_equal(cut.signals[0].values, wanted, equal_nan=True)
-
-
-def cut_motion(motion: Motion, start: int, stop: int) -> Motion:
-    """Frames start <= f < stop with the parts of the source that belong to them."""
-    signal, source = motion.signals[0], motion.source
-    assert source is not None
-    chosen = (signal.exceptions.rows >= start) & (signal.exceptions.rows < stop)
-    exceptions = type(signal.exceptions)(
-        signal.exceptions.rows[chosen] - start,
-        signal.exceptions.channels[chosen],
-        tuple(t for t, c in zip(signal.exceptions.texts, chosen, strict=True) if c),
-    )
-    notes = source.notes and join_notes([(0, stop - start, source.notes.cut(start, stop))])
-    part = replace(signal, values=signal.values[start:stop], exceptions=exceptions)
-    return replace(motion, signals=(part,), source=replace(source, notes=notes))
+from tests.formats.text_files import BVH
 
 
 def test_what_a_file_says() -> None:
@@ -83,7 +53,7 @@ def test_a_frame_count_that_is_wrong_is_reported() -> None:
     motion = bvh.read(data, "walk")
     assert motion.metadata["source-note"] == "4 frames are declared, 3 are there"
     assert bvh.write(motion) == data
-    assert b"Frames: 2\n" in bvh.write(cut_motion(motion, 0, 2))
+    assert b"Frames: 2\n" in bvh.write(motion.cut(0, 2))
 
 
 def test_a_joint_without_channels_anywhere_has_a_row_a_line() -> None:

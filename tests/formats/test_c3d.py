@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
-from mcz import Channel, FormatError, Joint, Motion, MotionError, Signal, Skeleton, SourceError
+from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.formats import c3d
 from mcz.numbers import Grid, GridKind
-from tests.formats.c3d_files import DEC, INTEL, SGI, Made, c3d_files, made, real_of, word
+from tests.formats.c3d_files import DEC, INTEL, SGI, Made, c3d_files, made, real_of
 
 ORDERS = (INTEL, DEC, SGI)
 POSITION = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
@@ -59,74 +58,6 @@ def test_what_words_mean(file: Made) -> None:
         assert np.array_equal(signals["analog"].values, rows, equal_nan=True)
 
 
-@given(st.sampled_from(ORDERS), st.sampled_from([2, 4]), st.integers(0, 35), st.data())
-def test_a_changed_value_changes_only_its_word(
-    processor: int, size: int, cell: int, draw: st.DataObject
-) -> None:
-    data = made(6, 2, 2, 2, processor=processor, size=size).build()
-    motion = c3d.read(data, "clip")
-    grid = motion.signals[0].grids[0]
-    values = motion.signals[0].values.copy()
-    ordinal, _ = grid.ordinals(values.flat[cell : cell + 1])
-    values.flat[cell] = grid.values(ordinal + draw.draw(st.sampled_from([-1, 1])))[0]
-    changed = c3d.write(motion.with_values(values))
-    differ = [k for k, (a, b) in enumerate(zip(data, changed, strict=True)) if a != b]
-    frame, column = divmod(cell, 6)
-    frame_size = size * (8 + 4)
-    start = len(data) - 6 * frame_size + frame * frame_size + size * (column // 3 * 4 + column % 3)
-    assert differ and {k // size for k in differ} == {start // size}
-    assert np.array_equal(c3d.read(changed, "clip").signals[0].values, values)
-
-
-def cut_motion(motion: Motion, start: int, stop: int) -> Motion:
-    """Frames start <= f < stop."""
-    signals = []
-    for signal in motion.signals:
-        rows = slice(start * signal.samples_per_frame, stop * signal.samples_per_frame)
-        parts = {
-            name: getattr(signal, name)[rows]
-            for name in ("values", "mask", "ordinals")
-            if getattr(signal, name) is not None
-        }
-        signals.append(replace(signal, **parts))
-    numbers = motion.frame_numbers
-    if numbers is None:
-        numbers = np.arange(1, motion.n_frames + 1)
-    return replace(motion, signals=tuple(signals), frame_numbers=numbers[start:stop])
-
-
-@pytest.mark.parametrize("processor", ORDERS)
-@pytest.mark.parametrize("size", [2, 4])
-@pytest.mark.parametrize("tail", [b"", bytes(100), b"\1" * 600])
-def test_a_range_of_frames_can_be_written(processor: int, size: int, tail: bytes) -> None:
-    file = made(60, 4, 3, 2, processor=processor, size=size, first=40, tail=tail)
-    file.parameters = {
-        "POINT": {"LONG_FRAMES": file.real(60.0)},
-        "TRIAL": {"ACTUAL_START_FIELD": file.long(40), "ACTUAL_END_FIELD": file.long(99)},
-    }
-    motion = c3d.read(file.build(), "clip")
-    assert "source-note" not in motion.metadata
-    part = cut_motion(motion, 7, 19)
-    again = c3d.read(c3d.write(part), "clip")
-    assert "source-note" not in again.metadata  # all counts are right
-    assert again.frame_numbers is not None and again.frame_numbers.tolist() == [*range(47, 59)]
-    for one, other in zip(part.signals, again.signals, strict=True):
-        assert np.array_equal(one.values, other.values)
-    assert c3d.write(motion) == file.build()
-
-
-def test_a_range_is_refused_where_parameters_follow_the_data() -> None:
-    file = made(4, 2)
-    data = bytearray(file.build())
-    head, section = data[:512], data[512:-128]
-    behind = head + data[-128:] + bytes(384) + section
-    behind[0], behind[16] = 3, 2
-    motion = c3d.read(bytes(behind), "clip")
-    assert motion.n_frames == 4 and c3d.write(motion) == behind
-    with pytest.raises(MotionError, match="only whole clips"):
-        c3d.write(cut_motion(motion, 1, 3))
-
-
 @pytest.mark.parametrize("processor", ORDERS)
 @pytest.mark.parametrize("convention", ["trial", "long", "header only", "wrapped"])
 def test_more_frames_than_a_word_counts(processor: int, convention: str) -> None:
@@ -159,7 +90,7 @@ def test_first_frames_beyond_a_word_are_in_trial() -> None:
     assert motion.frame_numbers is not None
     assert motion.frame_numbers.tolist() == [*range(70_000, 70_005)]
     assert "source-note" not in motion.metadata
-    again = c3d.read(c3d.write(cut_motion(motion, 2, 4)), "late")
+    again = c3d.read(c3d.write(motion.cut(2, 4)), "late")
     assert again.frame_numbers is not None and again.frame_numbers.tolist() == [70_002, 70_003]
 
 
@@ -248,7 +179,7 @@ def test_rotations_are_a_signal(processor: int) -> None:
     assert signal.channels is not None and signal.channels[1].name == "pelvis m21"
     assert signal.channels[33].name == "rotation 2 reliability"
     assert c3d.write(motion) == data
-    part = cut_motion(motion, 1, 3)
+    part = motion.cut(1, 3)
     again = c3d.read(c3d.write(part), "rotations").signals[1]
     assert np.array_equal(again.values, part.signals[1].values)
 
@@ -275,15 +206,6 @@ def test_what_cannot_be_read_is_refused(change: object, message: str) -> None:
     with pytest.raises(SourceError) as error:
         c3d.read(change(data) if message != "offset 1024" else data, "bad")
     assert message in str(error.value)
-
-
-def test_signals_that_do_not_fit_the_template_are_refused() -> None:
-    motion = c3d.read(made(3, 2, 2).build(), "clip")
-    with pytest.raises(FormatError, match="needs a signal of analog"):
-        c3d.write(replace(motion, signals=motion.signals[:2]))
-    doubles = Signal(motion.signals[0].values)
-    with pytest.raises(FormatError, match="not on a grid BINARY32"):
-        c3d.write(replace(motion, signals=(doubles, *motion.signals[1:])))
 
 
 def markers(n_points: int, values: np.ndarray, **more: object) -> Motion:
@@ -405,7 +327,3 @@ def test_the_sample_is_read_by_others(samples: Path) -> None:
     assert np.array_equal(
         np.array(frames)[:, :, :3], motion.signals[0].values.reshape(values.shape)
     )
-
-
-def test_word_is_the_inverse() -> None:
-    assert [word(258, order) for order in ORDERS] == [b"\2\1", b"\2\1", b"\1\2"]

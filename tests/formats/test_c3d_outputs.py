@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz import Channel, FormatError, Joint, Motion, MotionError, Signal, Skeleton
-from mcz.formats import FORMATS, c3d
-from mcz.formats.c3d_outputs import Split, split_of
+from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton
+from mcz.formats import c3d
+from mcz.formats.c3d_outputs import Split
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made
 
 ORDERS = (INTEL, DEC, SGI)
@@ -29,16 +28,6 @@ def listed(file: Made, **lists: list[str]) -> Made:
 
 def signal_of(motion: Motion, name: str) -> Signal:
     return next(signal for signal in motion.signals if signal.name == name)
-
-
-@given(st.lists(st.booleans(), max_size=12))
-def test_runs_say_which_points_are_outputs(is_output: list[bool]) -> None:
-    mask = np.array(is_output, np.bool_)
-    split = Split(np.flatnonzero(~mask), np.flatnonzero(mask))
-    again = split_of(split.runs, len(mask))
-    assert again.points.tolist() == split.points.tolist()
-    assert again.outputs.tolist() == split.outputs.tolist()
-    assert 0 not in split.runs[1:] and sum(split.runs) in (0, len(mask))
 
 
 @pytest.mark.parametrize("processor", ORDERS)
@@ -156,17 +145,6 @@ def test_lossy_codecs_and_distances_leave_them_alone() -> None:
     assert 0 < compared.mean_position_error_cm <= 0.1
 
 
-def test_a_part_of_the_frames() -> None:
-    file = listed(made(30, 4, 1, 3, first=7), FORCES=["p2"], FORCE_UNITS=["N"])
-    motion = c3d.read(file.build(), "clip")
-    stream = io.BytesIO()
-    mcz.write(motion, stream)
-    with mcz.open(stream.getvalue()) as held:
-        part = c3d.read(held.clips["clip"].source_bytes((4, 9)), "part")
-    for one, other in zip(motion.signals, part.signals, strict=True):
-        assert np.array_equal(one.cut(4, 9).values, other.values)
-
-
 @pytest.mark.parametrize("size", [2, 4])
 def test_a_plain_file_lists_them_again(size: int) -> None:
     file = made(9, 5, 2, 2, size=size)
@@ -208,15 +186,3 @@ def test_what_a_plain_file_cannot_list_is_refused(names: tuple[str, ...], messag
     with pytest.raises(MotionError) as error:
         c3d.write(Motion(Skeleton((joint,)), (Signal(np.zeros((1, 3))), outputs)))
     assert message in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("runs", "message"),
-    [((1, 0, 2), "a run of no points"), ((1, 1), "runs of 2 points"), ((1, 1, 2), "runs of 4")],
-)
-def test_runs_that_do_not_fit_are_refused(runs: tuple[int, ...], message: str) -> None:
-    motion = c3d.read(listed(made(2, 3), ANGLES=["p1"]).build(), "clip")
-    source: Any = motion.source
-    template = bytes((len(runs), *runs)) + source.template[4:]
-    with pytest.raises(FormatError, match=message):
-        FORMATS["c3d-outputs"].write(replace(motion, source=replace(source, template=template)))

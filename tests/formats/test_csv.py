@@ -7,18 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import mcz
-from mcz import FormatError, Motion, MotionError, SourceError
+from mcz import Motion, MotionError, SourceError
 from mcz.formats import FORMATS, likely_formats
 from mcz.formats.csv_files import is_motion, kind_of
-from mcz.formats.csv_text import cells_of
-from mcz.formats.notes import RowNotes
-from mcz.formats.table_notes import join_table_notes, table_notes
 from mcz.sample import bvh_walk
-from tests.formats.csv_files import column_files, motive_files, vicon_files
 from tools.vectors.build.table_files import COLUMNS, DEVICES, EULER, MOTIVE, ODD_SECTIONS, VICON
 
 
@@ -32,31 +26,6 @@ def back(data: bytes) -> Motion:
 def said(motion: Motion) -> str:
     assert motion.source is not None
     return motion.source.format
-
-
-@given(motive_files())
-def test_any_motive_file_comes_back(data: bytes) -> None:
-    motion = back(data)
-    assert said(motion) == "motive"
-    assert motion.skeleton.unit_cm in (100, 1, 0.1)
-    assert {c.kind[:1] for c in motion.skeleton.channels} <= {"", "t", "q", "r"}
-    assert not any(joint.parent >= 0 for joint in motion.skeleton.joints) or b"Local" in data
-
-
-@given(vicon_files())
-def test_any_vicon_file_comes_back(data: bytes) -> None:
-    motion = back(data)
-    assert said(motion) == "vicon"
-    titles = [line for line in data.splitlines() if line in (b"Trajectories", b"Segments")]
-    if titles:
-        assert motion.skeleton.channels[-1].kind == "tz"
-
-
-@given(column_files())
-def test_any_columns_come_back(data: bytes) -> None:
-    motion = back(data)
-    assert said(motion) == "csv"
-    assert {channel.kind for channel in motion.skeleton.channels} <= {""}
 
 
 def test_motive_says_its_bones_and_markers() -> None:
@@ -214,31 +183,6 @@ def test_a_folder_leaves_out_tables_of_words(tmp_path: Path) -> None:
     assert results == {"take.csv": "parsed", "index.csv": "skipped"}
     kept = mcz.pack(folder, tmp_path / "kept.mcz", keep_all=True)
     assert {outcome.result for outcome in kept.outcomes} == {"parsed", "verbatim"}
-
-
-@given(st.binary(max_size=60))
-def test_quotes_and_separators(line: bytes) -> None:
-    for separator in (b",", b";", b"\t", None):
-        cells = cells_of(line, separator)
-        assert separator is None or len(cells) >= 1
-    plain = line.translate(None, b'"\r\n,').strip().removeprefix(b"\xef\xbb\xbf")
-    assert cells_of(b'x,"' + plain + b',",y', b",") == [b"x", plain + b",", b"y"]
-
-
-@given(st.lists(st.integers(0, 3), min_size=1, max_size=12), st.data())
-def test_notes_of_sections_are_cut_and_joined(patterns: list[int], data: st.DataObject) -> None:
-    n, rows = len(patterns), np.array(patterns)
-    notes = table_notes([(1, None), (2, RowNotes(np.repeat(rows, 2), ((1, b"+1"),)))])
-    assert notes is not None
-    cut = sorted(data.draw(st.sets(st.integers(1, n - 1)) if n > 1 else st.just(set())))
-    edges = [0, *cut, n]
-    parts = [(a, b, notes.cut(a, b)) for a, b in zip(edges, edges[1:], strict=False)]
-    again = join_table_notes(parts)
-    found = again.of(1, 2, 2 * n)
-    assert found is not None and found.texts == ((1, b"+1"),)
-    assert np.array_equal(found.patterns, np.repeat(rows, 2))
-    with pytest.raises(FormatError, match="rows a frame"):
-        again.of(1, 3, 3 * n)
 
 
 def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:

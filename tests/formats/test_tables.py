@@ -15,13 +15,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz import Channel, FormatError, LimitError, Motion, MotionError, SourceError
+from mcz import Channel, LimitError, Motion, MotionError, SourceError
 from mcz.formats import FORMATS
-from mcz.formats.table_layout import PHRASES, fill, with_phrases
+from mcz.formats.table_layout import PHRASES, fill
 from mcz.formats.times import find_clock, rate_of_times, stated_rate
 from mcz.numbers import GridKind, scan
 from mcz.sample import bvh_walk, marker_walk
-from tests.formats.tab_files import NUMBERS, trc_files
+from tests.formats.tab_files import NUMBERS
 from tools.vectors.build.table_files import FORCES, MARKERS, QUATERNIONS, TIMES
 
 SMALL = {"trc": MARKERS, "mot": FORCES, "sto": QUATERNIONS}
@@ -32,14 +32,6 @@ def back(name: str, data: bytes) -> Motion:
     motion: Motion = FORMATS[name].read(data, "table")
     assert FORMATS[name].write(motion) == data
     return motion
-
-
-@given(trc_files())
-def test_any_trc_comes_back(data: bytes) -> None:
-    motion = back("trc", data)
-    assert motion.skeleton.unit_cm == 0.1
-    kinds = {channel.kind for channel in motion.skeleton.channels}
-    assert kinds <= {"tx", "ty", "tz"}
 
 
 def test_a_trc_says_its_markers() -> None:
@@ -91,31 +83,6 @@ def test_other_values_and_frames_print_in_the_same_style() -> None:
     assert b"\n200\t3.317000\t596.88" in FORMATS["trc"].write(numbers)
 
 
-def test_part_of_a_clip_keeps_its_times(tmp_path: Path) -> None:
-    source = tmp_path / "walk.trc"
-    source.write_bytes(MARKERS)
-    mcz.encode(source, tmp_path / "walk.mcz")
-    with mcz.open(tmp_path / "walk.mcz") as file:
-        lines = file.only_clip().source_bytes((1, 3)).splitlines()
-    assert lines[2].split(b"\t")[2].strip() == b"2"  # NumFrames counts what is there
-    assert [line.split(b"\t")[:2] for line in lines[6:]] == [
-        [b"186", b"3.083000"],
-        [b"187", b"3.100000"],
-    ]
-
-
-def test_a_lossy_clip_keeps_its_layout(tmp_path: Path) -> None:
-    motion = marker_walk()
-    source = tmp_path / "walk.trc"
-    source.write_bytes(FORMATS["trc"].write(replace(motion, source=None)))
-    mcz.encode(source, tmp_path / "walk.mcz", codec="mrdwt", params={"T_g": 1.0})
-    with mcz.open(tmp_path / "walk.mcz") as file:
-        text = file.only_clip().source_bytes()
-    again = FORMATS["trc"].read(text, "walk")
-    assert again.skeleton.joint_names == motion.skeleton.joint_names
-    assert np.nanmax(np.abs(again.values - motion.values)) < 20
-
-
 REFUSED = {
     "trc": {
         b"": "no line that begins with Frame#",
@@ -147,17 +114,6 @@ def test_what_is_no_table_is_refused_with_the_reason(name: str, data: bytes) -> 
 
 
 # Headers
-
-
-@given(st.binary(max_size=200), st.lists(st.text(max_size=5), max_size=4))
-def test_phrases_and_marks(header: bytes, names: list[str]) -> None:
-    plain = bytes(byte for byte in header if byte >= 32 or byte in b"\t\n\r")
-    text = plain + b"nRows=7\nversion=3 Frame#\tTimes"
-    assert fill(with_phrases(text), names, b"7") == text
-    marks = b"\0|" * len(names)
-    assert fill(marks, names, b"") == "".join(f"{name}|" for name in names).encode()
-    with pytest.raises(FormatError, match="a name of joint"):
-        fill(marks + b"\0", names, b"")
 
 
 def test_a_header_has_a_limit() -> None:
