@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcz.container.writer import Writer
 from mcz.editing.cutting import WITHOUT_CHANNELS, ClipCut, add_note, joint_of_column
 from mcz.editing.recoding import recorded_options
 from mcz.errors import MotionError, OptionError
@@ -18,10 +17,7 @@ from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
 from mcz.reading.source_rates import stating_rate
-from mcz.types import Params, Progress, Settings
-from mcz.writing.clip_writer import Amend
-from mcz.writing.prepare import prepare
-from mcz.writing.tuning import write_motion
+from mcz.types import Settings
 
 OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may not be there
 
@@ -127,21 +123,3 @@ def settings_of_joints(clip: Clip) -> Settings:
     found = {k: v for k, v in settings_of(clip).items() if k not in OF_JOINTS}
     # Positions of points stay what they are: with fewer of them, positions were found again.
     return found | {"domain": "channels"} if codec.has("domain") else found
-
-
-def write_anew(
-    writer: Writer,
-    motion: Motion,
-    clip: Clip,
-    settings: Params,
-    amend: Amend,
-    progress: Progress | None,
-) -> dict[str, str]:
-    """Write ``motion`` with the codec of ``clip``.
-
-    ``amend`` makes the quality record from that of this coding, which is returned; a lossless
-    codec has none.
-    """
-    codec = clip.signals[0].codec
-    prepared = prepare(motion, codec, settings)
-    return write_motion(writer, prepared, codec, settings, progress, amend=amend) or {}

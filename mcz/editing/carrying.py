@@ -6,7 +6,7 @@ What is shared is named by its hash, so that it needs no new number and is writt
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -57,11 +57,9 @@ class Carrier:
     Every checksum is compared on the way; raises FormatError where one is wrong.
     """
 
-    def __init__(
-        self, container: Container, writer: Writer, left_out: list[str] | None = None
-    ) -> None:
+    def __init__(self, container: Container, writer: Writer) -> None:
         self.container, self.writer = container, writer
-        self.left_out = [] if left_out is None else left_out
+        self.left_out: list[str] = []
 
     def stored(self, kind: bytes, id_: bytes) -> bytes:
         """The payload of the SKEL, MODL or SRCE with this id, its hash checked."""
@@ -78,8 +76,8 @@ class Carrier:
         if (kind, id_) not in self.writer.directory.shared:
             self.writer.shared(kind, self.stored(kind, id_))
 
-    def skeleton(self, id_: bytes) -> None:
-        """Carry a SKEL over after its bases and their templates, unless it is there."""
+    def skeleton(self, id_: bytes) -> bytes:
+        """Carry a SKEL over after its bases and their templates, unless it is there; its id."""
         chain: list[bytes] = []
         wanted: bytes | None = id_
         while wanted and (ChunkType.SKEL, wanted) not in self.writer.directory.shared:
@@ -91,6 +89,7 @@ class Carrier:
             wanted = fields.base
         for payload in reversed(chain):
             self.writer.shared(ChunkType.SKEL, payload)
+        return id_
 
     def attachment(self, name: str, as_name: str | None = None) -> None:
         """Carry an attached file over, perhaps under another name."""
@@ -156,46 +155,56 @@ class Carrier:
         self.writer.begin_carried(new, payload)
         self._body(row, new)
         self.writer.end_carried()
+        self.behind(row)
+
+    def behind(self, row: ClipRow, *, but: bytes = b"") -> None:
+        """Carry over the ancillary chunks behind CEND, those of the type ``but`` apart."""
         for chunk in row.ancillary:
             found = read_chunk(self.container.source, chunk.offset)
             if found.type != chunk.type:
                 raise FormatError(f"{found.label} is {chunk.label} in the index")
-            self.ancillary(found)
+            if found.type != but:
+                self.ancillary(found)
+
+    def inside(self, row: ClipRow) -> None:
+        """Carry over the ancillary chunks between CLIP and CEND."""
+        for chunk, _ in self._walk(row):
+            if chunk.flags:
+                self.ancillary(chunk)
+
+    def _walk(self, row: ClipRow) -> Iterator[tuple[Chunk, int]]:
+        """The chunks between CLIP and CEND, and where each ends."""
+        if row.cend is None:  # of a damaged file
+            raise FormatError(f"clip {row.name!r} has no CEND")
+        source, at = self.container.source, row.clip.stop
+        while at < row.cend.offset:
+            chunk = read_chunk(source, at)
+            at = end_of(source, chunk) if chunk.length is None else chunk.stop
+            yield chunk, at
+        if at != row.cend.offset:
+            raise FormatError(f"{row.cend.label} is not where the index says", clip=row.name)
 
     def _body(self, row: ClipRow, new: PackedClipRow) -> None:
         """What lies between CLIP and CEND, and CEND; ``new`` learns where."""
-        packed, cend = segment_rows(row), row.cend
-        if cend is None:
-            raise FormatError(f"clip {row.name!r} has no CEND")
-        source, at = self.container.source, row.clip.offset + row.clip.size
+        packed = segment_rows(row)
         moved: list[tuple[int, int]] = []  # from where on how many bytes less lie before
         less = 0
-        while at <= cend.offset:
-            chunk = read_chunk(source, at)
-            if chunk.length is None:
-                at = self._open_data(chunk)
-                continue
-            at += chunk.size
-            if not chunk.flags:
+        for chunk, end in self._walk(row):
+            if chunk.length is None:  # an open DATA, packets and all
+                for at in range(chunk.offset, end, BLOCK):
+                    self.writer.raw(self.container.source.read(at, min(BLOCK, end - at)))
+            elif not chunk.flags:
                 self.writer.chunk(chunk.type, self.container.payload(chunk))
             elif not self.ancillary(chunk):
                 less += chunk.size
-                moved.append((at, less))
-        if at != cend.offset + cend.size:
-            raise FormatError(f"{cend.label} is not where the index says", clip=row.name)
-        shift = new.clip.stop - row.clip.stop
-        new.cend = replace(cend, offset=cend.offset + shift - less)
+                moved.append((end, less))
+        assert row.cend is not None
+        new.cend = self.writer.chunk(ChunkType.CEND, self.container.payload(row.cend))
         if moved:
+            shift = new.clip.stop - row.clip.stop
             new.segments = [_moved(segment, shift, moved) for segment in row.segments]
         else:
             new.keep_packed(lambda: packed, parse_segments)
-
-    def _open_data(self, chunk: Chunk) -> int:
-        """Carry an open DATA over, packets and all; return where it ends."""
-        end = end_of(self.container.source, chunk)
-        for at in range(chunk.offset, end, BLOCK):
-            self.writer.raw(self.container.source.read(at, min(BLOCK, end - at)))
-        return end
 
 
 def said_of(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:

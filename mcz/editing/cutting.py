@@ -5,11 +5,12 @@ SPEC.md, "Cutting without re-encoding", is normative. ``extraction.py`` writes w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from mcz.clock import numbering_of, part_begins
-from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.limits import Profile
@@ -24,6 +25,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build
 from mcz.skeleton import Chosen, Joints, joint_list
+from mcz.types import Values
 
 WITHOUT_SOURCE = "the source file was left out when joints were cut"
 WITHOUT_CHANNELS = "the channels of other joints were cut"
@@ -115,14 +117,14 @@ def plan_cut(
         )
     kept = None if joints is None else _kept_joints(clip, joints)
     cut = ClipCut(clip, start, stop, kept, resolution, ())
-    if kept is not None and anew and not _is_of_groups(clip, kept):
-        return replace(cut, anew=True)
-    signals = []
-    for info in clip.signals:
-        groups = tuple(range(info.counts.n_groups))
-        if kept is not None and info.index == 0:
-            groups = _kept_groups(clip, info, kept)
-        signals.append(_plan_signal(cut, info, groups))
+    groups = [tuple(range(info.counts.n_groups)) for info in clip.signals]
+    if kept is not None:
+        groups[0], mixed = groups_of(clip, kept)
+        if mixed is not None and anew:
+            return replace(cut, anew=True)
+        if mixed is not None:
+            raise coded_together(clip, *mixed, "cut out, its channels are coded")
+    signals = list(map(partial(_plan_signal, cut), clip.signals, groups))
     if anew and any(part.skip or part.spare for part in signals):
         return replace(cut, anew=True)
     return replace(cut, signals=tuple(signals))
@@ -144,34 +146,29 @@ def joint_of_column(skeleton: Skeleton) -> list[int]:
     return [index for index, joint in enumerate(skeleton.joints) for _ in joint.channels]
 
 
-def _is_of_groups(clip: Clip, joints: frozenset[int]) -> bool:
-    """Whether no group has channels of these joints and of others."""
-    owners = joint_of_column(clip.skeleton)
-    groups = [{owners[c] in joints for c in group} for group in clip.signals[0].layout.groups]
-    return all(len(group) < 2 for group in groups)
-
-
-def recode_hint(codec: Codec) -> Hint:
-    """The way out for channels that are coded in one group with others."""
-    return Hint.RECODE if codec.lossless else Hint.RECODE_LOSSY
-
-
-def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[int, ...]:
+def groups_of(
+    clip: Clip, joints: Collection[int]
+) -> tuple[tuple[int, ...], tuple[int, int] | None]:
+    """The groups with channels of these joints; one of these, and another joint in its group."""
     owners, groups = joint_of_column(clip.skeleton), []
-    for number, columns in enumerate(info.layout.groups):
+    mixed = None
+    for number, columns in enumerate(clip.signals[0].layout.groups):
         inside = {owners[column] for column in columns if owners[column] in joints}
         outside = {owners[column] for column in columns} - inside
-        if inside and outside:
-            names = clip.skeleton.addresses()
-            raise OptionError(
-                f"joint {names[min(inside)]} cannot be cut out, its channels "
-                f"are coded in one group with those of {names[min(outside)]}",
-                clip=clip.name,
-                hint=recode_hint(info.codec),
-            )
         if inside:
             groups.append(number)
-    return tuple(groups)
+            mixed = mixed or ((min(inside), min(outside)) if outside else None)
+    return tuple(groups), mixed
+
+
+def coded_together(clip: Clip, joint: int, other: int, text: str) -> OptionError:
+    """The error for a joint that is coded in one group with another, and the way out."""
+    names, codec = clip.skeleton.addresses(), clip.signals[0].codec
+    return OptionError(
+        f"joint {names[joint]} cannot be {text} in one group with those of {names[other]}",
+        clip=clip.name,
+        hint=Hint.RECODE if codec.lossless else Hint.RECODE_LOSSY,
+    )
 
 
 def _plan_signal(cut: ClipCut, info: SignalInfo, groups: tuple[int, ...]) -> SignalCut:
@@ -298,8 +295,29 @@ class _Numbers(dict[int, int]):
         )
 
 
+class Unchanged:
+    """The streams of a segment as they are; an edit has others."""
+
+    def beside(self, flag: int, group: int, old: bytes) -> bytes:
+        """Group notes or a mask, as ``flag`` says."""
+        return old
+
+    def coded(self, resolution: int, group: int, old: bytes) -> bytes:
+        """A stream of the codec."""
+        return old
+
+
+UNCHANGED = Unchanged()
+
+
 def cut_segment(
-    container: Container, part: SignalCut, row: SegmentRow, *, noted: bool, name: str
+    container: Container,
+    part: SignalCut,
+    row: SegmentRow,
+    *,
+    noted: bool,
+    name: str,
+    edit: Unchanged = UNCHANGED,
 ) -> tuple[SegmentHeader, list[bytes], bytes]:
     """Header, streams and extension of what is left of a segment; ``noted``: with frame notes.
 
@@ -313,16 +331,21 @@ def cut_segment(
         flags |= FRAME_NOTES
         kept.append(streams[index])
     for flag, stream_of in ((GROUP_NOTES, table.group_notes), (MASKS, table.mask)):
-        if header.flags & flag and part.groups:
+        numbers = [(group, stream_of(group)) for group in part.groups]
+        found = [
+            edit.beside(flag, group, b"" if number is None else streams[number])
+            for group, number in numbers
+        ]
+        if any(found) or (found and header.flags & flag):
             flags |= flag
-            kept += [streams[stream_of(group) or 0] for group in part.groups]
-    numbers = _Numbers(part, name)
+            kept += found
+    left = _Numbers(part, name)
     for resolution in range(part.info.counts.n_resolutions - part.dropped):
         for group in part.groups:
             stream = streams[table.codec(resolution, group)]
             if not part.has_all_groups and part.info.codec.regroup is not None:
-                stream = part.info.codec.regroup(stream, part.info.layout, group, numbers)
-            kept.append(stream)
+                stream = part.info.codec.regroup(stream, part.info.layout, group, left)
+            kept.append(edit.coded(resolution, group, stream))
     first = header.first - part.base
     lead = min(header.lead, first)
     new = SegmentHeader(part.info.index, first, header.n_frames, lead, header.tail, flags)
@@ -336,3 +359,48 @@ def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int], profile: Pr
         if index not in joints:
             joint.channels = []
     return build(replace(fields, base=id_, source=None), "skeleton")
+
+
+def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
+    """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
+
+    All are as they are stored: a cut leaves each joint its index.
+
+    Where these say of a former cut what cannot be, it is taken for none.
+    """
+    now = _keys(cut, old)
+    for key, value in old.items():
+        if key.startswith(("param.", "uncut_")) or key in ("codec", "edit-joints"):
+            now[key] = value
+        elif not key.startswith("cut-"):
+            now[f"uncut_{key}"] = value
+    return now
+
+
+def recoded_quality(
+    cut: ClipCut, old: Mapping[str, str], now: dict[str, str], _: Sequence[Values]
+) -> dict[str, str]:
+    """The entries for a clip that was cut and coded anew; ``now`` are those of this coding."""
+    before = {k: v for k, v in cut_quality(cut, old).items() if not k.startswith("param.")}
+    return before | {"cut-recoded": "yes"} | now
+
+
+def _keys(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
+    """What a quality record says of a cut, of which ``old`` tells of earlier ones."""
+    now = {key: value for key, value in old.items() if key.startswith("cut-")}
+    if cut.resolution:
+        before = _first_number(old.get("cut-resolution", ""), 1)
+        now["cut-resolution"] = str(before + cut.resolution)
+    if not cut.has_all_frames:
+        start = _first_number(old.get("cut-frames", ""), 2)
+        now["cut-frames"] = f"{start + cut.start}:{start + cut.stop}"
+    if cut.joints is not None:
+        now["cut-joints"] = ",".join(map(str, sorted(cut.joints)))
+    return now
+
+
+def _first_number(text: str, count: int) -> int:
+    """The first of ``count`` numbers with colons between them, 0 where the text is another."""
+    words = text.split(":")
+    good = len(words) == count and all(re.fullmatch("[0-9]{1,16}", word) for word in words)
+    return int(words[0]) if good else 0

@@ -14,13 +14,11 @@ from typing import BinaryIO
 
 from mcz.brief import brief
 from mcz.container import payloads
-from mcz.container.chunks import ChunkType, read_chunk
-from mcz.container.directory import ClipRow
-from mcz.container.packed import chunk_id
-from mcz.container.reader import Container
+from mcz.container.chunks import ChunkType
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.segments import SegmentHeader
 from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.container.writer import Writer
-from mcz.editing.ancillary import inside
 from mcz.editing.anew import (
     OF_JOINTS,
     check_anew,
@@ -28,20 +26,21 @@ from mcz.editing.anew import (
     settings_of,
     settings_of_joints,
     with_own_source,
-    write_anew,
 )
 from mcz.editing.carrying import Carrier, said_of
-from mcz.editing.cut_quality import cut_quality, recoded_quality
 from mcz.editing.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
     SignalCut,
     clip_record,
+    cut_quality,
     cut_segment,
     cut_skeleton,
     note_source,
     plan_cut,
+    recoded_quality,
 )
+from mcz.editing.rewriting import writer_like
 from mcz.errors import FormatError, MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion
@@ -56,6 +55,9 @@ from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_check import check_values
 from mcz.writing.clip_writer import Amend
+from mcz.writing.prepare import prepare
+from mcz.writing.quality import CHUNK
+from mcz.writing.tuning import write_motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +141,10 @@ def extract(
                 check_anew(cut.clip, whole=cut.joints is None)
         with replacing_file(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
-            copier.found.damage += opened.damage
-            found = copier.run(cuts, alone=alone)
+            copier.run(cuts, alone=alone)
             check_values(stream, [cut.clip.name for cut in cuts if not copier.is_same(cut)])
-            return found
+            size = copier.writer.offset
+            return Extraction(copier.clips, copier.left_out, list(opened.damage), size)
 
 
 def with_stated_rate(
@@ -156,7 +158,7 @@ def with_stated_rate(
     return changed, replace(held, template=template)
 
 
-class Copier:
+class Copier(Carrier):
     """Copies what is left of a file to ``stream``; ``copies`` None: where it has some."""
 
     def __init__(
@@ -166,20 +168,13 @@ class Copier:
         progress: Progress | None,
         copies: bool | None = None,
     ) -> None:
+        super().__init__(file.container, writer_like(stream, [file], copies))
         self.file, self.progress = file, progress
-        self.container: Container = file.container
-        head = parse(payloads.Head, self.container.directory.head, "HEAD")
-        self.writer = Writer(
-            stream,
-            profile=self.container.profile,
-            head_extension=bytes(head.extension),
-            copies=bool(self.container.copies()) if copies is None else copies,
-        )
-        self.found = Extraction()
-        self.carrier = Carrier(self.container, self.writer, self.found.left_out)
+        self.clips: list[ExtractedClip] = []
         self.done = self.total = 0  # segments
 
-    def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> Extraction:
+    def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> None:
+        """Write the new file; ``alone``: these clips and what they need, nothing else."""
         self.total = sum(len(part.rows) for cut in cuts for part in cut.signals)
         for (kind, _), chunk in self.container.directory.shared.items():
             if kind == ChunkType.MODL:  # which one a clip needs, its codec alone knows
@@ -189,14 +184,15 @@ class Copier:
             self.before_clips()
             self.attachments()
         for cut in cuts:
-            self.clip(cut)
+            if cut.anew:
+                self.write_anew(cut)
+            else:
+                self.write(cut)
         self.aliases({cut.clip.name: cut for cut in cuts}, alone)
         if cuts:
             names = ((cut.clip.name, self.name_of(cut)) for cut in cuts)
             self.writer.metadata(said_of(self.container, names))
         self.writer.finish()
-        self.found.size = self.writer.offset
-        return self.found
 
     def skeletons(self) -> None:
         """Copy every skeleton, also those that no clip has."""
@@ -204,36 +200,21 @@ class Copier:
             if kind == ChunkType.SKEL:
                 self.skeleton(id_)
 
-    def skeleton(self, id_: bytes) -> bytes:
-        """Copy a SKEL after its bases and their templates; return its payload."""
-        self.carrier.skeleton(id_)
-        return self.carrier.stored(ChunkType.SKEL, id_)
-
-    def before_clips(self) -> None:
-        """Copy the ancillary chunks that belong to no clip."""
-        self.carrier.before_clips()
-
     def attachments(self) -> None:
         for name in self.container.directory.attachments:
             self.attachment(name)
-
-    def attachment(self, name: str) -> None:
-        self.carrier.attachment(name)
 
     def is_same(self, cut: ClipCut) -> bool:
         """Whether the clip stays what it was."""
         return cut.is_whole and not cut.anew
 
-    def clip(self, cut: ClipCut) -> None:
-        """Write one clip."""
-        if cut.anew:
-            self._anew(cut)
-            return
+    def write(self, cut: ClipCut) -> None:
+        """Write one clip from its stored bytes."""
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         record = self.record_of(cut)
-        payload = self.skeleton(clip.skeleton_id)
-        skeleton = chunk_id(ChunkType.SKEL, payload, self.container.profile)
+        skeleton = self.skeleton(clip.skeleton_id)
         if cut.joints is not None:
+            payload = self.stored(ChunkType.SKEL, skeleton)
             payload = cut_skeleton(payload, skeleton, cut.joints, self.container.profile)
             skeleton = self.writer.shared(ChunkType.SKEL, payload)
         whole = replace(record, skeleton=skeleton)
@@ -246,15 +227,26 @@ class Copier:
         ]
         self.writer.begin_clip(new, n_channels)
         self.inside(row)
-        self._segments(cut, noted=bool(new.source))
+        rows = [(own, part) for part in cut.signals for own in part.rows]
+        for own, part in sorted(rows, key=lambda pair: pair[0].offset):
+            self.writer.segment(*self.segment(cut, part, own, noted=bool(new.source)))
+            self.done += 1
+            if self.progress is not None:
+                self.progress(self.done, self.total, clip.name)
         cend = self.container.cend(row)
         extension = b"" if cend is None else bytes(cend.extension)
         missing = cend.missing if cend is not None and cut.is_whole else []
         self.writer.end_clip(cut.n_frames, source, hashes, extension, missing)
-        self._quality(cut, row)
+        self.quality(cut, row)
         self._note(cut)
 
-    def _anew(self, cut: ClipCut) -> None:
+    def segment(
+        self, cut: ClipCut, part: SignalCut, row: SegmentRow, *, noted: bool
+    ) -> tuple[SegmentHeader, list[bytes], bytes]:
+        """Header, streams and extension of what is left of a segment."""
+        return cut_segment(self.container, part, row, noted=noted, name=cut.clip.name)
+
+    def write_anew(self, cut: ClipCut) -> None:
         """Write what is left of a clip, decoded and coded anew."""
         clip, old = cut.clip, cut.clip.stored_quality or {}
         motion = replace(joints_alone(cut), name=self.name_of(cut))
@@ -262,25 +254,29 @@ class Copier:
         record = self.recode(clip, motion, settings, partial(recoded_quality, cut, old))
         for name in OF_JOINTS:
             if f"param.{name}" in old and f"param.{name}" not in record:
-                said = f"its {name}, which other joints have a part in"
-                self.found.left_out.append(f"clip {clip.name}: {said}")
+                self._leave_out(cut, f"its {name}, which other joints have a part in")
         if clip.source is not None and cut.joints is not None:
-            self.found.left_out.append(f"clip {clip.name}: its source file, as joints were cut")
+            self._leave_out(cut, "its source file, as joints were cut")
         self._note(cut)
 
+    def _leave_out(self, cut: ClipCut, text: str) -> None:
+        self.left_out.append(f"clip {cut.clip.name}: {text}")
+
     def recode(self, clip: Clip, motion: Motion, settings: Params, amend: Amend) -> dict[str, str]:
-        """Write ``motion``, coded anew, in the place of ``clip``; return its quality record."""
-        row = self.container.directory.clips[clip.name]
+        """Write ``motion``, coded anew, in the place of ``clip``; return its quality record.
+
+        ``amend`` makes that from the one of this coding; a lossless codec has none.
+        """
+        row, codec = self.container.directory.clips[clip.name], clip.signals[0].codec
         self.skeleton(clip.skeleton_id)
         motion, left_out = with_own_source(motion, clip)
         if left_out is not None:
-            self.found.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
-        record = write_anew(self.writer, motion, clip, settings, amend, self.progress)
+            self.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
+        prepared = prepare(motion, codec, settings)
+        record = write_motion(self.writer, prepared, codec, settings, self.progress, amend=amend)
         self.inside(row)
-        for chunk in row.ancillary:
-            if chunk.type != ChunkType.QUAL:
-                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
-        return record
+        self.behind(row, but=CHUNK)
+        return record or {}
 
     def record_of(self, cut: ClipCut) -> payloads.Clip:
         """The CLIP that is cut."""
@@ -300,7 +296,7 @@ class Copier:
             if new.source is None:
                 self._without_units(cut, new)
         if new.source is not None:
-            self.carrier.shared(ChunkType.SRCE, new.source.template)
+            self.shared(ChunkType.SRCE, new.source.template)
         return source, hashes
 
     def _without_units(self, cut: ClipCut, new: payloads.Clip) -> None:
@@ -309,8 +305,8 @@ class Copier:
             if cut.clip.is_scaled(info.index):
                 signal.channels = [replace(own, unit="") for own in signal.channels or ()]
                 note_source(new, f"{info.name}: words as they were stored")
-                said = f"what the words of its signal {info.name} mean, as its source file was cut"
-                self.found.left_out.append(f"clip {cut.clip.name}: {said}")
+                words = f"the words of its signal {info.name}"
+                self._leave_out(cut, f"what {words} mean, as its source file was cut")
 
     def _decoded(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
         """The hashes of what is left, decoded once, and the source file that it has now."""
@@ -318,7 +314,7 @@ class Copier:
         if held and cut.joints is not None:
             new.source = None
             note_source(new, WITHOUT_SOURCE)
-            self.found.left_out.append(f"clip {cut.clip.name}: its source file, as joints were cut")
+            self._leave_out(cut, "its source file, as joints were cut")
         elif held:
             motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
             hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
@@ -330,13 +326,17 @@ class Copier:
             try:
                 data = FORMATS[motion.source.format].write(motion)
             except MotionError as error:
-                new.source = None
-                note_source(new, f"the source file was left out: {error}", cut)
-                self.found.left_out.append(f"clip {cut.clip.name}: its source file, as {error}")
+                self.without_source(cut, new, error)
                 return b"", hashes
             new.source = replace(held, size=len(data))
             return hashlib.sha256(data).digest(), hashes
         return b"", [self._value_hash(cut, part) for part in cut.signals]
+
+    def without_source(self, cut: ClipCut, new: payloads.Clip, error: MotionError) -> None:
+        """Leave out a source that cannot be written, and say so."""
+        new.source = None
+        note_source(new, f"the source file was left out: {error}", None if cut.is_whole else cut)
+        self._leave_out(cut, f"its source file, as {error}")
 
     def _value_hash(self, cut: ClipCut, part: SignalCut) -> bytes:
         """The hash of what is left of a signal, a few segments in memory at a time."""
@@ -346,37 +346,26 @@ class Copier:
             digest.update(block.values, block.mask)
         return digest.digest()
 
-    def _segments(self, cut: ClipCut, *, noted: bool) -> None:
-        """Copy the segments in the order of the file."""
-        rows = [(row.offset, row, part) for part in cut.signals for row in part.rows]
-        for _, row, part in sorted(rows, key=lambda entry: entry[0]):
-            self.writer.segment(
-                *cut_segment(self.container, part, row, noted=noted, name=cut.clip.name)
-            )
-            self.done += 1
-            if self.progress is not None:
-                self.progress(self.done, self.total, cut.clip.name)
+    def quality(self, cut: ClipCut, row: ClipRow) -> None:
+        """The quality record, another one where the clip is, and the other ancillary chunks."""
+        if self.is_same(cut):
+            self.behind(row)
+            return
+        records = [chunk for chunk in row.ancillary if chunk.type == CHUNK]
+        record = payloads.Qual(entries=[])
+        if records:
+            payload = self.container.payload(records[0])
+            record = parse(payloads.Qual, payload, records[0].label)
+        old = {entry.key: entry.value for entry in record.entries}
+        now = self.entries(cut, old if records else None)
+        if now is not None:
+            record.entries = payloads.metadata_records(now)
+            self.writer.ancillary(CHUNK, build(record, "quality record"))
+        self.behind(row, but=CHUNK)
 
-    def _quality(self, cut: ClipCut, row: ClipRow) -> None:
-        """The quality record, changed where something was cut, and the other ancillary chunks."""
-        records = [chunk for chunk in row.ancillary if chunk.type == ChunkType.QUAL]
-        if not cut.is_whole:
-            record = payloads.Qual(entries=[])
-            if records:
-                payload = self.container.payload(records[0])
-                record = parse(payloads.Qual, payload, records[0].label)
-            record.entries = payloads.metadata_records(
-                cut_quality(cut, {entry.key: entry.value for entry in record.entries})
-            )
-            self.writer.ancillary(ChunkType.QUAL, build(record, "quality record"))
-        for chunk in row.ancillary:
-            if cut.is_whole or chunk.type != ChunkType.QUAL:
-                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
-
-    def inside(self, row: ClipRow) -> None:
-        """Copy the ancillary chunks between CLIP and CEND."""
-        for chunk in inside(self.container, row):
-            self.carrier.ancillary(chunk)
+    def entries(self, cut: ClipCut, old: Mapping[str, str] | None) -> dict[str, str] | None:
+        """Entries of the quality record from those of before; None: there is no record."""
+        return cut_quality(cut, old or {})
 
     def _note(self, cut: ClipCut) -> None:
         written = self.writer.directory.clips[self.name_of(cut)].segments
@@ -386,7 +375,7 @@ class Copier:
             stored += cut.signals[0].skip + cut.signals[0].spare
             n_frames = sum(row.header.n_frames for part in cut.signals for row in part.rows)
             assert n_frames == sum(row.header.n_frames for row in written)
-        self.found.clips.append(
+        self.clips.append(
             ExtractedClip(
                 cut.clip.name,
                 (cut.start, cut.stop),
@@ -408,7 +397,7 @@ class Copier:
                     continue  # of a clip that was not chosen
                 if not self.is_same(cut):
                     text = f"{name}, a file identical to that of clip {cut.clip.name} before"
-                    self.found.left_out.append(text)
+                    self.left_out.append(text)
                     continue
             elif of == payloads.OF_SKELETON:
                 if (ChunkType.SKEL, bytes(target)) not in self.writer.directory.shared:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcz.codecs.contract import Codec, Recoding, Request
 from mcz.codecs.parameters import TARGETS
-from mcz.editing.cutting import joint_of_column, recode_hint
+from mcz.editing.cutting import coded_together, groups_of, joint_of_column
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
@@ -129,31 +129,18 @@ def _editable(clip: Clip, joint: int | str) -> int:
 
 def is_coded_with_others(clip: Clip, joint: int | str) -> bool:
     """Whether a group of the joint's channels has channels of another one."""
-    index, owners = _editable(clip, joint), joint_of_column(clip.skeleton)
-    groups = [{owners[c] for c in group} for group in clip.signals[0].layout.groups]
-    return any(index in group and len(group) > 1 for group in groups)
+    return groups_of(clip, (_editable(clip, joint),))[1] is not None
 
 
 def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...]:
     """The joint's groups, which hold no channel of another joint."""
-    index = _editable(clip, joint)
-    names, owners = clip.skeleton.addresses(), joint_of_column(clip.skeleton)
-    groups = []
-    for number, group in enumerate(info.layout.groups):
-        joints = sorted({owners[column] for column in group})
-        if index in joints and len(joints) > 1:
-            other = next(name for name in joints if name != index)
-            raise OptionError(
-                f"joint {names[index]} cannot be replaced alone, codec "
-                f"{info.codec.name} codes its channels in one group with those of {names[other]}",
-                clip=clip.name,
-                hint=recode_hint(info.codec),
-            )
-        if index in joints:
-            groups.append(number)
+    groups, mixed = groups_of(clip, (_editable(clip, joint),))
+    if mixed is not None:
+        text = f"replaced alone, codec {info.codec.name} codes its channels"
+        raise coded_together(clip, *mixed, text)
     if info.codec.recode is None:
         raise OptionError(f"codec {info.codec.name} cannot code one joint anew")
-    return tuple(groups)
+    return groups
 
 
 def _joints_of(clip: Clip, info: SignalInfo, groups: Mapping[int, object]) -> tuple[int, ...]:

@@ -21,13 +21,12 @@ from numpy.typing import ArrayLike
 
 from mcz.brief import brief
 from mcz.container import note_records, payloads
-from mcz.container.chunks import ChunkType, read_chunk
-from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.directory import SegmentRow
 from mcz.container.locks import lock
-from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
+from mcz.container.segments import GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
 from mcz.editing.anew import check_anew, settings_of, source_file
-from mcz.editing.cutting import ClipCut, cut_segment, note_source, plan_cut
+from mcz.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
 from mcz.editing.extraction import Copier, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.errors import (
@@ -39,11 +38,11 @@ from mcz.errors import (
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.quality_joints import with_indices
-from mcz.schema import build, parse
+from mcz.schema import parse
 from mcz.types import Progress, Target, Values
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_check import check_values
-from mcz.writing.quality import CHUNK, figures, texts_of
+from mcz.writing.quality import figures, texts_of
 
 RECODED = "edit-recoded"
 
@@ -112,15 +111,18 @@ def replace(
         stream = stack.enter_context(replacing_file(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)
+        editor: _Editor
         if recode and is_coded_with_others(chosen, joint):
             check_anew(chosen)
             edited = edit(chosen, joint, values, on_grid)
-            return _write_anew(chosen, _AnewEditor(file, stream, chosen, edited, progress, copies))
-        recoded = recode_joint(chosen, joint, values, on_grid)
-        writer = _Editor(file, stream, chosen.name, recoded, progress, copies)
-        found = _write(file, chosen, recoded, writer)
+            editor = _AnewEditor(file, stream, progress, copies, chosen, edited)
+        else:
+            recoded = recode_joint(chosen, joint, values, on_grid)
+            editor = _StreamEditor(file, stream, progress, copies, chosen, recoded)
+        cuts = [plan_cut(one, None, None, 0) for one in file.clips.values()]
+        editor.run(cuts, alone=False)
         check_values(stream, [chosen.name])
-        return found
+        return editor.replacement()
 
 
 def _locked(source: Target, stack: ExitStack) -> Path:
@@ -138,35 +140,15 @@ def _locked(source: Target, stack: ExitStack) -> Path:
     return path
 
 
-def _write(file: File, clip: Clip, recoded: Recoded, writer: _Editor) -> Replacement:
-    found = writer.run(
-        [plan_cut(one, None, None, 0) for one in file.clips.values()],
-        alone=False,
-    )
-    addresses = clip.skeleton.addresses()
-    return Replacement(
-        clip=clip.name,
-        joint=addresses[recoded.joint],
-        codec=clip.codec,
-        recoded=tuple(addresses[other] for other in recoded.others),
-        joint_bytes=recoded.size + writer.beside.size,
-        joint_bytes_before=recoded.size_before + writer.beside_before.size,
-        n_exceptions=writer.beside.n_exceptions,
-        n_exceptions_before=writer.beside_before.n_exceptions,
-        max_error=recoded.max_error,
-        left_out=tuple(found.left_out),
-        size=found.size,
-    )
-
-
 @dataclass(slots=True)
-class _Beside:
-    """Bytes beside the codec's streams of a joint, and how many exceptions are in them."""
+class _Sizes:
+    """Bytes of a joint, and how many exceptions are in them."""
 
     size: int = 0
     n_exceptions: int = 0
 
     def add(self, flag: int, stream: bytes) -> None:
+        """Count group notes or a mask, as ``flag`` says."""
         self.size += len(stream)
         if flag == GROUP_NOTES and stream:
             notes = parse(note_records.GroupNotes, stream, "group notes")
@@ -174,195 +156,167 @@ class _Beside:
 
 
 class _Editor(Copier):
-    """Copies a file, the streams of one joint of one clip replaced."""
+    """Copies a file, one joint of one clip replaced."""
+
+    joint: int
+    others: tuple[int, ...] = ()
+    anew = False
 
     def __init__(
         self,
         file: File,
         stream: BinaryIO,
-        name: str,
-        recoded: Recoded,
         progress: Progress | None,
         copies: bool | None,
+        clip: Clip,
     ) -> None:
         super().__init__(file, stream, progress, copies)
-        self.name, self.recoded = name, recoded
-        self.beside, self.beside_before = _Beside(), _Beside()
+        self.edited = clip
+        self.before, self.after = _Sizes(), _Sizes()
+        self.max_error = self.others_error = 0.0
 
     def is_same(self, cut: ClipCut) -> bool:
-        return cut.clip.name != self.name
+        return cut.clip.name != self.edited.name
 
-    def clip(self, cut: ClipCut) -> None:
+    def replacement(self) -> Replacement:
+        """What was done."""
+        addresses = self.edited.skeleton.addresses()
+        return Replacement(
+            clip=self.edited.name,
+            joint=addresses[self.joint],
+            codec=self.edited.codec,
+            recoded=tuple(addresses[other] for other in self.others),
+            joint_bytes=self.after.size,
+            joint_bytes_before=self.before.size,
+            n_exceptions=self.after.n_exceptions,
+            n_exceptions_before=self.before.n_exceptions,
+            max_error=self.max_error,
+            left_out=tuple(self.left_out),
+            size=self.writer.offset,
+            anew=self.anew,
+            others_error=self.others_error,
+        )
+
+
+class _StreamEditor(_Editor):
+    """Puts the streams of the joint in the place of those that the clip has."""
+
+    def __init__(
+        self,
+        file: File,
+        stream: BinaryIO,
+        progress: Progress | None,
+        copies: bool | None,
+        clip: Clip,
+        recoded: Recoded,
+    ) -> None:
+        super().__init__(file, stream, progress, copies, clip)
+        self.recoded, self.joint, self.others = recoded, recoded.joint, recoded.others
+        self.before, self.after = _Sizes(recoded.size_before), _Sizes(recoded.size)
+        self.max_error = recoded.max_error
+        self._numbers = {row.offset: number for number, row in enumerate(recoded.info.rows)}
+
+    def finish_record(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
         if self.is_same(cut):
-            super().clip(cut)
-            return
-        row = self.container.directory.clips[cut.clip.name]
-        record = self.container.clip(row)
-        self.skeleton(cut.clip.skeleton_id)
-        source = self._source(record)
-        if record.source is not None:
-            self.carrier.shared(ChunkType.SRCE, record.source.template)
-        self.writer.begin_clip(record, [part.info.layout.n_channels for part in cut.signals])
-        self.inside(row)
-        self._edited_segments(cut, noted=bool(record.source))
-        cend = self.container.whole_cend(row)
+            return super().finish_record(cut, new)
+        source = self._source(cut, new)
+        _, hashes = super().finish_record(cut, new)
         signal = self.recoded.decoded.signals[0]
-        hashes = [value_hash(signal.values, signal.mask), *cend.value_sha256[1:]]
-        extension = bytes(cend.extension)
-        self.writer.end_clip(cut.n_frames, source, hashes, extension, cend.missing)
-        self._edited_quality(row)
+        return source, [value_hash(signal.values, signal.mask), *hashes[1:]]
 
-    def _source(self, record: payloads.Clip) -> bytes:
+    def _source(self, cut: ClipCut, record: payloads.Clip) -> bytes:
         """Put the size of the new source file into CLIP; return its hash."""
         motion, held = self.recoded.decoded, record.source
         if motion.source is None or held is None:
             return b""
-        clip = self.file.clips[self.name]
-        motion, held = with_stated_rate(self.writer, motion, held, clip)
+        motion, held = with_stated_rate(self.writer, motion, held, cut.clip)
         try:
             data = source_file(motion)
         except MotionError as error:
-            note_source(record, f"the source file was left out: {error}")
-            record.source = None
-            self.found.left_out.append(f"clip {self.name}: its source file, as {error}")
+            self.without_source(cut, record, error)
             return b""
         record.source = dataclasses.replace(held, size=len(data))
         return hashlib.sha256(data).digest()
 
-    def _edited_segments(self, cut: ClipCut, *, noted: bool) -> None:
-        motion = cut.signals[0]
-        numbers = {row.offset: index for index, row in enumerate(motion.rows)}
-        rows = [(row.offset, row, part) for part in cut.signals for row in part.rows]
-        for _, row, part in sorted(rows, key=lambda entry: entry[0]):
-            if part is motion:
-                written = self._segment(row, numbers[row.offset], noted)
-            else:
-                written = cut_segment(self.container, part, row, noted=noted, name=self.name)
-            self.writer.segment(*written)
-            self.done += 1
-            if self.progress is not None:
-                self.progress(self.done, self.total, self.name)
-
-    def _segment(
-        self, row: SegmentRow, index: int, noted: bool
+    def segment(
+        self, cut: ClipCut, part: SignalCut, row: SegmentRow, *, noted: bool
     ) -> tuple[SegmentHeader, list[bytes], bytes]:
-        """Header, streams and extension of a segment, those of the joint in their places."""
-        counts, edit = self.recoded.info.counts, self.recoded
-        table, old = self.container.streams(row, counts, None)
-        flags = row.header.flags & ~(FRAME_NOTES | GROUP_NOTES | MASKS)
-        kept: list[bytes] = []
-        at = table.frame_notes()
-        if noted and at is not None:
-            flags |= FRAME_NOTES
-            kept.append(old[at])
-        new_notes, new_masks = edit.beside(row.header.first, row.header.stop)
-        for flag, where, new in (
-            (GROUP_NOTES, table.group_notes, new_notes),
-            (MASKS, table.mask, new_masks),
-        ):
-            numbers = [where(group) for group in range(counts.n_groups)]
-            streams = [b"" if number is None else old[number] for number in numbers]
-            for group, stream in new.items():
-                if group in edit.groups:
-                    self.beside_before.add(flag, streams[group])
-                    self.beside.add(flag, stream)
-                streams[group] = stream
-            if row.header.flags & flag or any(streams):
-                flags |= flag
-                kept += streams
-        for resolution in range(counts.n_resolutions):
-            for group in range(counts.n_groups):
-                coded = edit.streams.get((index, group))
-                kept.append(
-                    old[table.codec(resolution, group)] if coded is None else coded[resolution]
-                )
-        return dataclasses.replace(row.header, flags=flags), kept, table.extension
+        if self.is_same(cut) or part.info.index:
+            return super().segment(cut, part, row, noted=noted)
+        edit = _SegmentEdit(self, row, self._numbers[row.offset])
+        return cut_segment(self.container, part, row, noted=noted, name=cut.clip.name, edit=edit)
 
-    def _edited_quality(self, row: ClipRow) -> None:
-        """The quality record with what is known of the new values, and the other chunks."""
-        records = [chunk for chunk in row.ancillary if chunk.type == CHUNK]
-        if records or not self.recoded.info.codec.lossless:
-            record = payloads.Qual(entries=[])
-            if records:
-                payload = self.container.payload(records[0])
-                record = parse(payloads.Qual, payload, records[0].label)
-            old = {entry.key: entry.value for entry in record.entries}
-            record.entries = payloads.metadata_records(self._entries(old))
-            self.writer.ancillary(CHUNK, build(record, "quality record"))
-        for chunk in row.ancillary:
-            if chunk.type != CHUNK:
-                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
-
-    def _entries(self, old: dict[str, str]) -> dict[str, str]:
-        edit, codec = self.recoded, self.recoded.info.codec
-        found = {} if codec.lossless else texts_of(figures(edit.given, edit.decoded))
-        stored = with_indices(found, edit.given.skeleton)
-        return edited_quality(old, codec.name, edit.joint, stored)
+    def entries(self, cut: ClipCut, old: Mapping[str, str] | None) -> dict[str, str] | None:
+        given, codec = self.recoded.given, self.recoded.info.codec
+        if old is None and codec.lossless:
+            return None
+        found = {} if codec.lossless else texts_of(figures(given, self.recoded.decoded))
+        return edited_quality(
+            old or {}, codec.name, self.joint, with_indices(found, given.skeleton)
+        )
 
 
-class _AnewEditor(Copier):
-    """Copies a file, one clip of it decoded and, after its edit, coded anew."""
+class _SegmentEdit(Unchanged):
+    """The streams of the joint in one segment."""
+
+    def __init__(self, editor: _StreamEditor, row: SegmentRow, number: int) -> None:
+        self._editor, self._number = editor, number
+        notes, masks = editor.recoded.beside(row.header.first, row.header.stop)
+        self._beside = {GROUP_NOTES: notes, MASKS: masks}
+
+    def beside(self, flag: int, group: int, old: bytes) -> bytes:
+        if group not in self._beside[flag]:
+            return old
+        new = self._beside[flag][group]
+        self._editor.before.add(flag, old)
+        self._editor.after.add(flag, new)
+        return new
+
+    def coded(self, resolution: int, group: int, old: bytes) -> bytes:
+        streams = self._editor.recoded.streams.get((self._number, group))
+        return old if streams is None else streams[resolution]
+
+
+class _AnewEditor(_Editor):
+    """Decodes the clip and codes it anew after its edit."""
+
+    anew = True
 
     def __init__(
         self,
         file: File,
         stream: BinaryIO,
-        clip: Clip,
-        edited: Edited,
         progress: Progress | None,
         copies: bool | None,
+        clip: Clip,
+        edit: Edited,
     ) -> None:
-        super().__init__(file, stream, progress, copies)
-        self.edited_clip, self.edited = clip, edited
-        self.address = clip.skeleton.addresses()[edited.joint]
-        self.max_error = self.others_error = 0.0
+        super().__init__(file, stream, progress, copies, clip)
+        self.edit, self.joint = edit, edit.joint
 
-    def is_same(self, cut: ClipCut) -> bool:
-        return cut.clip.name != self.edited_clip.name
-
-    def clip(self, cut: ClipCut) -> None:
+    def write(self, cut: ClipCut) -> None:
         if self.is_same(cut):
-            super().clip(cut)
+            super().write(cut)
             return
-        self.recode(cut.clip, self.edited.motion, settings_of(cut.clip), self._record)
+        self.before.size = sum(row.size for info in cut.clip.signals for row in info.rows)
+        self.recode(cut.clip, self.edit.motion, settings_of(cut.clip), self._record)
+        segments = self.writer.directory.clips[cut.clip.name].segments
+        self.after.size = sum(row.size for row in segments)
 
     def _record(self, now: dict[str, str], decoded: Sequence[Values]) -> dict[str, str]:
-        wanted = self.edited.motion.signals[0].masked()
+        wanted = self.edit.motion.signals[0].masked()
         with np.errstate(invalid="ignore"):  # infinities
             difference = np.abs(decoded[0] - wanted)
         own = np.zeros(difference.shape[1], np.bool_)
-        own[list(self.edited_clip.skeleton.columns(self.edited.joint))] = True
+        own[list(self.edited.skeleton.columns(self.joint))] = True
         self.max_error = float(np.nanmax(difference[:, own], initial=0.0))
         self.others_error = float(np.nanmax(difference[:, ~own], initial=0.0))
         settings = {key: value for key, value in now.items() if key.startswith("param.")}
         found = {k: v for k, v in now.items() if k != "codec" and k not in settings}
-        old = self.edited_clip.stored_quality or {}
-        record = edited_quality(old, now["codec"], self.edited.joint, found)
+        old = self.edited.stored_quality or {}
+        record = edited_quality(old, now["codec"], self.joint, found)
         record = {k: v for k, v in record.items() if not k.startswith("param.")}
         return record | settings | {RECODED: "yes"}
-
-
-def _write_anew(clip: Clip, writer: _AnewEditor) -> Replacement:
-    before = sum(row.size for info in clip.signals for row in info.rows)
-    found = writer.run(
-        [plan_cut(one, None, None, 0) for one in writer.file.clips.values()], alone=False
-    )
-    segments = writer.writer.directory.clips[clip.name].segments
-    return Replacement(
-        clip=clip.name,
-        joint=writer.address,
-        codec=clip.codec,
-        recoded=(),
-        joint_bytes=sum(row.size for row in segments),
-        joint_bytes_before=before,
-        n_exceptions=0,
-        n_exceptions_before=0,
-        max_error=writer.max_error,
-        left_out=tuple(found.left_out),
-        size=found.size,
-        anew=True,
-        others_error=writer.others_error,
-    )
 
 
 def edited_quality(

@@ -152,8 +152,11 @@ def source_path(file: File, name: str) -> str:
     return source.path if source is not None else ""
 
 
-def writer_like(stream: BinaryIO, files: Iterable[File]) -> Writer:
-    """A Writer of a new file that has what the first of ``files`` has, and holds what all hold."""
+def writer_like(stream: BinaryIO, files: Iterable[File], copies: bool | None = None) -> Writer:
+    """A Writer of a new file that has what the first of ``files`` has, and holds what all hold.
+
+    ``copies`` None: where one of them has some.
+    """
     files = list(files)
     head = parse(payloads.Head, files[0].container.directory.head, "HEAD")
     profiles: list[Profile] = [file.container.profile for file in files]
@@ -161,7 +164,7 @@ def writer_like(stream: BinaryIO, files: Iterable[File]) -> Writer:
         stream,
         profile=max(profiles, key=lambda profile: profile.channels),
         head_extension=bytes(head.extension),
-        copies=any(file.container.copies() for file in files),
+        copies=any(file.container.copies() for file in files) if copies is None else copies,
     )
 
 

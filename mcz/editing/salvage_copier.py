@@ -16,9 +16,9 @@ from typing import BinaryIO
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
-from mcz.container.packed import chunk_id, parse_skel
+from mcz.container.packed import parse_skel
 from mcz.editing.cutting import ClipCut, note_source
-from mcz.editing.extraction import Copier, Extraction
+from mcz.editing.extraction import Copier
 from mcz.editing.recovering import Recovery
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
@@ -117,7 +117,7 @@ class Repairer(Copier):
     ) -> None:
         super().__init__(file, stream, progress)
         self.repair, self.degrees = found, degrees
-        self._skeletons: dict[bytes, bytes] = {}  # the payload that stands for each id
+        self._skeletons: dict[bytes, bytes] = {}  # the id that each has now
 
     def name_of(self, cut: ClipCut) -> str:
         if not isinstance(cut, WholeRun):
@@ -139,17 +139,17 @@ class Repairer(Copier):
                 signal.role = 0 if signal.of is None else signal.role
         return replace(record, signals=signals, source=None)
 
-    def _quality(self, cut: ClipCut, row: ClipRow) -> None:
+    def quality(self, cut: ClipCut, row: ClipRow) -> None:
         """Figures are of the motion."""
         has_motion = not isinstance(cut.clip, SomeSignals) or 0 in cut.clip.kept
         if has_motion and self._degree(cut) == FULL:
-            super()._quality(cut, row)
+            super().quality(cut, row)
 
     def _degree(self, cut: ClipCut) -> int:
         return self.degrees.get(self.name_of(cut), FULL)
 
-    def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> Extraction:
-        return super().run([cut for cut in cuts if self._is_kept(cut)], alone=alone)
+    def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> None:
+        super().run([cut for cut in cuts if self._is_kept(cut)], alone=alone)
 
     def _is_kept(self, cut: ClipCut) -> bool:
         """Return whether a clip is written; note what of it is not, as it breaks a rule."""
@@ -199,32 +199,28 @@ class Repairer(Copier):
         while wanted and wanted not in self._skeletons and wanted not in chain:
             chain[wanted] = None
             with suppress(FormatError):
-                bases = self.container.skeleton_fields(wanted).base
-                wanted = bases
+                wanted = self.container.skeleton_fields(wanted).base
         for one in reversed(chain):
             with suppress(FormatError) if one != id_ else nullcontext():
                 self._skeletons[one] = self._after_its_base(one)
         return self._skeletons[id_]
 
     def _after_its_base(self, id_: bytes) -> bytes:
-        """Copy a skeleton, whose base is copied; return its payload."""
+        """Copy a skeleton, whose base is copied; return its id."""
         fields = self.container.skeleton_fields(id_)
-        kept = {base: self._skeletons.get(base) for base in [fields.base] if base}
+        base = self._skeletons.get(fields.base) if fields.base else None
         try:
-            if any(skel is None or _skel_id(skel) != id_ for id_, skel in kept.items()):
+            if base != (fields.base or None):
                 raise FormatError("its base is not what it was")
             if fields.source:
                 self.file.skeleton_bytes(id_)
             return super().skeleton(id_)
         except FormatError as error:
             self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
-        stored, where = self.carrier.stored(ChunkType.SKEL, id_), f"SKEL {id_.hex()}"
-        bases = [_skel_id(payload) for payload in kept.values() if payload is not None]
-        record = parse_skel(stored, where, self.container.profile)
-        record.base, record.source = (bases[0] if bases else None), None
-        payload = build(record, "skeleton")
-        self.writer.shared(ChunkType.SKEL, payload)
-        return payload
+        stored = self.stored(ChunkType.SKEL, id_)
+        record = parse_skel(stored, f"SKEL {id_.hex()}", self.container.profile)
+        record.base, record.source = base, None
+        return self.writer.shared(ChunkType.SKEL, build(record, "skeleton"))
 
     def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
         for name, (of, target) in self.file.aliases.items():
@@ -269,7 +265,3 @@ class Repairer(Copier):
         note_source(new, NOTE)
         _, hashes = super().finish_record(cut, new)
         return b"", hashes
-
-
-def _skel_id(payload: bytes) -> bytes:
-    return chunk_id(ChunkType.SKEL, payload)

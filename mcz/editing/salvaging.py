@@ -61,8 +61,8 @@ def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress 
         cuts = list(_cuts(file, attempt))
         attempt.lost += _gone(file.container)
         repairer.run(cuts, alone=False)
-        attempt.size = repairer.found.size
-        for text in repairer.found.left_out:
+        attempt.size = repairer.writer.offset
+        for text in repairer.left_out:
             (attempt.damage if text == UNPROTECTED else attempt.lost).append(f"left out: {text}")
         if not (attempt.clips or attempt.runs or attempt.attachments or attempt.skeletons):
             raise FormatError("no clip, skeleton or attachment in it is whole", path=file.name)
