@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.merging import merge
     from mcz.editing.outcomes import Outcome, Report
-    from mcz.editing.protected import protect
     from mcz.editing.protecting import Protection
     from mcz.editing.recovering import Recovery
     from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
+    from mcz.editing.rewriting import protect
     from mcz.editing.unpacking import unpack
     from mcz.errors import (
         AccessError,
@@ -120,7 +120,7 @@ _HOMES = {
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions", "left_out"),
     "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
-    "mcz.editing.protected": ("protect",),
+    "mcz.editing.rewriting": ("protect",),
     "mcz.editing.protecting": ("Protection",),
     "mcz.editing.recovering": ("Recovery",),
     "mcz.editing.repair": ("Repair", "repair"),

@@ -231,15 +231,16 @@ def test_a_rate_that_is_set_later(files: tuple[Path, Path], takes: Path, tmp_pat
     from fractions import Fraction
 
     from mcz.editing.carrying import Change
-    from mcz.editing.rewriting import rewrite, source_of, whole
+    from mcz.editing.outcomes import Report
+    from mcz.editing.rewriting import rewriting, whole
 
     path = tmp_path / "one.mcz"
     mcz.encode(takes / "a" / "walk.amc", path)
-    with source_of(path, None) as file:
-        assert file.clips["walk"].frame_rate is None
-        plan = whole(file)
-        plan.clips["walk"] = Change(rate=Fraction(30000, 1001))
-        rewrite(path, None, False, file, plan, lambda name: None)
+    with rewriting(path) as job:
+        assert job.file.clips["walk"].frame_rate is None
+        plan = whole(job.file)
+        plan.things["clip", "walk"] = Change(rate=Fraction(30000, 1001))
+        job.write(plan, Report(), lambda name: None)
     assert sound(path).clips["walk"].frame_rate == Fraction(30000, 1001)
     assert contents(path)["walk.amc"] == (takes / "a" / "walk.amc").read_bytes()
 

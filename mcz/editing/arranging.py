@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from mcz.brief import counted, nearest, shown
@@ -18,11 +18,18 @@ from mcz.container.chunks import ChunkType
 from mcz.editing.carrying import SAME, Change
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.rewriting import (
+    ALIAS,
+    ATTACHMENT,
+    CLIP,
+    KINDS,
+    SKELETON,
     Plan,
-    rewrite,
-    source_of,
-    source_path,
+    Rewriting,
+    Thing,
+    path_of,
+    rewriting,
     steps,
+    things_in,
     used_by,
     used_by_skeleton,
     whole,
@@ -60,94 +67,70 @@ def delete_clips(
     the place of the old one once it is whole. Raises OptionError for a name that is not there, and
     where nothing is named.
     """
-    with source_of(target, output) as file:
-        gone = _named(file, [names] if isinstance(names, str) else names)
+    with rewriting(target, output, force=force) as job:
+        file = job.file
+        named = [_named(file, name) for name in ([names] if isinstance(names, str) else names)]
         if where is not None:
-            gone.clips |= {clip.name: SAME for clip in file.find(where)}
-        if not (gone.clips or gone.attachments or gone.aliases):
+            named += [(CLIP, clip.name) for clip in file.find(where)]
+        if not named:
             raise OptionError("nothing to delete; name clips or say where", path=file.name)
-        _take_aliases(file, gone, allowed=aliases)
+        gone = dict.fromkeys(named)
+        others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in gone]
+        missed = [alias for _, alias in others if (ALIAS, alias) not in gone]
+        if missed and not aliases:
+            raise OptionError(
+                f"{listed(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
+                "under another name, which would go, too; name it, or say aliases",
+                path=file.name,
+            )
+        gone |= dict.fromkeys(others)
         plan = _without(file, gone)
-        report = Report()
-        for name, what in (*_each(gone), *_lost_aliases(file, gone, plan)):
-            report.outcomes.append(Outcome(name, "deleted", 0, what))
-        return _finish(report, target, output, force, file, plan, progress)
+        what = {thing: thing[0] for kind in KINDS for thing in gone if thing[0] == kind}
+        for thing in things_in(file):
+            if thing not in plan.things:  # with the clips that had the skeleton
+                what.setdefault(thing, "the file of a skeleton that no other clip has")
+        report = Report([Outcome(name, "deleted", 0, said) for (_, name), said in what.items()])
+        return _finish(job, plan, report, progress)
 
 
-def _named(file: File, names: Iterable[str]) -> Plan:
-    """The clips, attachments and aliases of these names."""
-    found = Plan()
-    for name in names:
-        clips = clips_meant(file.clips, name)
-        if name in file.clips.rows:
-            found.clips[name] = SAME
-        elif name in file.attachments:
-            found.attachments[name] = name
-        elif name in file.aliases:
-            found.aliases[name] = name
-        elif len(clips) == 1:
-            found.clips[clips[0]] = SAME
-        else:
-            raise OptionError(_unknown(file, name, clips), path=file.name)
-    return found
-
-
-def _unknown(file: File, name: str, clips: Sequence[str]) -> str:
+def _named(file: File, name: str) -> Thing:
+    """The clip, attachment or alias of this name."""
+    tables: tuple[Container[str], ...] = (file.clips.rows, file.attachments, file.aliases)
+    for kind, table in zip(KINDS, tables, strict=True):
+        if name in table:
+            return kind, name
+    clips = clips_meant(file.clips, name)
+    if len(clips) == 1:
+        return CLIP, clips[0]
     if clips:
-        return f"{name!r} may be {listed(clips)}; choose one"
-    near = nearest(name, [*file.clips, *file.attachments, *file.aliases])
-    return f"nothing is called {name!r}" + (f"; did you mean {near}?" if near else "")
+        raise OptionError(f"{name!r} may be {listed(clips)}; choose one", path=file.name)
+    near = nearest(name, [other for _, other in things_in(file)])
+    said = f"; did you mean {near}?" if near else ""
+    raise OptionError(f"nothing is called {name!r}{said}", path=file.name)
 
 
-def _take_aliases(file: File, gone: Plan, *, allowed: bool) -> None:
-    """Let the further names of what goes go as well, where that is allowed."""
-    others = []
-    for alias, (of, target) in file.aliases.items():
-        name = target.decode("utf-8", "replace")
-        of_clip = of == payloads.OF_CLIP and name in gone.clips
-        if of_clip or (of == payloads.OF_ATTACHMENT and name in gone.attachments):
-            others.append(alias)
-    if not allowed and (missed := [alias for alias in others if alias not in gone.aliases]):
-        raise OptionError(
-            f"{listed(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
-            "under another name, which would go, too; name it, or say aliases",
-            path=file.name,
-        )
-    gone.aliases |= {alias: alias for alias in others}
-
-
-def _without(file: File, gone: Plan) -> Plan:
+def _without(file: File, gone: Collection[Thing]) -> Plan:
     """What stays when ``gone`` goes, and what is there for the sake of that alone."""
     plan = whole(file)
-    for name in gone.clips:
-        del plan.clips[name]
-    for name in gone.attachments:
-        del plan.attachments[name]
-    needed, lost = used_by(file, plan.clips), used_by(file, gone.clips)
-    for alias, (of, target) in file.aliases.items():
-        if of == payloads.OF_SKELETON and alias in gone.aliases:
-            lost |= used_by_skeleton(file.container, target)
-        elif of == payloads.OF_SKELETON and (ChunkType.SKEL, target) not in lost:
-            needed |= used_by_skeleton(file.container, target)
+    plan.things = {thing: SAME for thing in plan.things if thing not in gone}
+    needed = used_by(file, plan.of(CLIP))
+    lost = used_by(file, [name for kind, name in gone if kind == CLIP])
+    of_skeleton = {
+        alias: (ChunkType.SKEL, target)
+        for alias, (of, target) in file.aliases.items()
+        if of == payloads.OF_SKELETON
+    }
+    for alias, skeleton in of_skeleton.items():
+        if (ALIAS, alias) in gone:
+            lost |= used_by_skeleton(file.container, skeleton[1])
+        elif skeleton not in lost:
+            needed |= used_by_skeleton(file.container, skeleton[1])
     lost -= needed
     plan.shared = [key for key in plan.shared if key not in lost]
-    for alias, (of, target) in file.aliases.items():
-        if alias in gone.aliases or (
-            of == payloads.OF_SKELETON and (ChunkType.SKEL, target) in lost
-        ):
-            del plan.aliases[alias]
+    for alias, skeleton in of_skeleton.items():
+        if skeleton in lost:
+            plan.things.pop((ALIAS, alias), None)
     return plan
-
-
-def _each(gone: Plan) -> list[tuple[str, str]]:
-    kinds = (gone.clips, "clip"), (gone.attachments, "attachment"), (gone.aliases, "alias")
-    return [(name, what) for names, what in kinds for name in names]
-
-
-def _lost_aliases(file: File, gone: Plan, plan: Plan) -> list[tuple[str, str]]:
-    """The files of skeletons that go with the clips that had them."""
-    others = [name for name in file.aliases if name not in plan.aliases | gone.aliases]
-    return [(name, "the file of a skeleton that no other clip has") for name in others]
 
 
 def rename_clips(
@@ -166,52 +149,37 @@ def rename_clips(
     those of ``delete_clips``. Raises OptionError for a name that is not there, and for one that is
     taken.
     """
-    with source_of(target, output) as file:
-        plan, report = whole(file), Report()
+    with rewriting(target, output, force=force) as job:
+        file, report = job.file, Report()
+        plan = whole(file)
         for old, new in names.items():
-            _rename(file, plan, old, new, report)
+            thing = _named(file, old)
+            check_name(new)
+            plan.things[thing] = _renamed(file, thing, new)
+            report.outcomes.append(Outcome(thing[1], "renamed", 0, new))
         _refuse_equal(file, plan)
-        return _finish(report, target, output, force, file, plan, progress)
+        return _finish(job, plan, report, progress)
 
 
-def _rename(file: File, plan: Plan, old: str, new: str, report: Report) -> None:
-    found = _named(file, [old])
-    check_name(new)
-    for name in found.clips:
-        plan.clips[name] = renamed(file, name, new)
-    for name in found.attachments:
-        plan.attachments[name] = new
-    for name in found.aliases:
-        plan.aliases[name] = new
-    report.outcomes += [Outcome(name, "renamed", 0, new) for name, _ in _each(found)]
-
-
-def renamed(file: File, name: str, new: str) -> Change:
-    """What makes the clip ``name`` one that is called ``new``."""
-    path = source_path(file, name)
+def _renamed(file: File, thing: Thing, new: str) -> Change:
+    """What makes a thing one that is called ``new``: the path of a clip's source may follow."""
+    path = path_of(file, thing) if thing[0] == CLIP else ""
     suffix = PurePosixPath(path).suffix
-    return Change(new, new + suffix if path and path == name + suffix else None)
+    return Change(new, new + suffix if path and path == thing[1] + suffix else None)
 
 
 def _refuse_equal(file: File, plan: Plan) -> None:
     """Raise OptionError where two things would have one name that have not got one now."""
-    names = [change.name or name for name, change in plan.clips.items()]
-    tables = {"clips": names, "attachments": [*plan.attachments.values()]}
-    tables["aliases"] = [*plan.aliases.values()]
-    for what, taken in tables.items():
-        if twice := [name for name, count in Counter(taken).items() if count > 1]:
-            raise OptionError(f"two {what} would be called {shown(twice[0])}", path=file.name)
-    before, after = Counter(paths_of(file, whole(file))), Counter(paths_of(file, plan))
-    for path, count in after.items():
-        if count > 1 and count > before[path]:
+    names = Counter((kind, change.name or name) for (kind, name), change in plan.things.items())
+    for (kind, name), number in names.items():
+        if number > 1:
+            kinds = "aliases" if kind == ALIAS else f"{kind}s"
+            raise OptionError(f"two {kinds} would be called {shown(name)}", path=file.name)
+    before = Counter(path_of(file, thing) for thing in plan.things)
+    after = Counter(path_of(file, thing, change) for thing, change in plan.things.items())
+    for path, number in after.items():
+        if path and number > 1 and number > before[path]:
             raise OptionError(f"two files would be restored as {shown(path)}", path=file.name)
-
-
-def paths_of(file: File, plan: Plan) -> list[str]:
-    """The path of every file that what ``plan`` says restores."""
-    paths = [*plan.attachments.values(), *plan.aliases.values()]
-    found = ((change, source_path(file, name)) for name, change in plan.clips.items())
-    return paths + [change.path or path for change, path in found if path]
 
 
 def reorder_clips(
@@ -234,13 +202,14 @@ def reorder_clips(
         names = [names]
     if not names and by is None:
         raise OptionError("no order: name clips, or say by what they are sorted")
-    with source_of(target, output) as file:
-        first = {clip.name: SAME for clip in file.clips_called(names)}
+    with rewriting(target, output, force=force) as job:
+        file = job.file
         rest = list(file) if by is None else in_order(file, list(file), by)
+        clips = dict.fromkeys((CLIP, clip.name) for clip in (*file.clips_called(names), *rest))
         plan = whole(file)
-        plan.clips = first | {clip.name: SAME for clip in rest if clip.name not in first}
-        report = Report([Outcome(name, "moved") for name in plan.clips])
-        return _finish(report, target, output, force, file, plan, progress)
+        plan.things = dict.fromkeys([*clips, *plan.things], SAME)
+        report = Report([Outcome(name, "moved") for _, name in clips])
+        return _finish(job, plan, report, progress)
 
 
 def in_order(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
@@ -288,11 +257,10 @@ def split(
         folder.mkdir(parents=True, exist_ok=True)
         step = steps(progress, len(file.clips))
         for value, names in groups.items():
-            plan = _part(file, names, with_rest=value == rest)
-            output = outputs[value]
-            written = rewrite(target, output, force, file, plan, step)
-            said = counted(len(plan.clips), "clip")
-            report.outcomes.append(Outcome(str(output), "written", written.size, said))
+            plan, part = _part(file, names, with_rest=value == rest), Report()
+            Rewriting(target, outputs[value], force, file).write(plan, part, step)
+            said = counted(len(names), "clip")
+            report.outcomes.append(Outcome(str(outputs[value]), "written", part.size or 0, said))
     return report
 
 
@@ -339,34 +307,17 @@ def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
     needed = used_by(file, names)
     if with_rest:
         needed |= set(file.container.directory.shared) - used_by(file, file.clips)
-    plan = Plan(dict.fromkeys(names, SAME))
-    plan.attachments = {name: name for name in file.attachments if with_rest}
-    plan.shared = [key for key in file.container.directory.shared if key in needed]
-    for alias, (of, target) in file.aliases.items():
-        name = target.decode("utf-8", "replace")
-        of_clip = of == payloads.OF_CLIP and name in plan.clips
-        of_attachment = of == payloads.OF_ATTACHMENT and name in plan.attachments
-        if (
-            of_clip
-            or of_attachment
-            or (of == payloads.OF_SKELETON and (ChunkType.SKEL, target) in needed)
-        ):
-            plan.aliases[alias] = alias
+    shared = [key for key in file.container.directory.shared if key in needed]
+    plan = Plan(dict.fromkeys(((CLIP, name) for name in names), SAME), shared)
+    if with_rest:
+        plan.things |= dict.fromkeys(((ATTACHMENT, name) for name in file.attachments), SAME)
+    kept = {*plan.things}
+    kept |= {(SKELETON, id_.hex()) for kind, id_ in shared if kind == ChunkType.SKEL}
+    others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in kept]
+    plan.things |= dict.fromkeys(others, SAME)
     return plan
 
 
-def _finish(
-    report: Report,
-    target: Target,
-    output: Target | None,
-    force: bool,
-    file: File,
-    plan: Plan,
-    progress: Progress | None,
-) -> Report:
-    """Write the new file; let the report say its size, and what may not be carried over."""
-    step = steps(progress, len(plan.clips))
-    written = rewrite(target, output, force, file, plan, step)
-    report.size = written.size
-    report.left_out += written.left_out
+def _finish(job: Rewriting, plan: Plan, report: Report, progress: Progress | None) -> Report:
+    job.write(plan, report, steps(progress, len(plan.of(CLIP))))
     return report

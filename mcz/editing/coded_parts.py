@@ -14,11 +14,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcz.container import payloads
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
-from mcz.editing.carrying import Carrier, Change
+from mcz.editing.carrying import Change
 from mcz.editing.folders import size_of
+from mcz.editing.rewriting import ALIAS, CLIP, SKELETON, carry, whole
 from mcz.editing.stored_files import Content
 from mcz.errors import MczError, WorkerError
 from mcz.formats import wants_skeleton
@@ -134,18 +134,15 @@ class Far(Joined):
 
 def join(part: Part, draft: Draft, clip: str) -> None:
     """Carry the chunks of ``part`` over; its clip is called ``clip`` from now on."""
-    writer = draft.writer
+    held = draft.writer.directory
     with open(part.data) as file:
-        carrier = Carrier(file.container, writer)
-        for kind, id_ in file.container.directory.shared:
-            writer.shared(kind, carrier.stored(kind, id_))
-        for name in file.attachments:
-            carrier.attachment(name)
-        for name in file.clips:
-            carrier.clip(name, Change(name=None if name == clip else clip))
-        for name, (of, target) in file.aliases.items():
-            if of != payloads.OF_SKELETON or name not in writer.directory.aliases:
-                writer.alias(name, of, target)
+        plan = whole(file)
+        for kind, name in list(plan.things):
+            if kind == CLIP and name != clip:
+                plan.things[kind, name] = Change(clip)
+            elif kind == ALIAS and name in held.aliases and file.alias_of(name).kind == SKELETON:
+                del plan.things[kind, name]
+        carry(file, draft.writer, plan, lambda name: None)
 
 
 def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask | None]:

@@ -15,7 +15,7 @@ from mcz.editing.appending import growing
 from mcz.editing.carrying import Change
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.protecting import redundancy_of, still_protect
-from mcz.editing.rewriting import rewrite, source_of, steps, whole
+from mcz.editing.rewriting import CLIP, rewriting, steps, whole
 from mcz.errors import ChecksumError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import frame_rate_of
@@ -77,11 +77,13 @@ def set_metadata(
 
 def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[str]:
     """Rewrite a file so that its metadata stand in CLIP; return what was left out."""
-    with source_of(target, None) as file:
-        plan = whole(file)
+    with rewriting(target) as job:
+        report, plan = Report(), whole(job.file)
         plan.purges = True  # META-09
-        plan.clips = {clip.name: Change(metadata=clip.metadata) for clip in file}
-        return rewrite(target, None, True, file, plan, steps(progress, len(plan.clips))).left_out
+        for clip in job.file:
+            plan.things[CLIP, clip.name] = Change(metadata=clip.metadata)
+        job.write(plan, report, steps(progress, len(job.file.clips)))
+        return report.left_out
 
 
 def registered_key(key: str) -> str:
@@ -128,18 +130,18 @@ def set_rate(
     exact = frame_rate_of(rate, "rate").limit_denominator(10**6)
     if exact <= 0:
         raise OptionError(f"rate is {rate}, not above 0")
-    with source_of(target, output) as file:
+    with rewriting(target, output, force=force) as job:
+        file = job.file
         named = names is not None or where is not None
         clips = file.chosen(names, where) if named else [c for c in file if c.frame_rate is None]
         report, plan = Report(), whole(file)
         for clip in clips:
             _check_rate(clip, exact, force)
-            plan.clips[clip.name] = Change(rate=exact)
+            plan.things[CLIP, clip.name] = Change(rate=exact)
             report.outcomes.append(Outcome(clip.name, "rate", 0, f"{float(exact):g}"))
         if not clips:
             return report
-        written = rewrite(target, output, force, file, plan, steps(progress, len(plan.clips)))
-        report.size, report.left_out = written.size, written.left_out
+        job.write(plan, report, steps(progress, len(file.clips)))
     _check_sources(target if output is None else output, [clip.name for clip in clips])
     return report
 

@@ -7,9 +7,10 @@ is refused, or the later one is called otherwise.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import count
 from pathlib import PurePosixPath
 
@@ -20,23 +21,26 @@ from mcz.editing.carrying import UNPROTECTED, Change
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.protecting import protect_written, redundancy_of
 from mcz.editing.rewriting import (
+    ALIAS,
+    ATTACHMENT,
+    CLIP,
+    SKELETON,
     Plan,
+    Thing,
     carry,
-    source_path,
+    path_of,
     steps,
+    things_in,
     whole,
     writer_like,
 )
 from mcz.errors import OptionError
-from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.names import listed
 from mcz.schema import parse
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
 from mcz.writing.draft import Draft
-
-CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"
 
 
 def merge(
@@ -92,7 +96,7 @@ def carried(
     plans: Sequence[tuple[File, Plan]], writer: Writer, progress: Progress | None
 ) -> list[str]:
     """Write what the plans say of their files; return what may not be carried over."""
-    step, left_out = steps(progress, sum(len(plan.clips) for _, plan in plans)), []
+    step, left_out = steps(progress, sum(len(plan.of(CLIP)) for _, plan in plans)), []
     for file, plan in plans:
         found = carry(file, writer, plan, step)
         left_out += [f"{file.name}: {text}" for text in found]
@@ -112,12 +116,9 @@ def add_files(
     Raises as ``merge`` does.
     """
     directory, report = draft.writer.directory, Report()
-    contents = {(kind, name): content for kind, name, content in _things(before)}
-    names = [(CLIP, name) for name in directory.clips]
-    names += [(ATTACHMENT, name) for name in directory.attachments]
-    names += [(ALIAS, name) for name in directory.aliases]
     # Content that was written just now is like no other: it cannot be read yet.
-    held = Held({key: contents.get(key, object) for key in names}, set(draft.paths))
+    held = Held(dict.fromkeys(things_in(directory), object), set(draft.paths))
+    held.things |= {thing: _content(before, thing) for thing in things_in(before)}
     with ExitStack() as stack:
         files = [stack.enter_context(open(source)) for source in sources]
         options = {"rename": rename, "skip_identical": skip_identical}
@@ -137,37 +138,39 @@ def add_files(
 class Held:
     """What a new file holds so far: what finds whether a thing of a name is the same.
 
-    ``names`` are those of clips, attachments and aliases, each with what tells the content.
-    ``paths`` are those of all files that it restores. ``double``: what cannot be taken in.
+    ``things`` have what tells the content of each. ``paths`` are those of all files that it
+    restores. ``double``: what cannot be taken in.
     """
 
-    names: dict[tuple[str, str], Callable[[], object]] = field(default_factory=dict)
+    things: dict[Thing, Callable[[], object]] = field(default_factory=dict)
     paths: set[str] = field(default_factory=set)
     double: list[str] = field(default_factory=list)
 
 
 def joined(file: File, held: Held, report: Report, *, rename: bool, skip_identical: bool) -> Plan:
     """What of ``file`` goes into the file that holds ``held``, which learns it."""
-    plan, first = whole(file), not held.names
-    for kind, name, content in _things(file):
-        if first:
-            report.outcomes.append(Outcome(name, "copied", 0, ""))
-            continue
-        path = _path_of(file, kind, name)
-        there = held.names.get((kind, name))
-        may_skip = there is not None and _may_skip(kind, file, name, skip_identical)
-        if there is not None and may_skip and there() == content():
-            _drop(plan, kind, name)
+    plan = whole(file)
+    for thing in list(plan.things):
+        kind, name = thing
+        there = held.things.get(thing)
+        of_skeleton = kind == ALIAS and file.alias_of(name).kind == SKELETON
+        may_skip = there is not None and (skip_identical or of_skeleton)
+        if there is not None and may_skip and there() == _content(file, thing)():
+            del plan.things[thing]  # aliases lead to what is there
             report.outcomes.append(Outcome(name, "present", 0, "the same content"))
-        elif there is None and path not in held.paths:
+        elif there is None and path_of(file, thing) not in held.paths:
             report.outcomes.append(Outcome(name, "copied", 0, ""))
         elif rename:
-            new = _free(file, held, kind, name)
-            _call(file, plan, kind, name, new)
+            new = _free(file, held, thing)
+            path = path_of(file, thing) if kind == CLIP else ""
+            plan.things[thing] = Change(new, new.removesuffix(name) + path if path else None)
             report.outcomes.append(Outcome(name, "renamed", 0, new))
         else:
             held.double.append(f"{kind} {shown(name)}")
-    _learn(file, plan, held)
+    for thing, change in plan.things.items():
+        held.things[thing[0], change.name or thing[1]] = _content(file, thing)
+        if path := path_of(file, thing, change):
+            held.paths.add(path)
     return plan
 
 
@@ -179,97 +182,46 @@ def _refuse_double(held: Held) -> None:
         )
 
 
-def _things(file: File) -> Iterator[tuple[str, str, Callable[[], object]]]:
-    """Kind, name, and what finds the content of everything that has a name."""
-    for clip in file:
-        yield CLIP, clip.name, _of_clip(clip)
-    for name in file.attachments:
-        yield ATTACHMENT, name, _of_attachment(file, name)
-    for name, (of, target) in file.aliases.items():
-        yield ALIAS, name, _of_alias(file, of, target)
+def _content(file: File, thing: Thing) -> Callable[[], object]:
+    """What finds the content of a thing, which is the same in two that can stand for each other."""
+    kind, name = thing
+    if kind == ALIAS:
+        return _of_alias(file, name)
+    return partial(_of_clip if kind == CLIP else _of_attachment, file, name)
 
 
-def _of_clip(clip: Clip) -> Callable[[], object]:
-    """What is the same in two clips of which one can stand for the other."""
-
-    def content() -> object:
-        hashes = clip.container.whole_cend(clip.container.directory.clips[clip.name])
-        digests = [hashes.source_sha256, *hashes.value_sha256]
-        path = clip.source.path if clip.source is not None else ""
-        return clip.skeleton_id, clip.frame_rate, path, dict(clip.metadata), digests
-
-    return content
+def _of_clip(file: File, name: str) -> object:
+    clip = file.clips[name]
+    hashes = clip.container.whole_cend(clip.container.directory.clips[name])
+    digests = [hashes.source_sha256, *hashes.value_sha256]
+    path = clip.source.path if clip.source is not None else ""
+    return clip.skeleton_id, clip.frame_rate, path, dict(clip.metadata), digests
 
 
-def _of_attachment(file: File, name: str) -> Callable[[], tuple[object, ...]]:
-    def content() -> tuple[object, ...]:
-        container = file.container
-        part = container.directory.attachments[name].parts[0]
-        fields = parse(payloads.Atta, container.payload(part), part.label)
-        return fields.size, bytes(fields.sha256)
-
-    return content
+def _of_attachment(file: File, name: str) -> tuple[int, bytes]:
+    part = file.container.directory.attachments[name].parts[0]
+    fields = parse(payloads.Atta, file.container.payload(part), part.label)
+    return fields.size, bytes(fields.sha256)
 
 
-def _of_alias(file: File, of: int, target: bytes) -> Callable[[], object]:
+def _of_alias(file: File, alias: str) -> Callable[[], object]:
     """The content of what an alias stands for; of a skeleton's file its id."""
-    name = target.decode("utf-8", "replace")
-    if of == payloads.OF_CLIP and name in file.clips.rows:
+    kind, name = file.alias_of(alias)
+    if kind == CLIP and name in file.clips.rows:
         source = file.clips[name].source
         return lambda: None if source is None else source.sha256
-    if of == payloads.OF_ATTACHMENT and name in file.attachments:
-        content = _of_attachment(file, name)
-        return lambda: content()[1]
-    return lambda: (of, target)
+    if kind == ATTACHMENT and name in file.attachments:
+        return lambda: _of_attachment(file, name)[1]
+    return lambda: (kind, name)
 
 
-def _may_skip(kind: str, file: File, name: str, skip_identical: bool) -> bool:
-    of_skeleton = kind == ALIAS and file.aliases[name][0] == payloads.OF_SKELETON
-    return skip_identical or of_skeleton
-
-
-def _path_of(file: File, kind: str, name: str) -> str | None:
-    return name if kind != CLIP else source_path(file, name) or None
-
-
-def _drop(plan: Plan, kind: str, name: str) -> None:
-    """Take a thing out of the plan, since the file has it: aliases lead to what is there."""
-    if kind == CLIP:
-        del plan.clips[name]
-    else:
-        del (plan.attachments if kind == ATTACHMENT else plan.aliases)[name]
-
-
-def _free(file: File, held: Held, kind: str, name: str) -> str:
+def _free(file: File, held: Held, thing: Thing) -> str:
     """A name below that of the file, that nothing has."""
+    kind, name = thing
     stem = PurePosixPath(file.name.replace("\\", "/")).stem or "file"
     folders = (stem if n == 1 else f"{stem}~{n}" for n in count(1))
     return next(
         new
         for new in (f"{folder}/{name}" for folder in folders)
-        if (kind, new) not in held.names and new not in held.paths
+        if (kind, new) not in held.things and new not in held.paths
     )
-
-
-def _call(file: File, plan: Plan, kind: str, name: str, new: str) -> None:
-    if kind == CLIP:
-        path = source_path(file, name)
-        plan.clips[name] = Change(new, new.removesuffix(name) + path if path else None)
-    elif kind == ATTACHMENT:
-        plan.attachments[name] = new
-    else:
-        plan.aliases[name] = new
-
-
-def _learn(file: File, plan: Plan, held: Held) -> None:
-    """Let ``held`` know what ``plan`` brings, by its new names."""
-    contents = {(kind, name): content for kind, name, content in _things(file)}
-    for name, change in plan.clips.items():
-        held.names[CLIP, change.name or name] = contents[CLIP, name]
-        path = change.path or _path_of(file, CLIP, name)
-        if path:
-            held.paths.add(path)
-    for kind, names in ((ATTACHMENT, plan.attachments), (ALIAS, plan.aliases)):
-        for name, new in names.items():
-            held.names[kind, new] = contents[kind, name]
-            held.paths.add(new)

@@ -6,14 +6,12 @@ it has coded. Where all joints are coded in one and a caller allows it, the clip
 
 from __future__ import annotations
 
-import builtins
 import dataclasses
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
@@ -22,19 +20,14 @@ from numpy.typing import ArrayLike
 from mcz.brief import brief
 from mcz.container import note_records, payloads
 from mcz.container.directory import SegmentRow
-from mcz.container.locks import lock
 from mcz.container.segments import GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
 from mcz.editing.anew import check_anew, settings_of, source_file
 from mcz.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
 from mcz.editing.extraction import Copier, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
-from mcz.errors import (
-    AccessError,
-    MotionError,
-    OptionError,
-    reason_of,
-)
+from mcz.editing.rewriting import disk_path, hold
+from mcz.errors import MotionError
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.quality_joints import with_indices
@@ -107,7 +100,9 @@ def replace(
     with ExitStack() as stack:
         inputs = [source.name if isinstance(source, File) else source]
         if target is None:
-            target, force, inputs = _locked(source, stack), True, []
+            target, force, inputs = disk_path(source), True, []
+            if os.name == "posix":  # elsewhere nothing can be renamed to what is open
+                hold(target, stack)
         stream = stack.enter_context(replacing_file(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)
@@ -123,21 +118,6 @@ def replace(
         editor.run(cuts, alone=False)
         check_values(stream, [chosen.name])
         return editor.replacement()
-
-
-def _locked(source: Target, stack: ExitStack) -> Path:
-    """The file that ``source`` names, taken for this process until ``stack`` ends."""
-    if not isinstance(source, (str, os.PathLike)) or "://" in str(source):
-        raise OptionError(f"{source!r} cannot be edited in place; name a target")
-    path = Path(source).resolve()
-    if os.name == "posix":  # elsewhere nothing can be renamed to what is open
-        try:
-            held = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
-        except (OSError, ValueError) as error:
-            raise AccessError(reason_of(error), path=path) from None
-        if not lock(stack.enter_context(held)):
-            raise AccessError("another process is appending to it", path=path)
-    return path
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import builtins
 import os
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -17,16 +17,19 @@ from typing import BinaryIO
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
+from mcz.container.directory import Directory
 from mcz.container.limits import Profile
 from mcz.container.locks import lock
 from mcz.container.metadata import Record
 from mcz.container.reader import Container
-from mcz.container.source import path_of
+from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
 from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
+from mcz.editing.outcomes import Report
 from mcz.editing.protecting import (
     DEFAULT,
     Protection,
+    add_recovery,
     protect_written,
     protection_of,
     redundancy_of,
@@ -39,6 +42,8 @@ from mcz.errors import (
 )
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
+from mcz.recovery import making
+from mcz.recovery.shape import check_redundancy
 from mcz.schema import parse
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
@@ -58,29 +63,38 @@ def steps(progress: Progress | None, total: int) -> Step:
     return step
 
 
+KINDS = CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"
+SKELETON = "skeleton"
+Thing = tuple[str, str]  # its kind and its name, of a skeleton its id in hex
+
+
+def things_in(held: File | Directory) -> Iterator[Thing]:
+    """All that a file has under a name, in order."""
+    names = (CLIP, held.clips), (ATTACHMENT, held.attachments), (ALIAS, held.aliases)
+    return ((kind, name) for kind, names_of in names for name in names_of)
+
+
 @dataclass(slots=True)
 class Plan:
-    """What of a file goes into a new one: names, and what they are from now on.
+    """What of a file goes into a new one.
 
-    ``clips`` are in their new order. ``shared`` goes along, needed by a clip or not. ``purges``: no
-    META is carried over, for the clips have their metadata in CLIP.
+    ``things`` are what has a name, clips in their new order, and what is said otherwise of them.
+    ``shared`` goes along, needed by a clip or not. ``purges``: no META is carried over, for the
+    clips have their metadata in CLIP.
     """
 
-    clips: dict[str, Change] = field(default_factory=dict)
-    attachments: dict[str, str] = field(default_factory=dict)
-    aliases: dict[str, str] = field(default_factory=dict)
+    things: dict[Thing, Change] = field(default_factory=dict)
     shared: list[Shared] = field(default_factory=list)
     purges: bool = False
+
+    def of(self, kind: str) -> dict[str, Change]:
+        """The things of one kind by name."""
+        return {name: change for (its, name), change in self.things.items() if its == kind}
 
 
 def whole(file: File) -> Plan:
     """All of a file, as it is."""
-    return Plan(
-        dict.fromkeys(file.clips, SAME),
-        {name: name for name in file.attachments},
-        {name: name for name in file.aliases},
-        list(file.container.directory.shared),
-    )
+    return Plan(dict.fromkeys(things_in(file), SAME), list(file.container.directory.shared))
 
 
 def used_by(file: File, names: Iterable[str]) -> set[Shared]:
@@ -120,36 +134,31 @@ def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
             carrier.skeleton(id_)
         else:
             carrier.shared(kind, id_)
-    for name, as_name in plan.attachments.items():
-        carrier.attachment(name, as_name)
-    for name, change in plan.clips.items():
+    for name, change in plan.of(ATTACHMENT).items():
+        carrier.attachment(name, change.name)
+    clips = plan.of(CLIP)
+    for name, change in clips.items():
         carrier.clip(name, change)
         step(name)
-    for alias, as_name in plan.aliases.items():
-        writer.alias(as_name, *_target(file, plan, alias))
-    names = ((name, change.name or name) for name, change in plan.clips.items())
+    for name, change in plan.of(ALIAS).items():
+        of, target = file.aliases[name]
+        renamed = plan.things.get(file.alias_of(name), SAME).name
+        writer.alias(change.name or name, of, target if renamed is None else renamed.encode())
     if plan.purges and file.metadata:
         writer.metadata([Record("", file.metadata)])
-    elif plan.clips and not plan.purges:
+    elif clips and not plan.purges:
+        names = ((name, change.name or name) for name, change in clips.items())
         writer.metadata(said_of(file.container, names))
     return carrier.left_out
 
 
-def _target(file: File, plan: Plan, alias: str) -> tuple[int, bytes]:
-    """What an alias stands for, by the name that this has from now on."""
-    of, target = file.aliases[alias]
-    name = target.decode("utf-8", "replace")
-    if of == payloads.OF_CLIP:  # one that was left out has the same name where it is already
-        return of, (plan.clips.get(name, SAME).name or name).encode()
-    if of == payloads.OF_ATTACHMENT:
-        return of, plan.attachments.get(name, name).encode()
-    return of, target
-
-
-def source_path(file: File, name: str) -> str:
-    """The path of the source of a clip; "" where it has none, or that has none."""
+def path_of(file: File, thing: Thing, change: Change = SAME) -> str:
+    """The path under which a thing is restored; "" where it is not."""
+    kind, name = thing
+    if kind != CLIP:
+        return change.name or name
     source = file.container.clip_head(file.container.directory.clips[name]).source
-    return source.path if source is not None else ""
+    return change.path or (source.path if source is not None else "")
 
 
 def writer_like(stream: BinaryIO, files: Iterable[File], copies: bool | None = None) -> Writer:
@@ -168,81 +177,104 @@ def writer_like(stream: BinaryIO, files: Iterable[File], copies: bool | None = N
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Rewriting:
+    """A file that is rewritten to ``output``, or in its own place where that is None."""
+
+    target: Target
+    output: Target | None
+    force: bool
+    file: File
+
+    def write(self, plan: Plan, report: Report, step: Step) -> None:
+        """Write what ``plan`` says; ``report`` learns the size, and what was left out."""
+        in_place = self.output is None
+        inputs = () if in_place else (self.target,)
+        path = disk_path(self.target) if self.output is None else self.output
+        with replacing_file(path, force=self.force or in_place, inputs=inputs) as stream:
+            left_out = self.written(stream, plan, step)
+            if in_place and UNPROTECTED in left_out:
+                left_out.remove(UNPROTECTED)
+                protect_written(stream, redundancy_of(self.file.container) or DEFAULT)
+            report.size = stream.tell()
+        report.left_out += left_out
+
+    def written(self, stream: BinaryIO, plan: Plan, step: Step) -> list[str]:
+        """Write what ``plan`` says to ``stream``; return what was left out."""
+        writer = writer_like(stream, [self.file])
+        left_out = carry(self.file, writer, plan, step)
+        writer.finish()
+        return left_out
+
+
 @contextmanager
-def source_of(target: Target, output: Target | None) -> Iterator[File]:
+def rewriting(
+    target: Target, output: Target | None = None, *, force: bool = False
+) -> Iterator[Rewriting]:
     """The file to be rewritten; where it is to take its own place, nobody appends meanwhile.
 
     Raises AccessError where another process is appending to it.
     """
-    if output is not None:
-        with open(target) as file:
-            yield file
-        return
+    with ExitStack() as stack:
+        if output is None:
+            hold(disk_path(target), stack)
+        yield Rewriting(target, output, force, stack.enter_context(open(target)))
+
+
+def disk_path(target: Target) -> Path:
+    """The path of a file that can be rewritten in place; raises OptionError for any other."""
     if not isinstance(target, (str, os.PathLike)) or "://" in str(target):
         raise OptionError(
-            "only a file on disk can be rewritten in place; name an output", path=path_of(target)
+            "only a file on disk can be rewritten in place; name an output", path=named_path(target)
         )
+    return Path(target).resolve()
+
+
+def hold(path: Path, stack: ExitStack) -> None:
+    """Keep others from appending to a file until ``stack`` ends; raises AccessError."""
     try:
-        stream = builtins.open(target, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
+        stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
     except (OSError, ValueError) as error:
-        raise AccessError(reason_of(error), path=target) from None
-    with stream:
-        if not lock(stream):
-            raise AccessError("another process is appending to it", path=target)
-        with open(target) as file:
-            yield file
+        raise AccessError(reason_of(error), path=path) from None
+    if not lock(stack.enter_context(stream)):
+        raise AccessError("another process is appending to it", path=path)
 
 
-def _disk_path(target: Target) -> Path:
-    """The path of a file that ``source_of`` lets be rewritten in place."""
-    assert isinstance(target, (str, os.PathLike))
-    return Path(target)
+def protect(
+    target: str | os.PathLike[str],
+    redundancy: float = DEFAULT,
+    *,
+    anew: bool = False,
+    progress: making.Step | None = None,
+) -> list[Protection]:
+    """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
 
-
-def rewrite(
-    target: Target, output: Target | None, force: bool, file: File, plan: Plan, step: Step
-) -> Written:
-    """Write what ``plan`` says of ``file`` in its own place, or to ``output``."""
-    inputs = () if output is None else (target,)
-    path = output or _disk_path(target)
-    with replacing_file(path, force=force or output is None, inputs=inputs) as stream:
-        size, left_out = _written(stream, file, plan, step)
-        if output is None and UNPROTECTED in left_out:
-            left_out = [text for text in left_out if text != UNPROTECTED]
-            protect_written(stream, redundancy_of(file.container) or DEFAULT)
-            size = stream.tell()
-    return Written(size, left_out)
-
-
-def _written(stream: BinaryIO, file: File, plan: Plan, step: Step) -> tuple[int, list[str]]:
-    """Write what ``plan`` says of ``file``; the size, and what was left out."""
-    writer = writer_like(stream, [file])
-    left_out = carry(file, writer, plan, step)
-    writer.finish()
-    return writer.offset, left_out
-
-
-def protected_anew(
-    target: Target, redundancy: float, progress: Callable[[int, int], object] | None
-) -> Protection | None:
-    """Rewrite a file with recovery data for all of it in place of those that it has.
-
-    The file has its old ones until it has the new ones. Returns None, and does nothing, where it
-    has none. Raises FormatError where more would be lost, and as ``source_of`` does.
+    ``mcz.repair`` restores every byte of it as long as no more blocks are bad than there are
+    recovery blocks, wherever they lie: single bytes, a burst, the beginning, the end. Where the
+    file has some already, what was appended since gets its own; where nothing was, nothing is
+    done. ``anew``: what it has is left out, and all of the file gets recovery data together, for
+    which it is rewritten. Returns what there is of it then, in the order of the file. Raises
+    OptionError, FormatError where rewriting would lose a chunk that nobody here knows, AccessError
+    where another process is appending, and as ``mcz.append`` for a file cut short.
     """
-    with source_of(target, None) as file:
-        if redundancy_of(file.container) is None:
+    check_redundancy(redundancy)
+    if anew and (found := _protected_anew(target, redundancy, progress)) is not None:
+        return [found]
+    return add_recovery(target, redundancy, progress)
+
+
+def _protected_anew(
+    target: Target, redundancy: float, progress: making.Step | None
+) -> Protection | None:
+    """Rewrite a file with recovery data for all of it; None, and nothing done, where it has none.
+
+    The file has its old ones until it has the new ones.
+    """
+    with rewriting(target) as job:
+        if redundancy_of(job.file.container) is None:
             return None
-        with replacing_file(_disk_path(target), force=True) as stream:
-            _, left_out = _written(stream, file, whole(file), lambda name: None)
+        with replacing_file(disk_path(target), force=True) as stream:
+            left_out = job.written(stream, whole(job.file), lambda name: None)
             if lost := [text for text in left_out if text != UNPROTECTED]:
-                raise FormatError(f"rewriting it would lose {lost[0]}", path=file.name)
+                raise FormatError(f"rewriting it would lose {lost[0]}", path=job.file.name)
             return protection_of(protect_written(stream, redundancy, progress))
-
-
-@dataclass(frozen=True, slots=True)
-class Written:
-    """The size of a new file, and what may not be carried over to it."""
-
-    size: int
-    left_out: list[str]

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from mcz.editing.archive import append
-from mcz.editing.protected import protect
+from mcz.editing.rewriting import protect
 
 
 def protected(data: bytes, redundancy: float, behind: bytes = b"") -> bytes:
