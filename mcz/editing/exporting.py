@@ -9,10 +9,10 @@ from pathlib import Path, PurePosixPath
 
 from mcz.conversion import TARGETS, converted_files, left_out, suffixes_of
 from mcz.conversion.scenes import WRITERS, to_scene
-from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.outcomes import Outcome, Report, failed
 from mcz.editing.safe_names import Folder, PortableNames
 from mcz.editing.unpacking import safe_path
-from mcz.errors import ExistsError, FormatError, MczError, OptionError, remark_of
+from mcz.errors import FormatError, MczError, OptionError
 from mcz.jobs import limited
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
@@ -22,7 +22,6 @@ from mcz.reading.sharing import shared_out
 from mcz.reading.source_options import SourceOptions
 from mcz.tables.files import EXPORTS, table_of
 from mcz.types import JsonObject, Target
-from mcz.writing.atomic import replacing
 
 Progress = Callable[[int, int, str], None]
 FORMS = (*EXPORTS, *TARGETS, *WRITERS)
@@ -68,27 +67,16 @@ def export(
                 try:
                     for own, data, notes in converted():
                         path = portable(str(safe_path(own)))
-                        _write(path, data, folder, written, target, force)
-                        size = len(data)
-                        report.outcomes.append(Outcome(path, "written", size, notes=notes))
+                        if path in written:
+                            raise FormatError(f"another clip becomes {path}, too")
+                        folder.write(path, data, target, force=force)
+                        written.add(path)
+                        report.outcomes.append(Outcome(path, "written", len(data), notes=notes))
                 except (MczError, OSError) as error:
-                    result = "exists" if isinstance(error, ExistsError) else "failed"
-                    report.outcomes.append(Outcome(name, result, 0, remark_of(error, path=name)))
+                    report.outcomes.append(failed(name, error))
                 if progress is not None:
                     progress(done + 1, len(called), name)
     return report
-
-
-def _write(
-    name: str, data: bytes, folder: Folder, written: set[str], target: Target, force: bool
-) -> None:
-    if name in written:
-        raise FormatError(f"another clip becomes {name}, too")
-    path = folder.place(name, force=force)
-    with replacing(path, force=force, inputs=(target,)) as stream:
-        stream.write(data)
-    written.add(name)
-    folder.note(name, path)
 
 
 Made = tuple[str, bytes, tuple[str, ...]]  # the name of a file, its content, what is to be said

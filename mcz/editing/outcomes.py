@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from mcz.brief import brief
+from mcz.errors import ExistsError, MczError, remark_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,12 @@ class Outcome:
     notes: tuple[str, ...] = ()
 
     __repr__ = brief
+
+
+def failed(path: str, error: MczError | OSError) -> Outcome:
+    """The outcome of a file that an error has kept from being written."""
+    result = "exists" if isinstance(error, ExistsError) else "failed"
+    return Outcome(path, result, 0, remark_of(error, path=path))
 
 
 @dataclass(slots=True)

@@ -11,6 +11,8 @@ from pathlib import Path, PurePosixPath
 
 from mcz.errors import AccessError, ExistsError, reason_of
 from mcz.hints import Hint
+from mcz.types import Target
+from mcz.writing.atomic import replacing
 
 ODD = re.compile(r'[<>:"|?*\\]')
 # Controls, what turns the direction of text, line ends and other characters that are not seen; but
@@ -159,10 +161,17 @@ class Folder:
             raise ExistsError("it exists", path=place, hint=Hint.FORCE)
         return place
 
-    def note(self, path: str, place: Path) -> None:
-        """Remember that the file ``path`` was written."""
+    def write(self, path: str, data: bytes, source: Target, *, force: bool, name: str = "") -> Path:
+        """Write the file ``path``, made of ``source``; return where it is, as ``place`` has it.
+
+        ``name`` is what it is called where another file meets it.
+        """
+        place = self.place(path, force=force)
+        with replacing(place, force=force, inputs=(source,)) as stream:
+            stream.write(data)
         if (found := _found(place)) is not None:
-            self._written[found.st_dev, found.st_ino] = path
+            self._written[found.st_dev, found.st_ino] = name or path
+        return place
 
 
 def _found(place: Path) -> os.stat_result | None:

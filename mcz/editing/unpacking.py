@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 
-from mcz.container import payloads
 from mcz.container.strict import check_path
 from mcz.editing.mtimes import set_time
-from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.outcomes import Outcome, Report, failed
+from mcz.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
 from mcz.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
-from mcz.errors import ExistsError, FormatError, MczError, OptionError, remark_of
+from mcz.errors import FormatError, MczError, OptionError
 from mcz.jobs import limited
 from mcz.reading.clip import Clip
 from mcz.reading.fidelity import RESTORED, fidelity_of
@@ -24,7 +24,6 @@ from mcz.reading.names import listed
 from mcz.reading.rate_notes import text_notes
 from mcz.reading.sharing import shared_out
 from mcz.types import Progress, Settings, Target
-from mcz.writing.atomic import replacing
 
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
 
@@ -75,7 +74,7 @@ def unpack(
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
                 if outcome.result == RESTORED:
-                    clip = file.clips[one.name] if one.kind == "clip" else None
+                    clip = file.clips[one.name] if one.kind == CLIP else None
                     time = clip.metadata.get("mtime") if mtimes and clip is not None else None
                     if mtimes and not set_time(writing.place, time):
                         timeless.append(one.path)
@@ -118,13 +117,14 @@ def files_of(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Stored
         except FormatError:  # which is that of restoring it, and no other clip's
             path = clip.name
         if path:
-            yield Stored(path, "clip", clip.name)
+            yield Stored(path, CLIP, clip.name)
     for name in file.attachments if clips is None else ():
-        yield Stored(name, "attachment", name)
-    skeletons = None if clips is None else file.skeleton_ids(clips)
-    for name, (of, target) in file.aliases.items():
-        if skeletons is None or (of == payloads.OF_SKELETON and target in skeletons):
-            yield Stored(name, "alias", name)
+        yield Stored(name, ATTACHMENT, name)
+    skeletons = None if clips is None else {id_.hex() for id_ in file.skeleton_ids(clips)}
+    for name in file.aliases:
+        kind, target = file.alias_of(name)
+        if skeletons is None or (kind == SKELETON and target in skeletons):
+            yield Stored(name, ALIAS, name)
 
 
 def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
@@ -133,35 +133,26 @@ def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
         yield one.path, partial(_restored, (file, None), one)
 
 
+def _meant(file: File, one: Stored) -> Thing:
+    """What a file is, or what the alias stands for that it is."""
+    return file.alias_of(one.name) if one.kind == ALIAS else (one.kind, one.name)
+
+
 def _restored(shared: tuple[File, object], one: Stored) -> bytes:
     """The bytes of a file; raises FormatError where they cannot be restored."""
     file, _ = shared
-    if one.kind == "alias":
-        return _of_alias(file, one.name, *file.aliases[one.name])
-    return _of_thing(file, one.kind, one.name)
-
-
-def _of_thing(file: File, kind: str, name: str) -> bytes:
-    return file.clips[name].source_bytes() if kind == "clip" else file.attachments[name].read()
-
-
-def _of_alias(file: File, name: str, of: int, target: bytes) -> bytes:
-    """What an alias stands for; raises FormatError where that is not there."""
-    if of == payloads.OF_SKELETON:
-        return file.skeleton_bytes(target)
-    called = target.decode("utf-8", "replace")
-    if called not in (file.clips if of == payloads.OF_CLIP else file.attachments):
-        raise FormatError(f"alias {name!r} names {target!r}, which is not there")
-    return _of_thing(file, "clip" if of == payloads.OF_CLIP else "attachment", called)
+    kind, name = _meant(file, one)
+    if kind == SKELETON:
+        return file.skeleton_bytes(bytes.fromhex(name))
+    if one.kind == ALIAS and name not in (file.clips if kind == CLIP else file.attachments):
+        raise FormatError(f"alias {one.name!r} names {name!r}, which is not there")
+    return file.clips[name].source_bytes() if kind == CLIP else file.attachments[name].read()
 
 
 def _fidelity(file: File, one: Stored) -> str:
     """The word for a file that was written: only of a clip it may be another than "restored"."""
-    if one.kind == "alias":
-        of, target = file.aliases[one.name]
-        clip = file.clips.get(target.decode("utf-8", "replace")) if of == payloads.OF_CLIP else None
-    else:
-        clip = file.clips[one.name] if one.kind == "clip" else None
+    kind, name = _meant(file, one)
+    clip = file.clips.get(name) if kind == CLIP else None
     return RESTORED if clip is None else fidelity_of(clip)
 
 
@@ -189,8 +180,7 @@ class _Writing:
             size, as_path = self._write(path, restore)
         except (MczError, OSError) as error:
             self.is_damaged |= isinstance(error, FormatError)
-            result = "exists" if isinstance(error, ExistsError) else "failed"
-            return Outcome(path, result, 0, remark_of(error, path=path))
+            return failed(path, error)
         return Outcome(path, RESTORED, size, "" if as_path == path else f"as {as_path}")
 
     def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:
@@ -205,11 +195,7 @@ class _Writing:
         data = restore()
         self.is_damaged = False
         self._written.add(path)
-        place = self._folder.place(as_path, force=self._force)
-        with replacing(place, force=self._force, inputs=(self._target,)) as stream:
-            stream.write(data)
-        self._folder.note(path, place)
-        self.place = place
+        self.place = self._folder.write(as_path, data, self._target, force=self._force, name=path)
         return len(data), as_path
 
 
