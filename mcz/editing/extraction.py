@@ -140,7 +140,7 @@ def extract(
             if cut.anew:
                 check_anew(cut.clip, whole=cut.joints is None)
         with replacing_file(target, force=force, inputs=(source,)) as stream:
-            copier = Copier(file, stream, progress, copies)
+            copier = Copier(Copying(file, stream, progress, copies))
             copier.run(cuts, alone=alone)
             check_values(stream, [cut.clip.name for cut in cuts if not copier.is_same(cut)])
             size = copier.writer.offset
@@ -158,18 +158,23 @@ def with_stated_rate(
     return changed, replace(held, template=template)
 
 
-class Copier(Carrier):
-    """Copies what is left of a file to ``stream``; ``copies`` None: where it has some."""
+@dataclass(frozen=True, slots=True)
+class Copying:
+    """A file and where it is copied to; ``copies`` None: where it has some."""
 
-    def __init__(
-        self,
-        file: File,
-        stream: BinaryIO,
-        progress: Progress | None,
-        copies: bool | None = None,
-    ) -> None:
-        super().__init__(file.container, writer_like(stream, [file], copies))
-        self.file, self.progress = file, progress
+    file: File
+    stream: BinaryIO
+    progress: Progress | None = None
+    copies: bool | None = None
+
+
+class Copier(Carrier):
+    """Copies what is left of a file."""
+
+    def __init__(self, copying: Copying) -> None:
+        file = copying.file
+        super().__init__(file.container, writer_like(copying.stream, [file], copying.copies))
+        self.file, self.progress = file, copying.progress
         self.clips: list[ExtractedClip] = []
         self.done = self.total = 0  # segments
 

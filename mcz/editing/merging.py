@@ -7,8 +7,8 @@ is refused, or the later one is called otherwise.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
@@ -65,23 +65,19 @@ def merge(
     """
     if not sources:
         raise OptionError("nothing to merge: name MCZ files")
-    with ExitStack() as stack:
-        files = [stack.enter_context(open(source)) for source in sources]
-        report, held = Report(), Held()
-        plans = [
-            joined(file, held, report, rename=rename, skip_identical=skip_identical)
-            for file in files
-        ]
-        _refuse_double(held)
-        with replacing_file(target, force=force, inputs=sources) as stream:
-            writer = writer_like(stream, files)
-            report.left_out += carried(list(zip(files, plans, strict=True)), writer, progress)
-            writer.finish()
-            report.size = writer.offset
-            if share := _share_of_all(files):
-                protect_written(stream, share)
-                report.size = stream.tell()
-                report.left_out = [t for t in report.left_out if not t.endswith(UNPROTECTED)]
+    merging = Merging(rename, skip_identical)
+    with (
+        merging.plans(sources) as plans,
+        replacing_file(target, force=force, inputs=sources) as stream,
+    ):
+        report, files = merging.report, [file for file, _ in plans]
+        writer = writer_like(stream, files)
+        merging.carry(plans, writer, progress)
+        writer.finish()
+        if share := _share_of_all(files):
+            protect_written(stream, share)
+            report.left_out = [t for t in report.left_out if not t.endswith(UNPROTECTED)]
+        report.size = stream.tell()
     return report
 
 
@@ -90,17 +86,6 @@ def _share_of_all(files: Sequence[File]) -> float | None:
     shares = [redundancy_of(file.container) for file in files]
     known = [share for share in shares if share is not None]
     return max(known) if len(known) == len(shares) else None
-
-
-def carried(
-    plans: Sequence[tuple[File, Plan]], writer: Writer, progress: Progress | None
-) -> list[str]:
-    """Write what the plans say of their files; return what may not be carried over."""
-    step, left_out = steps(progress, sum(len(plan.of(CLIP)) for _, plan in plans)), []
-    for file, plan in plans:
-        found = carry(file, writer, plan, step)
-        left_out += [f"{file.name}: {text}" for text in found]
-    return left_out
 
 
 def add_files(
@@ -115,71 +100,99 @@ def add_files(
 
     Raises as ``merge`` does.
     """
-    directory, report = draft.writer.directory, Report()
     # Content that was written just now is like no other: it cannot be read yet.
-    held = Held(dict.fromkeys(things_in(directory), object), set(draft.paths))
-    held.things |= {thing: _content(before, thing) for thing in things_in(before)}
-    with ExitStack() as stack:
-        files = [stack.enter_context(open(source)) for source in sources]
-        options = {"rename": rename, "skip_identical": skip_identical}
-        plans = [(file, joined(file, held, report, **options)) for file in files]
-        _refuse_double(held)
+    there: dict[Thing, Callable[[], object]] = dict.fromkeys(
+        things_in(draft.writer.directory), object
+    )
+    merging = Merging(rename, skip_identical, there)
+    merging.things |= {thing: _content(before, thing) for thing in things_in(before)}
+    merging.paths.update(draft.paths)
 
-        def kept(done: int, total: int, name: str) -> None:
-            draft.keep()
-            if progress is not None:
-                progress(done, total, name)
+    def kept(done: int, total: int, name: str) -> None:
+        draft.keep()
+        if progress is not None:
+            progress(done, total, name)
 
-        report.left_out += carried(plans, draft.writer, kept)
-    return report
+    with merging.plans(sources) as plans:
+        merging.carry(plans, draft.writer, kept)
+    return merging.report
 
 
 @dataclass(slots=True)
-class Held:
-    """What a new file holds so far: what finds whether a thing of a name is the same.
+class Merging:
+    """Files that are put into one, and what the new file holds so far.
 
-    ``things`` have what tells the content of each. ``paths`` are those of all files that it
-    restores. ``double``: what cannot be taken in.
+    ``things`` have what tells the content of each, ``paths`` are those of all files that it
+    restores. ``rename`` and ``skip_identical`` are those of ``merge``.
     """
 
+    rename: bool
+    skip_identical: bool
     things: dict[Thing, Callable[[], object]] = field(default_factory=dict)
     paths: set[str] = field(default_factory=set)
-    double: list[str] = field(default_factory=list)
+    report: Report = field(default_factory=Report)
 
+    @contextmanager
+    def plans(self, sources: Sequence[str | os.PathLike[str]]) -> Iterator[list[tuple[File, Plan]]]:
+        """The files, and what of each goes into the new one; raises OptionError as ``merge``."""
+        with ExitStack() as stack:
+            files = [stack.enter_context(open(source)) for source in sources]
+            double: list[str] = []
+            found = [(file, self._plan(file, double)) for file in files]
+            if double:
+                raise OptionError(
+                    f"{listed(double)}: {counted(len(double), 'name')} in more than one file; "
+                    "rename the later ones, or skip those of identical content"
+                )
+            yield found
 
-def joined(file: File, held: Held, report: Report, *, rename: bool, skip_identical: bool) -> Plan:
-    """What of ``file`` goes into the file that holds ``held``, which learns it."""
-    plan = whole(file)
-    for thing in list(plan.things):
+    def _plan(self, file: File, double: list[str]) -> Plan:
+        """What of ``file`` goes into the new file; ``double`` learns what cannot."""
+        plan = whole(file)
+        for thing in list(plan.things):
+            kind, name = thing
+            there = self.things.get(thing)
+            of_skeleton = kind == ALIAS and file.alias_of(name).kind == SKELETON
+            may_skip = there is not None and (self.skip_identical or of_skeleton)
+            new = ""
+            if there is not None and may_skip and there() == _content(file, thing)():
+                del plan.things[thing]  # aliases lead to what is there
+                new, result = "the same content", "present"
+            elif there is None and path_of(file, thing) not in self.paths:
+                result = "copied"
+            elif self.rename:
+                new, result = self._free(file, thing), "renamed"
+                path = path_of(file, thing) if kind == CLIP else ""
+                plan.things[thing] = Change(new, new.removesuffix(name) + path if path else None)
+            else:
+                double.append(f"{kind} {shown(name)}")
+                continue
+            self.report.outcomes.append(Outcome(name, result, 0, new))
+        for thing, change in plan.things.items():
+            self.things[thing[0], change.name or thing[1]] = _content(file, thing)
+            if path := path_of(file, thing, change):
+                self.paths.add(path)
+        return plan
+
+    def _free(self, file: File, thing: Thing) -> str:
+        """A name below that of the file, that nothing has."""
         kind, name = thing
-        there = held.things.get(thing)
-        of_skeleton = kind == ALIAS and file.alias_of(name).kind == SKELETON
-        may_skip = there is not None and (skip_identical or of_skeleton)
-        if there is not None and may_skip and there() == _content(file, thing)():
-            del plan.things[thing]  # aliases lead to what is there
-            report.outcomes.append(Outcome(name, "present", 0, "the same content"))
-        elif there is None and path_of(file, thing) not in held.paths:
-            report.outcomes.append(Outcome(name, "copied", 0, ""))
-        elif rename:
-            new = _free(file, held, thing)
-            path = path_of(file, thing) if kind == CLIP else ""
-            plan.things[thing] = Change(new, new.removesuffix(name) + path if path else None)
-            report.outcomes.append(Outcome(name, "renamed", 0, new))
-        else:
-            held.double.append(f"{kind} {shown(name)}")
-    for thing, change in plan.things.items():
-        held.things[thing[0], change.name or thing[1]] = _content(file, thing)
-        if path := path_of(file, thing, change):
-            held.paths.add(path)
-    return plan
-
-
-def _refuse_double(held: Held) -> None:
-    if held.double:
-        raise OptionError(
-            f"{listed(held.double)}: {counted(len(held.double), 'name')} in more than one file; "
-            "rename the later ones, or skip those of identical content"
+        stem = PurePosixPath(file.name.replace("\\", "/")).stem or "file"
+        folders = (stem if n == 1 else f"{stem}~{n}" for n in count(1))
+        return next(
+            new
+            for new in (f"{folder}/{name}" for folder in folders)
+            if (kind, new) not in self.things and new not in self.paths
         )
+
+    def carry(
+        self, plans: Sequence[tuple[File, Plan]], writer: Writer, progress: Progress | None
+    ) -> None:
+        """Write what the plans say of their files."""
+        step = steps(progress, sum(len(plan.of(CLIP)) for _, plan in plans))
+        for file, plan in plans:
+            left_out = carry(file, writer, plan, step)
+            self.report.left_out += [f"{file.name}: {text}" for text in left_out]
 
 
 def _content(file: File, thing: Thing) -> Callable[[], object]:
@@ -213,15 +226,3 @@ def _of_alias(file: File, alias: str) -> Callable[[], object]:
     if kind == ATTACHMENT and name in file.attachments:
         return lambda: _of_attachment(file, name)[1]
     return lambda: (kind, name)
-
-
-def _free(file: File, held: Held, thing: Thing) -> str:
-    """A name below that of the file, that nothing has."""
-    kind, name = thing
-    stem = PurePosixPath(file.name.replace("\\", "/")).stem or "file"
-    folders = (stem if n == 1 else f"{stem}~{n}" for n in count(1))
-    return next(
-        new
-        for new in (f"{folder}/{name}" for folder in folders)
-        if (kind, new) not in held.things and new not in held.paths
-    )

@@ -12,7 +12,6 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +23,7 @@ from mcz.container.segments import GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
 from mcz.editing.anew import check_anew, settings_of, source_file
 from mcz.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
-from mcz.editing.extraction import Copier, with_stated_rate
+from mcz.editing.extraction import Copier, Copying, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.editing.rewriting import disk_path, hold
 from mcz.errors import MotionError
@@ -106,14 +105,15 @@ def replace(
         stream = stack.enter_context(replacing_file(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)
+        copying = Copying(file, stream, progress, copies)
         editor: _Editor
         if recode and is_coded_with_others(chosen, joint):
             check_anew(chosen)
             edited = edit(chosen, joint, values, on_grid)
-            editor = _AnewEditor(file, stream, progress, copies, chosen, edited)
+            editor = _AnewEditor(copying, chosen, edited)
         else:
             recoded = recode_joint(chosen, joint, values, on_grid)
-            editor = _StreamEditor(file, stream, progress, copies, chosen, recoded)
+            editor = _StreamEditor(copying, chosen, recoded)
         cuts = [plan_cut(one, None, None, 0) for one in file.clips.values()]
         editor.run(cuts, alone=False)
         check_values(stream, [chosen.name])
@@ -142,15 +142,8 @@ class _Editor(Copier):
     others: tuple[int, ...] = ()
     anew = False
 
-    def __init__(
-        self,
-        file: File,
-        stream: BinaryIO,
-        progress: Progress | None,
-        copies: bool | None,
-        clip: Clip,
-    ) -> None:
-        super().__init__(file, stream, progress, copies)
+    def __init__(self, copying: Copying, clip: Clip) -> None:
+        super().__init__(copying)
         self.edited = clip
         self.before, self.after = _Sizes(), _Sizes()
         self.max_error = self.others_error = 0.0
@@ -181,16 +174,8 @@ class _Editor(Copier):
 class _StreamEditor(_Editor):
     """Puts the streams of the joint in the place of those that the clip has."""
 
-    def __init__(
-        self,
-        file: File,
-        stream: BinaryIO,
-        progress: Progress | None,
-        copies: bool | None,
-        clip: Clip,
-        recoded: Recoded,
-    ) -> None:
-        super().__init__(file, stream, progress, copies, clip)
+    def __init__(self, copying: Copying, clip: Clip, recoded: Recoded) -> None:
+        super().__init__(copying, clip)
         self.recoded, self.joint, self.others = recoded, recoded.joint, recoded.others
         self.before, self.after = _Sizes(recoded.size_before), _Sizes(recoded.size)
         self.max_error = recoded.max_error
@@ -262,16 +247,8 @@ class _AnewEditor(_Editor):
 
     anew = True
 
-    def __init__(
-        self,
-        file: File,
-        stream: BinaryIO,
-        progress: Progress | None,
-        copies: bool | None,
-        clip: Clip,
-        edit: Edited,
-    ) -> None:
-        super().__init__(file, stream, progress, copies, clip)
+    def __init__(self, copying: Copying, clip: Clip, edit: Edited) -> None:
+        super().__init__(copying, clip)
         self.edit, self.joint = edit, edit.joint
 
     def write(self, cut: ClipCut) -> None:

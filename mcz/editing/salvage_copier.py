@@ -11,22 +11,19 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
-from typing import BinaryIO
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
 from mcz.container.packed import parse_skel
 from mcz.editing.cutting import ClipCut, note_source
-from mcz.editing.extraction import Copier
+from mcz.editing.extraction import Copier, Copying
 from mcz.editing.recovering import Recovery
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
-from mcz.reading.file import File
 from mcz.reading.quick_check import Problem
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build
-from mcz.types import Progress
 
 Run = tuple[int, int]  # frames a <= f < b
 NOTE = "lost: the template of the source file was damaged"
@@ -107,15 +104,8 @@ class WholeRun(ClipCut):
 class Repairer(Copier):
     """Copies what is whole, and of everything else says that it is lost."""
 
-    def __init__(
-        self,
-        file: File,
-        stream: BinaryIO,
-        progress: Progress | None,
-        found: Repair,
-        degrees: Mapping[str, int],
-    ) -> None:
-        super().__init__(file, stream, progress)
+    def __init__(self, copying: Copying, found: Repair, degrees: Mapping[str, int]) -> None:
+        super().__init__(copying)
         self.repair, self.degrees = found, degrees
         self._skeletons: dict[bytes, bytes] = {}  # the id that each has now
 

@@ -19,6 +19,7 @@ from mcz.container.reader import Container
 from mcz.container.source import ByteSource
 from mcz.editing.carrying import UNPROTECTED
 from mcz.editing.cutting import ClipCut, plan_cut
+from mcz.editing.extraction import Copying
 from mcz.editing.salvage_copier import (
     FULL,
     NOTHING,
@@ -57,7 +58,7 @@ def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress 
     damage, degrees = [*found.damage, *file.damage], dict[str, int]()
     while True:
         attempt = Repair(damage=list(damage), recovery=found.recovery)
-        repairer = Repairer(file, stream, progress, attempt, degrees)
+        repairer = Repairer(Copying(file, stream, progress), attempt, degrees)
         cuts = list(_cuts(file, attempt))
         attempt.lost += _gone(file.container)
         repairer.run(cuts, alone=False)

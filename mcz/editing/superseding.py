@@ -6,7 +6,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from mcz.container.metadata_keys import SAID
@@ -35,13 +35,9 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
     if not old:
         yield target
         return
-    handle, name = tempfile.mkstemp(
-        prefix=f".{target.name[:48]}.", suffix=".part", dir=target.parent
-    )
-    os.close(handle)
-    copy = Path(name)
-    try:
-        delete_clips(target, old, output=copy, force=True)
+    with tempfile.TemporaryDirectory(prefix=f".{target.name[:48]}.", dir=target.parent) as folder:
+        copy = Path(folder, target.name)
+        delete_clips(target, old, output=copy)
         yield copy
         with open(copy) as file:
             by_path = {clip.source.path: clip.name for clip in file.clips.values() if clip.source}
@@ -52,9 +48,6 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
             set_metadata(copy, changes)
         os.chmod(copy, target.stat().st_mode)
         os.replace(copy, target)
-    finally:
-        with suppress(FileNotFoundError):
-            copy.unlink()
 
 
 def _old(file: File, named: Named) -> tuple[list[str], Said]:
