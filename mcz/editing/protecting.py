@@ -114,22 +114,15 @@ def write_recovery(
     directory, end = container.directory, container.directory.end
     shape, tail = _settled(directory, start, end, redundancy)
 
-    def read(block: int) -> bytes:
-        data = b"".join(_piece(container.source, tail, shape, *p) for p in shape.pieces(block))
-        return data.ljust(shape.block_size, b"\0")
+    def read(offset: int, size: int) -> bytes:
+        behind = offset - shape.stop + len(tail)
+        return container.source.read(offset, size) if behind < 0 else tail[behind : behind + size]
 
-    _, packets = made(shape, read, step)
+    _, packets = made(shape, lambda block: shape.block(block, read), step)
     for data in chunk_bytes(shape, packets):
         added.write(data)
     added.write(tail)
     return shape
-
-
-def _piece(source: ByteSource, tail: bytes, shape: Shape, offset: int, size: int) -> bytes:
-    behind = shape.chunk_offset + shape.chunk_size
-    if offset >= behind:
-        return tail[offset - behind : offset - behind + size]
-    return source.read(offset, size)
 
 
 def chunk_bytes(shape: Shape, packets: Iterator[bytes]) -> Iterator[bytes]:

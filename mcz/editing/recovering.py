@@ -6,7 +6,7 @@ were found say that bytes were inserted or cut off before them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain as chain_from
@@ -21,10 +21,8 @@ from mcz.editing.protecting import chunk_bytes
 from mcz.errors import FormatError
 from mcz.indexing import merged_ranges
 from mcz.reading.file import reached
-from mcz.recovery import making
-from mcz.recovery.code import LANE, encoded, recovered, runs_of
-from mcz.recovery.field import Ints
-from mcz.recovery.making import Step, made
+from mcz.recovery.code import LANE, encoded, recovered
+from mcz.recovery.making import Step, computed, made
 from mcz.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
 from mcz.recovery.shape import HASH, Shape
 from mcz.types import Progress, Target
@@ -232,53 +230,33 @@ class Restorer:
         shape = one.shape
         lost = [block for block in range(shape.n_blocks) if block not in there]
         rows = sorted(one.blocks)[: len(lost)]
-        lanes = shape.block_size // LANE
-        width = max(1, making.AT_ONCE // (runs_of(shape.n_recovery) * LANE))
-        for start in range(0, lanes if lost else 0, width):
-            stop = min(start + width, lanes)
-            read = self._columns(shape, there, start, stop)
-            rest = encoded(read, shape.n_blocks, shape.n_recovery, stop - start)[rows]
+
+        def read(block: int) -> bytes:
+            data = _read(self.source, shape.pieces(block), there[block]) if block in there else b""
+            return (data or b"").ljust(shape.block_size, b"\0")
+
+        for start, whole in computed(shape, read, self.step) if lost else ():
+            rest = whole[rows]
             for at, row in enumerate(rows):
                 place = one.blocks[row] + LANE * start
-                rest[at] ^= np.frombuffer(self.source.read(place, LANE * (stop - start)), "<i8")
+                rest[at] ^= np.frombuffer(self.source.read(place, rest[at].nbytes), "<i8")
             found = recovered(rest, lost, rows, shape.n_recovery).astype("<i8")
             for at, block in enumerate(lost):
                 self._write(shape, block, found[at].tobytes(), LANE * start)
-
-    def _columns(
-        self, shape: Shape, there: dict[int, tuple[int, ...]], start: int, stop: int
-    ) -> Callable[[int, int], Ints]:
-        """What reads some lanes of the blocks that are there; those that are not are zeros."""
-
-        def read(first: int, last: int) -> Ints:
-            found = np.zeros((last - first, stop - start), np.int64)
-            for block in range(first, last):
-                if block in there:
-                    data = _read(self.source, shape.pieces(block), there[block]) or b""
-                    padded = memoryview(data.ljust(shape.block_size, b"\0"))
-                    found[block - first] = np.frombuffer(padded[LANE * start : LANE * stop], "<i8")
-                if self.step is not None:
-                    self.step(block, shape.n_blocks)
-            return found
-
-        return read
 
     def _recv(self, one: _Set) -> None:
         """The RECV chunk, made anew of what was written around it; raises NotThatError."""
         shape = one.shape
 
-        def read(block: int) -> bytes:
-            parts = []
-            for offset, size in shape.pieces(block):
-                self.out.seek(offset)
-                parts.append(self.out.read(size))
-            return b"".join(parts).ljust(shape.block_size, b"\0")
+        def read(offset: int, size: int) -> bytes:
+            self.out.seek(offset)
+            return self.out.read(size)
 
-        key, packets = made(shape, read, self.step)
+        key, packets = made(shape, lambda block: shape.block(block, read), self.step)
         if key != one.key:
             raise NotThatError("what recovery data give is not what they were made of")
         at = shape.chunk_offset
-        for data in chunk_bytes(shape, packets):
+        for data in chunk_bytes(shape, packets):  # which reads meanwhile
             self.out.seek(at)
             self.out.write(data)
             at += len(data)

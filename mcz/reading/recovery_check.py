@@ -12,7 +12,6 @@ from mcz.errors import FormatError, MczError, remark_of
 from mcz.reading.quick_check import Problem
 from mcz.recovery.making import made
 from mcz.recovery.packets import read_packet
-from mcz.recovery.shape import Shape
 
 
 def recovery_chunks(container: Container) -> list[Chunk]:
@@ -41,7 +40,7 @@ def _checked(source: ByteSource, chunk: Chunk) -> str:
         raise FormatError(
             f"it is about {shape}, not what is around it", where=f"chunk {chunk.label}"
         )
-    _, packets = made(shape, lambda block: stored_block(source, shape, block))
+    _, packets = made(shape, lambda block: shape.block(block, source.read))
     at = chunk.payload_offset
     for packet in packets:
         if source.read(at, len(packet)) != packet:
@@ -50,9 +49,3 @@ def _checked(source: ByteSource, chunk: Chunk) -> str:
             )
         at += len(packet)
     return f"bytes {shape.start} to {shape.stop}"
-
-
-def stored_block(source: ByteSource, shape: Shape, block: int) -> bytes:
-    """A data block as it stands in the file."""
-    data = b"".join(source.read(offset, size) for offset, size in shape.pieces(block))
-    return data.ljust(shape.block_size, b"\0")

@@ -63,9 +63,10 @@ def _recovery_blocks(shape: Shape, read: READ, step: Step | None) -> Iterator[RE
         try:
             spool = BytesIO() if total <= IN_MEMORY else tempfile.TemporaryFile()  # noqa: SIM115
             stack.callback(_close, spool)
-            for index, lane, data in _columns(shape, read, step):
-                spool.seek(index * shape.block_size + LANE * lane)
-                spool.write(data)
+            for lane, found in computed(shape, read, step):
+                for index, part in enumerate(found):
+                    spool.seek(index * shape.block_size + LANE * lane)
+                    spool.write(part.tobytes())
             spool.flush()
         except OSError as error:
             raise AccessError(
@@ -86,16 +87,14 @@ def _close(spool: BinaryIO) -> None:
         spool.close()
 
 
-def _columns(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int, int, bytes]]:
-    """Number, first lane and bytes of parts of the recovery blocks."""
+def computed(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int, Ints]]:
+    """Lanes of all recovery blocks, of large ones some at a time, and the first of them."""
     lanes = shape.block_size // LANE
     width = max(1, min(lanes, AT_ONCE // (runs_of(shape.n_recovery) * LANE)))
     for start in range(0, lanes, width):
         stop = min(start + width, lanes)
         rows = _rows(shape, read, start, stop, step)
-        found = encoded(rows, shape.n_blocks, shape.n_recovery, stop - start)
-        for index, part in enumerate(found):
-            yield index, start, part.tobytes()
+        yield start, encoded(rows, shape.n_blocks, shape.n_recovery, stop - start)
 
 
 def _rows(

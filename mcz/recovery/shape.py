@@ -6,7 +6,7 @@ they are the *stream*, cut into blocks.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import ceil, isqrt
 
@@ -111,6 +111,11 @@ class Shape:
             own = max(first, self.a_size)
             found.append((behind + own, stop - own))
         return found
+
+    def block(self, number: int, read: Callable[[int, int], bytes]) -> bytes:
+        """A data block and its padding; ``read`` gives bytes of the file by offset and size."""
+        data = b"".join(read(offset, size) for offset, size in self.pieces(number))
+        return data.ljust(self.block_size, b"\0")
 
 
 def check_redundancy(redundancy: float) -> None:
