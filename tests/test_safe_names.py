@@ -193,13 +193,14 @@ def test_a_disk_that_folds_names_loses_nothing(
 ) -> None:
     """Here the disk is made to: the second name leads to the file of the first."""
     archive, out = packed(tmp_path, "NOTES.TXT", "notes.txt"), tmp_path / "out"
-    note = safe_names.Folder.note
+    write = safe_names.Folder.write
 
-    def folding(self: safe_names.Folder, path: str, place: Path) -> None:
-        note(self, path, place)
+    def folding(self: safe_names.Folder, path: str, data: bytes, *more, **options) -> Path:
+        place = write(self, path, data, *more, **options)
         os.link(place, out / "notes.txt")
+        return place
 
-    monkeypatch.setattr(safe_names.Folder, "note", folding)
+    monkeypatch.setattr(safe_names.Folder, "write", folding)
     report = mcz.unpack(archive, out, force=force)
     assert [o.path for o in report.failures] == ["notes.txt"]
     assert "names='portable' keeps both" in report.failures[0].message
