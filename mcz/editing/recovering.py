@@ -6,11 +6,10 @@ were found say that bytes were inserted or cut off before them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain as chain_from
-from itertools import takewhile
+from itertools import product, takewhile
 from typing import BinaryIO
 
 import numpy as np
@@ -142,12 +141,13 @@ def _examined(source: ByteSource, one: _Set) -> Examined:
     shape = one.shape
     table = _table(one)
     there: dict[int, tuple[int, ...]] = {}
-    shifts = list(dict.fromkeys([0, *one.shifts]))
+    shifts = [0, *one.shifts]
     hint = 0
     for block in range(shape.n_blocks):
         pieces = shape.pieces(block)
         wanted = None if table is None else table[HASH * block : HASH * (block + 1)]
-        for tried in _tries(hint, shifts, len(pieces)):
+        order = dict.fromkeys([hint, *shifts])
+        for tried in product(order, repeat=len(pieces)):
             data = _read(source, pieces, tried)
             if data is None:
                 continue
@@ -157,14 +157,6 @@ def _examined(source: ByteSource, one: _Set) -> Examined:
                 hint = tried[0]
                 break
     return Examined(one, there)
-
-
-def _tries(hint: int, shifts: list[int], n_pieces: int) -> Iterator[tuple[int, ...]]:
-    order = list(dict.fromkeys([hint, *shifts]))
-    if n_pieces == 1:
-        yield from ((shift,) for shift in order)
-    else:
-        yield from ((one, other) for one in order for other in order)
 
 
 def _read(
