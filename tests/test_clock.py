@@ -17,6 +17,7 @@ import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.clock import Timeline
 from mcz.tables.events import EVENT_EXPORTS
+from tests.clocked_files import motive, npz, sto, trc, vicon
 from tests.commands import run
 from tests.formats.c3d_files import Made
 
@@ -79,18 +80,8 @@ def test_samples_lie_evenly_from_each_frame_on() -> None:
         mcz.times(motion, signal="forces")
 
 
-TRC = """PathFileType\t4\t(X/Y/Z)\tw.trc
-DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames
-{rate}\t{rate}\t{n}\t1\tmm\t{rate}\t1\t{n}
-Frame#\tTime\tA\t\t
-\t\tX1\tY1\tZ1
-
-{rows}"""
-
-
-def trc(path: Path, numbers: list[int], rate: int = 120, digits: int = 3) -> Motion:
-    rows = "".join(f"{n}\t{(n - 1) / rate:.{digits}f}\t1.0\t2.0\t{n}.0\n" for n in numbers)
-    path.write_text(TRC.format(rate=rate, n=len(numbers), rows=rows))
+def table(path: Path, numbers: list[int], rate: int = 120, digits: int = 3) -> Motion:
+    path.write_bytes(trc(numbers, rate, digits, rate))
     return mcz.read(path)
 
 
@@ -99,7 +90,7 @@ NUMBERS = [*range(124, 140), *range(170, 180)]
 
 @pytest.mark.parametrize("digits", [3, 4, 6])
 def test_a_table_has_the_times_that_it_rounds(tmp_path: Path, digits: int) -> None:
-    motion = trc(tmp_path / "w.trc", NUMBERS, digits=digits)
+    motion = table(tmp_path / "w.trc", NUMBERS, digits=digits)
     meant = (np.array(NUMBERS) - 1) / 120
     assert motion.frame_rate == 120 and motion.first_time is None
     near(motion.times, meant)
@@ -111,9 +102,8 @@ def test_a_table_has_the_times_that_it_rounds(tmp_path: Path, digits: int) -> No
 
 def test_a_table_that_begins_late_has_a_first_time(tmp_path: Path) -> None:
     path = tmp_path / "w.trc"
-    rows = "".join(f"{n}\t{5 + (n - 1) / 120:.3f}\t1.0\t2.0\t{n}.0\n" for n in (1, 2, 3, 7, 8, 9))
-    path.write_text(TRC.format(rate=120, n=6, rows=rows))
     meant = 5 + np.array([0, 1, 2, 6, 7, 8]) / 120
+    path.write_bytes(trc((1, 2, 3, 7, 8, 9), 120, times=meant))
     motion = mcz.read(path)
     assert motion.first_time == 5
     near(motion[3:].first_time, 5.05)
@@ -142,8 +132,7 @@ def test_a_rate_that_is_set_moves_the_first_time() -> None:
 
 
 def test_numbers_that_skip_while_times_do_not_have_a_signal(tmp_path: Path) -> None:
-    rows = "".join(f"{2 * n + 1}\t{n / 50:.2f}\t1.0\t2.0\t{n}.0\n" for n in range(9))
-    (tmp_path / "w.trc").write_text(TRC.format(rate=50, n=9, rows=rows))
+    (tmp_path / "w.trc").write_bytes(trc(range(1, 19, 2), 50, times=np.arange(9) / 50))
     motion = mcz.read(tmp_path / "w.trc")
     assert motion.frame_rate == 50 and motion.frame_numbers is not None
     assert [signal.role for signal in motion.signals[1:]] == ["times"]
@@ -154,9 +143,8 @@ def test_numbers_that_skip_while_times_do_not_have_a_signal(tmp_path: Path) -> N
 def test_numbers_that_do_not_ascend_come_back_with_their_source(
     tmp_path: Path, numbers: list[int]
 ) -> None:
-    rows = "".join(f"{n}\t{k / 50:.2f}\t1.0\t2.0\t{k}.0\n" for k, n in enumerate(numbers))
     path = tmp_path / "w.trc"
-    path.write_text(TRC.format(rate=50, n=4, rows=rows))
+    path.write_bytes(trc(numbers, 50, times=np.arange(4) / 50))
     mcz.encode(path, tmp_path / "w.mcz")
     with mcz.open(tmp_path / "w.mcz") as file:
         clip = file.only_clip()
@@ -168,11 +156,11 @@ def test_numbers_that_do_not_ascend_come_back_with_their_source(
 
 
 def test_the_clock_outlives_the_source(tmp_path: Path) -> None:
-    motion = trc(tmp_path / "w.trc", NUMBERS, digits=6)
+    motion = table(tmp_path / "w.trc", NUMBERS, digits=6)
     for made in (
         motion.without_source(),
-        mcz.select(motion, ["A"]),
-        mcz.rename(motion, {"A": "B"}),
+        mcz.select(motion, ["RASI"]),
+        mcz.rename(motion, {"RASI": "B"}),
         mcz.convert(motion, "c3d"),
         mcz.post_filter(motion),
         stored(motion.without_source()),
@@ -182,7 +170,7 @@ def test_the_clock_outlives_the_source(tmp_path: Path) -> None:
 
 
 def test_a_decimated_clip_keeps_its_times(tmp_path: Path) -> None:
-    trc(tmp_path / "w.trc", list(range(125, 190)), digits=6)
+    table(tmp_path / "w.trc", list(range(125, 190)), digits=6)
     out = tmp_path / "w.mcz"
     mcz.encode(tmp_path / "w.trc", out, codec="dwt")
     with mcz.open(out) as file:
@@ -235,8 +223,8 @@ def test_speeds_by_irregular_times_are_exact_for_parabolas() -> None:
 
 
 def test_rounded_times_do_not_shake_speeds(tmp_path: Path) -> None:
-    motion = trc(tmp_path / "w.trc", NUMBERS, digits=3)  # z moves 120 mm a second
-    np.testing.assert_allclose(mcz.velocities(motion)[:, 0, 2], 120, rtol=1e-9)
+    motion = table(tmp_path / "w.trc", NUMBERS, digits=3)  # x moves 120 mm a second
+    np.testing.assert_allclose(mcz.velocities(motion)[:, 0, 0], 120, rtol=1e-9)
 
 
 @pytest.mark.parametrize("rate", [200, 100, 50, 30])
@@ -357,6 +345,7 @@ class Case:
 
 FIRST = [*range(124, 134), *range(160, 165)]  # frame numbers
 STATED = [(number - 1) / 100 for number in FIRST]
+FROM_0 = [number / 100 for number in FIRST]
 
 
 def c3d_case() -> Case:
@@ -372,44 +361,10 @@ def c3d_case() -> Case:
     return Case("a.c3d", made.build(), times, (1.30,), 4)
 
 
-def trc_case() -> Case:
-    rows = "".join(f"{n}\t{(n - 1) / 100:.2f}\t{n}.0\t2.0\t3.0\n" for n in FIRST)
-    return Case("a.trc", TRC.format(rate=100, n=15, rows=rows).encode(), STATED)
-
-
-def storage_case(suffix: str) -> Case:
-    rows = "".join(f"{t:.3f}\t{k}.5\n" for k, t in enumerate(STATED))
-    head = "a\nversion=1\nnRows=15\nnColumns=2\ninDegrees=no\nendheader\ntime\tpelvis_tilt\n"
-    return Case(f"a.{suffix}", (head + rows).encode(), STATED)
-
-
-def motive_case() -> Case:
-    head = (
-        "Format Version,1.23,Take Name,a,Capture Frame Rate,100.000000,Export Frame Rate,100.000000"
-        ",Total Exported Frames,15,Rotation Type,Quaternion,Length Units,Meters"
-        ",Coordinate Space,Global\n\n,Type,Marker,Marker,Marker\n,Name,a,a,a\n,ID,1,1,1\n"
-        ",,Position,Position,Position\nFrame,Time (Seconds),X,Y,Z\n"
-    )
-    rows = "".join(f"{n},{n / 100:.6f},{n}.000000,1.000000,2.000000\n" for n in FIRST)
-    return Case("a.csv", (head + rows).encode(), [n / 100 for n in FIRST])
-
-
-def vicon_case() -> Case:
-    rows = "".join(f"{n},0,{n}.5,0.5,1.5\n" for n in FIRST)
-    head = "Trajectories\n100\n,,s:A,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n"
-    return Case("a.csv", (head + rows).encode(), STATED)
-
-
 def csv_case(unit: str, per_second: int) -> Case:
     digits = 2 if per_second == 1 else 0
     rows = "".join(f"{n},{(n - 1) / 100 * per_second:.{digits}f},{n}.5\n" for n in FIRST)
     return Case("a.csv", f"frame,time ({unit}),a\n{rows}".encode(), STATED)
-
-
-def npz_case() -> Case:
-    out = io.BytesIO()
-    np.savez(out, positions=np.zeros((15, 2, 3)), time=np.array(STATED))
-    return Case("a.npz", out.getvalue(), STATED)
 
 
 def bvh_case() -> Case:
@@ -428,16 +383,16 @@ def amc_case() -> Case:
 
 CASES = {
     "c3d": c3d_case(),
-    "trc": trc_case(),
-    "mot": storage_case("mot"),
-    "sto": storage_case("sto"),
-    "motive": motive_case(),
-    "vicon": vicon_case(),
+    "trc": Case("a.trc", trc(FIRST), STATED),
+    "mot": Case("a.mot", sto(FIRST), STATED),
+    "sto": Case("a.sto", sto(FIRST), STATED),
+    "motive": Case("a.csv", motive(FIRST), FROM_0),
+    "vicon": Case("a.csv", vicon(FIRST), STATED),
     "csv s": csv_case("s", 1),
     "csv ms": csv_case("ms", 1000),
     "csv us": csv_case("us", 10**6),
     "csv ns": csv_case("ns", 10**9),
-    "npz": npz_case(),
+    "npz": Case("a.npz", npz(FIRST), FROM_0),
     "bvh": bvh_case(),
     "amc": amc_case(),
 }

@@ -18,6 +18,7 @@ import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton, left_out
 from mcz.formats import FORMATS
 from mcz.sample import bvh_walk
+from tests.clocked_files import motive, trc
 from tests.commands import Call
 from tests.glb import Glb
 
@@ -84,14 +85,7 @@ def test_times_that_were_rounded_are_printed_as_meant(
     rate: str, places: int, to: str, tmp_path: Path
 ) -> None:
     times = np.round((GAP - 1) / float(rate), places)
-    rows = zip(GAP, times, strict=True)
-    text = (
-        "PathFileType\t4\t(X/Y/Z)\tin.trc\n"
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
-        f"{rate}\t{rate}\t{len(GAP)}\t1\tmm\nFrame#\tTime\tA\n\t\tX1\tY1\tZ1\n\n"
-        + "".join(f"{n}\t{time:.{places}f}\t{n}.5\t1.0\t2.0\n" for n, time in rows)
-    )
-    (tmp_path / "a.trc").write_text(text)
+    (tmp_path / "a.trc").write_bytes(trc(GAP, rate, places, times=times))
     motion = mcz.read(tmp_path / "a.trc")
     meant = (GAP - 1) / float(rate)
     assert np.abs(motion.times - meant).max() < 1e-9
@@ -133,12 +127,7 @@ def test_times_without_a_rate_are_lost_in_a_c3d() -> None:
 
 
 def test_numbers_that_count_from_0_begin_a_c3d_at_their_time(tmp_path: Path) -> None:
-    rows = "".join(f"{n},{n / 100:g},{n}.5,1,2\n" for n in range(100, 110))
-    (tmp_path / "a.csv").write_text(
-        "Format Version,1.23,Take Name,a,Capture Frame Rate,100.000000,Export Frame Rate,"
-        "100.000000,Length Units,Meters\n\n,Type,Marker,Marker,Marker\n,Name,m,m,m\n,ID,1,1,1\n"
-        f",,Position,Position,Position\nFrame,Time (Seconds),X,Y,Z\n{rows}"
-    )
+    (tmp_path / "a.csv").write_bytes(motive(range(100, 110)))
     motion = mcz.read(tmp_path / "a.csv")
     made = again(motion, "c3d", tmp_path)
     assert made.frame_numbers is not None

@@ -15,7 +15,7 @@ from mcz.container.source import open_source
 from tests.repair import use
 from tools.fuzz import __main__ as command
 from tools.fuzz import differential, files, guard, readers
-from tools.fuzz.guard import BrokenError, HangError, Record, hold
+from tools.fuzz.guard import BrokenError, HangError, Record
 from tools.fuzz.mutation import STEPS, WEIGHTS, Mutation, plain_change
 from tools.fuzz.repair import joined, pieces_of, table_of, with_hashes, with_header, with_streams
 from tools.fuzz.seeds import VECTORS
@@ -188,12 +188,6 @@ def test_memory_is_limited() -> None:
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout == "limited\n"
-
-
-def test_hold() -> None:
-    hold(True, "fine")
-    with pytest.raises(BrokenError, match="not so"):
-        hold(False, "not so")
 
 
 def test_command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -18,49 +17,10 @@ from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.formats import FORMATS
 from mcz.sample import sample_files
+from tests.clocked_files import csv, motive, npz, sto, trc, vicon
 from tests.formats.c3d_files import Made
 
 GAP = (*range(124, 127), *range(130, 136))  # numbers of frames: 127 to 129 are missing
-
-
-def trc(numbers: tuple[int, ...], rate: str = "100.00", places: int = 3, hz: float = 100) -> bytes:
-    rows = "".join(f"{n}\t{(n - 1) / hz:.{places}f}\t{n}.5\t7\t14\n" for n in numbers)
-    return (
-        "PathFileType\t4\t(X/Y/Z)\tin.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
-        f"{rate}\t{rate}\t{len(numbers)}\t1\tmm\nFrame#\tTime\tRASI\n\t\tX1\tY1\tZ1\n\n{rows}"
-    ).encode()
-
-
-def sto(numbers: tuple[int, ...], header: str = "", places: int = 3, hz: float = 100) -> bytes:
-    rows = "".join(f"{(n - 1) / hz:.{places}f}\t{n}.5\n" for n in numbers)
-    return f"a\n{header}nRows={len(numbers)}\nendheader\ntime\tknee\n{rows}".encode()
-
-
-def motive(numbers: tuple[int, ...], stated: str = "100.000000", hz: float = 100) -> bytes:
-    rows = "".join(f"{n},{n / hz:.6g},{n}.5,1,2\n" for n in numbers)
-    return (
-        "Format Version,1.23,Take Name,a,Capture Frame Rate,"
-        f"{stated},Export Frame Rate,{stated},Length Units,Meters\n\n"
-        ",Type,Marker,Marker,Marker\n,Name,m,m,m\n,ID,1,1,1\n,,Position,Position,Position\n"
-        f"Frame,Time (Seconds),X,Y,Z\n{rows}"
-    ).encode()
-
-
-def csv(numbers: tuple[int, ...], hz: float = 100) -> bytes:
-    return ("time,a\n" + "".join(f"{n / hz:.3f},{n}.5\n" for n in numbers)).encode()
-
-
-def vicon(numbers: tuple[int, ...]) -> bytes:
-    rows = "".join(f"{n},0,{n}.5,1,2\n" for n in numbers)
-    head = "Trajectories\n100\n,,s:A,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n"
-    return (head + rows).encode()
-
-
-def npz(numbers: tuple[int, ...], hz: float = 100) -> bytes:
-    buffer = io.BytesIO()
-    times = np.array(numbers) / hz
-    np.savez(buffer, joints=np.arange(6.0 * len(numbers)).reshape(-1, 2, 3), times=times)
-    return buffer.getvalue()
 
 
 FILES = {
