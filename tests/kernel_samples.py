@@ -1,19 +1,21 @@
-"""Small kernels of everything that kernels are written in; ``kernel_builds`` has them compiled."""
+"""Small kernels for the edges of what kernels compute; ``kernel_builds`` has them compiled.
+
+The kernels of the package are compared with their sources themselves: ``kernel_twins``.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from mcz.kernels import bit_length, truncated
-from mcz.kernels.types import Bytes, Bytes2, Flags, FloatColumn, Floats, Floats2, Ints, Ints2
+from mcz.kernels.types import Bytes, Bytes2, Flags, FloatColumn, Floats2, Ints, Ints2
 
 WEIGHTS = (3, -1, 4, 1 << 40)
 PAIRS = ((1, 0.5), (-2, 0.25), (3, -1.0))
-SHIFT = 40
 LEAST = -(1 << 63)
 
 
@@ -53,11 +55,6 @@ def bits(a: int, b: int) -> tuple[int, int, int]:
 @kernel
 def shifts(a: int, n: int) -> tuple[int, int, int]:
     return a << n, a >> n, (1 << n) - 1
-
-
-@kernel
-def wide_constants() -> tuple[int, int, int, int]:
-    return (1 << 40) - 1, (1 << SHIFT) - 1, 3 << 61, LEAST
 
 
 @kernel
@@ -137,52 +134,12 @@ def mix(a: int, x: float, flag: bool) -> tuple[float, float, int]:
     return a + x, 2.0 * (a if flag else x), flag + flag
 
 
-# Functions, tuples and constant tables
-
-
-def next_of(state: Ints) -> int:
-    state[0] += 1
-    return state[0]
-
-
-def divided_by(a: int, b: int) -> tuple[int, int]:
-    return (a // b, a % b) if b != 0 else (0, a)
-
-
-def subtract(a: int, b: int) -> int:
-    return a - b
-
-
-@kernel
-def order_of_calls(state: Ints, found: Ints) -> tuple[int, int]:
-    a, b = next_of(state), next_of(state)
-    found[0] = 10 * a + b
-    found[1], found[2] = next_of(state), next_of(state)
-    found[3] = 1 if 4 < next_of(state) < 6 else 0
-    if next_of(state) > 100 and next_of(state) > 0:
-        found[4] = 1
-    found[5] = subtract(a, next_of(state))
-    return next_of(state), next_of(state)
-
-
-@kernel
-def tuples(a: int, b: int, row: Ints) -> tuple[int, int, float]:
-    a, b = b, a
-    row[0], row[1] = row[1], row[0]
-    quotient, rest = divided_by(a, b)
-    both = quotient, rest
-    a = b = both[1]
-    return both[0] + a, b, row[0] / 4
+# Tuples and constant tables
 
 
 @kernel
 def pair_sum(pair: tuple[int, float]) -> float:
     return pair[0] + pair[1]
-
-
-@kernel
-def given_pair(a: int, x: float) -> float:
-    return pair_sum((a, x))
 
 
 @kernel
@@ -195,33 +152,6 @@ def table(at: int) -> tuple[int, float, int]:
     for step in (1, -1, 5):
         total += step
     return total, weighted, WEIGHTS[at] + WEIGHTS[1]
-
-
-# Loops
-
-
-@kernel
-def loops(n: int, start: int, stop: int) -> tuple[int, int, int, int]:
-    last = i = 7
-    for i in range(n):  # noqa: B007 - its last value is what counts
-        pass
-    total = 0
-    for k in range(start, stop, -3):
-        total = 5 * total + k
-    for k in range(start, stop, 2):
-        total = 5 * total - k
-        if total > 1000:
-            break
-    for k in range(n):
-        if k == 2:
-            continue
-        k *= 2
-        last = k
-        n = 0
-    count = 0
-    while count < start:
-        count += 3
-    return i, total, last, count
 
 
 # Arrays
@@ -240,38 +170,6 @@ def slices(row: Ints, start: int, stop: int) -> tuple[int, int, int, int]:
     for value in part:
         total = 3 * total + value
     return len(part), len(head), len(tail), total
-
-
-@kernel
-def rows(grid: Ints2, out: Ints2, marks: Flags) -> int:
-    n_rows, n = grid.shape
-    spare = np.zeros((n_rows, 2), np.int64)
-    for r in range(n_rows - 1, -1, -1):
-        total = row_sum(grid[r], -3)
-        spare[r] = spare[r, 1] = total
-        marks[r] = total > 10
-        out[r, :2] = spare[r]
-        out[r, 2:n] = 7
-        out[r, n - 1] += grid[r, n - 2]
-        out[r, 0] = 2 * out[r, 0] - spare[r, 1]
-    column, last = grid[:, 1], out[n_rows - 1]
-    last[0] += len(column)
-    for value in column[1:]:
-        last[0] += value
-    for row in grid:
-        last[1] ^= row[0]
-    return spare[0, 0]
-
-
-def row_sum(row: Ints, least: int) -> int:
-    total = 0
-    for value in row:
-        if value == 99:
-            break
-        if value < least:
-            continue
-        total += value
-    return total
 
 
 @kernel
@@ -352,46 +250,3 @@ def fill_long(marks: Ints, n: int) -> int:
         marks[1 + (value & 1)] = value
     marks[3] = 1
     return value
-
-
-# Records
-
-
-class Rule(NamedTuple):
-    size: int
-    factor: float
-    is_on: bool
-
-
-class Store(NamedTuple):
-    values: Floats
-    counts: Ints
-    flags: Flags
-    limit: int
-
-
-class Both(NamedTuple):
-    store: Store
-    rule: Rule
-    texts: Bytes
-
-
-def apply_rule(rule: Rule, value: float) -> float:
-    return rule.factor * value + rule.size if rule.is_on else value
-
-
-def apply_all(store: Store, texts: Bytes, rule: Rule) -> int:
-    values, counts, _, limit = store
-    size = min(limit, len(values))
-    for i in range(size):
-        values[i] = apply_rule(rule, values[i])
-        counts[i] += texts[i]
-    return size
-
-
-@kernel
-def records(both: Both, rule: Rule) -> float:
-    total = 0.0
-    for i in range(apply_all(both.store, both.texts, rule)):
-        total += apply_rule(both.rule, both.store.values[i]) if both.store.flags[i] else 0.5
-    return total

@@ -79,12 +79,6 @@ def test_a_file_that_fails_leaves_no_trace(folder: Path, tmp_path: Path) -> None
         assert "bvh/walk.bvh" in file.aliases
 
 
-def test_two_packs_are_the_same_bytes(folder: Path, tmp_path: Path) -> None:
-    for name in ("one.mcz", "two.mcz"):
-        mcz.pack(folder, tmp_path / name, keep_all=True)
-    assert (tmp_path / "one.mcz").read_bytes() == (tmp_path / "two.mcz").read_bytes()
-
-
 def small(tmp_path: Path) -> tuple[Path, Path]:
     """Two BVH files of a few frames."""
     text = (
@@ -177,10 +171,6 @@ def test_no_file_overwrites_another(tmp_path: Path) -> None:
     report = mcz.unpack(archive, tmp_path / "out")
     assert tree(tmp_path / "out") == {"a.txt": b"first", "b.txt": b"second"}
     assert [outcome.path for outcome in report.failures] == ["a.txt"]
-
-
-def test_safe_path() -> None:
-    assert str(safe_path("a b/c: d.bvh")) == "a b/c: d.bvh"
 
 
 def test_remote_archive_costs_few_requests(samples: Path) -> None:

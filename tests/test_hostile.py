@@ -25,6 +25,7 @@ from tests.repair import (
     parts_of,
     replaced,
     use,
+    with_index_content,
 )
 
 POSITIONS = 2000 if os.environ.get("MCZ_LONG") else 80  # bits a file and kind of damage
@@ -154,3 +155,9 @@ def test_chunks_dropped_doubled_and_swapped(data: bytes) -> None:
         if which:
             before, here = parts[which - 1], parts[which]
             outcome(joined([*parts[: which - 1], here, before, *parts[which + 1 :]]))
+
+
+def test_flipped_bits_of_the_index(files: dict[str, bytes]) -> None:
+    for byte, bit in flips(600, POSITIONS, seed=3):
+        flip = lambda content, at=byte, of=bit: flipped(content, at % len(content), of)  # noqa: E731
+        outcome(with_index_content(files["rich"], flip))

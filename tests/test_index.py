@@ -15,13 +15,8 @@ import conformance
 import mcz
 from mcz.codecs import raw
 from mcz.container import http, index
-from mcz.container.chunks import Chunk
-from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
-from mcz.container.index import build_index, index_chunk, index_content
-from mcz.container.index_reader import directory_of, parse_index, read_indexes
-from mcz.container.index_records import Index
+from mcz.container.index import build_index
 from mcz.container.scan import scan
-from mcz.container.segments import SegmentHeader
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.schema import Table, build, columns, field, parse
@@ -34,9 +29,7 @@ from tests.web_server import Server, served
 VECTORS = Path(conformance.__file__).parent / "vectors" / "valid"
 
 NUMBERS = st.integers(0, 2**53 - 1)
-SMALL = st.integers(0, 2**20)
 NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=12)
-LIMIT = 2**20
 
 
 class Item(Record):
@@ -93,116 +86,6 @@ def test_a_table_is_its_columns(items: list[Item], last: int) -> None:
 def test_columns_have_the_varints_of_the_format(column: bytes, error: str) -> None:
     with pytest.raises(mcz.FormatError, match=error):
         parse(Items, b"\x02\x00\x00\x05" + column, "items")
-
-
-@st.composite
-def rows(draw: st.DrawFn, name: str, at: int) -> ClipRow:
-    numbers = st.tuples(*[SMALL] * 6)
-    signals = tuple(
-        SignalRow(*fields) for fields in draw(st.lists(numbers, min_size=1, max_size=2))
-    )
-    clip = Chunk(b"CLIP", 0, at + draw(SMALL), draw(SMALL))
-    row = ClipRow(
-        name,
-        draw(st.sampled_from([bytes(16), bytes(range(16))])),
-        *draw(st.tuples(NUMBERS, NUMBERS, st.integers(1, 2**53 - 1))),
-        signals,
-        clip,
-    )
-    end, first = clip.stop, [0] * len(signals)
-    for _ in range(draw(st.integers(0, 3))):
-        gap, size, n_frames = draw(SMALL), draw(SMALL), draw(SMALL)
-        signal = draw(st.integers(0, len(signals) - 1))
-        header = SegmentHeader(signal, first[signal], n_frames, draw(SMALL), draw(SMALL), 1)
-        row.segments.append(SegmentRow(end + gap, size, header))
-        first[signal] += n_frames
-        end += gap + size
-    row.cend = Chunk(b"CEND", 0, end + draw(SMALL), draw(SMALL))
-    row.ancillary += _chunks(draw, row.cend.stop, draw(SMALL) % 3, b"QUAL")
-    return row
-
-
-def _chunks(draw: st.DrawFn, at: int, count: int, kind: bytes) -> list[Chunk]:
-    found = []
-    for _ in range(count):
-        found.append(Chunk(kind, 0, at + draw(SMALL), draw(SMALL)))
-        at = found[-1].stop
-    return found
-
-
-def _end(row: ClipRow) -> int:
-    return [row.cend, *row.ancillary][-1].stop
-
-
-def _grow(draw: st.DrawFn, held: Directory, at: int, number: int) -> int:
-    """Let a file have more of everything behind ``at``; return where it ends."""
-    ends = [at]
-    if held.clips.last is not None:
-        held.clips.last.ancillary += _chunks(draw, at, draw(SMALL) % 3, b"xtra")
-        ends.append(_end(held.clips.last))
-    for id_, chunk in zip(
-        draw(st.sets(st.binary(min_size=16, max_size=16), max_size=2)),
-        _chunks(draw, at, 2, b"SKEL"),
-        strict=False,
-    ):
-        held.shared.setdefault((b"SKEL", id_), chunk)
-        ends.append(chunk.stop)
-    name = f"{number} {draw(NAMES)}"
-    parts = _chunks(draw, at, draw(SMALL) % 2 + 1, b"ATTA")
-    held.attachments[name] = AttachmentRow(name, draw(NUMBERS), parts)
-    ends.append(parts[-1].stop)
-    held.aliases[name] = draw(st.integers(0, 2)), draw(st.binary(max_size=20))
-    for one in draw(st.lists(NAMES, max_size=3, unique=True)):
-        row = draw(rows(f"{number} {one}", max(ends)))
-        held.clips[row.name] = row
-        ends.append(_end(row))
-    return max(ends)
-
-
-@given(st.data())
-def test_what_is_built_is_read(data: st.DataObject) -> None:
-    held = Directory(head=data.draw(st.binary(max_size=9)))
-    _grow(data.draw, held, 0, 0)
-    content = index_content(held)
-    again = directory_of([parse_index(index_chunk(content), 0, LIMIT)])
-    assert index_content(again) == content  # from tables still
-    assert again == held
-    assert index_content(again) == content  # and from rows
-    fields = parse(Index, content, "INDX")
-    assert build(fields, "INDX") == content
-    assert [row.name for row in fields.clips] == list(held.clips)
-
-
-@given(st.data())
-def test_indexes_that_continue_each_other_say_what_one_says(data: st.DataObject) -> None:
-    held = Directory(head=b"head")
-    file, end = {}, 0
-    for number in range(data.draw(st.integers(1, 4))):
-        offset = _grow(data.draw, held, end, number)
-        since = held.indexes[-1] if held.indexes else None
-        file[offset] = index_chunk(index_content(held, since), since)
-        end = offset + len(file[offset])
-        listed = read_indexes(lambda at, n: file[at][:n], offset, len(file[offset]), LIMIT)
-        again = directory_of(listed)
-        assert again == held
-        held.indexes = again.indexes
-    assert [place.offset for place in held.indexes] == list(file)
-
-
-@given(st.data())
-def test_a_changed_index_is_read_or_refused(data: st.DataObject) -> None:
-    held = Directory(head=b"head")
-    _grow(data.draw, held, 0, 0)
-    content = bytearray(index_content(held))
-    at = data.draw(st.integers(0, len(content) - 1))
-    content[at] ^= 1 << data.draw(st.integers(0, 7))
-    del content[data.draw(st.integers(at, len(content))) :]
-    try:
-        found = directory_of([parse_index(index_chunk(bytes(content)), 0, LIMIT)])
-        for row in found.clips.values():
-            _ = row.cend, row.segments, row.ancillary
-    except mcz.MczError:
-        pass
 
 
 def test_appends_leave_few_indexes_and_write_little() -> None:

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from tests import kernel_samples
 from tests.kernel_builds import MODES, sample
-from tests.kernel_samples import Both, Rule, Store
 from tools.kernels import source
 from tools.kernels.annotations import KernelError
 from tools.kernels.unit import Unit
@@ -89,10 +88,6 @@ def test_shifts(a: int, n: int) -> None:
     agree("shifts", a, n)
 
 
-def test_constants_have_64_bits() -> None:
-    assert agree("wide_constants") == (2**40 - 1, 2**40 - 1, wrapped(3 << 61), LEAST)
-
-
 @given(LONGS, LONGS, LONGS)
 def test_least_and_greatest(a: int, b: int, c: int) -> None:
     agree("extremes", a, b, c)
@@ -133,23 +128,6 @@ def test_floats_become_the_nearest_integers(a: float) -> None:
         agree("to_integer_in_range", a)
 
 
-def test_calls_come_in_order() -> None:
-    assert agree("order_of_calls", np.zeros(1, np.int64), np.zeros(6, np.int64)) == (8, 9)
-
-
-@given(LONGS, LONGS, LONGS, LONGS)
-def test_tuples(a: int, b: int, c: int, d: int) -> None:
-    if (a, b) != (-1, LEAST):  # a quotient beyond 64 bits
-        agree("tuples", a, b, np.array([c, d]))
-    agree("given_pair", a, 0.5)
-    agree("pair_sum", (a, 0.5))
-
-
-@pytest.mark.parametrize("at", range(4))
-def test_tables_of_constants(at: int) -> None:
-    agree("table", at)
-
-
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("pair", [(1,), (1, 2.0, 3), (1.5, 2.0), ("1", 2.0), (1, "2"), None, 5])
 def test_tuples_that_do_not_fit(pair: Any, mode: str) -> None:
@@ -163,11 +141,6 @@ def test_an_index_out_of_a_table(at: int) -> None:
         sample("table", "checked")(at)
 
 
-@given(st.integers(-3, 9), SMALL, SMALL)
-def test_loops(n: int, start: int, stop: int) -> None:
-    agree("loops", n, start, stop)
-
-
 @given(st.integers(0, 9), st.integers(0, 4), st.integers(0, 4))
 def test_lengths_are_signed(n: int, n_rows: int, n_columns: int) -> None:
     agree("lengths", np.zeros(n, np.int64), np.zeros((n_rows, n_columns)))
@@ -176,13 +149,6 @@ def test_lengths_are_signed(n: int, n_rows: int, n_columns: int) -> None:
 @given(st.integers(0, 6), st.integers(-9, 9) | LONGS, st.integers(-9, 9) | LONGS)
 def test_slices(n: int, start: int, stop: int) -> None:
     agree("slices", np.arange(1, n + 1), start, stop)
-
-
-@given(st.integers(1, 5), st.integers(2, 6), st.data())
-def test_rows_and_columns(n_rows: int, n: int, data: st.DataObject) -> None:
-    values = st.lists(st.sampled_from([-9, -2, 0, 3, 5, 8, 99]), min_size=n, max_size=n)
-    grid = np.array(data.draw(st.lists(values, min_size=n_rows, max_size=n_rows)), np.int64)
-    agree("rows", grid, np.zeros_like(grid), np.zeros(n_rows, bool))
 
 
 @given(st.lists(st.integers(0, 255), max_size=9))
@@ -208,21 +174,6 @@ def test_allocations(n: int, m: int) -> None:
 def test_allocations_that_fail(sizes: tuple[int, int], mode: str) -> None:
     with pytest.raises((MemoryError, ValueError)):
         sample("allocate", mode)(*sizes)
-
-
-@given(st.data(), st.integers(0, 6), LONGS, st.booleans(), FLOATS)
-def test_records(data: st.DataObject, n: int, size: int, is_on: bool, factor: float) -> None:
-    numbers = data.draw(st.lists(FLOATS, min_size=n, max_size=n))
-    limit = data.draw(st.integers(-2, 9))
-    answers = []
-    for call in (kernel_samples.records, *(sample("records", mode) for mode in MODES)):
-        store = Store(np.array(numbers), np.arange(n), np.arange(n) % 2 == 1, limit)
-        rule, other = Rule(size, factor, is_on), Rule(-size // 2, 0.5, not is_on)
-        with np.errstate(all="ignore"):
-            total = call(Both(store, other, np.arange(n, dtype=np.uint8)), rule)
-        values = tuple(map(float, store.values))
-        answers.append(bits((float(total), values, store.counts, store.flags)))
-    assert answers[0] == answers[1] == answers[2]
 
 
 @pytest.mark.parametrize("mode", MODES)

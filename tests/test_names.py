@@ -86,49 +86,12 @@ def test_all_commands_find_it(
     assert mcz.read(f"{out}2.mcz", clip="run").name == "a/run"
 
 
-KEYS: list[Any] = [
-    np.s_[10:20, 3:6],
-    np.s_[5],
-    np.s_[-1, 2],
-    np.s_[5, ::2],
-    np.s_[::-3, 1],
-    np.s_[3:3],
-    np.s_[:, -1],
-    np.s_[[4, 2, -1]],
-    np.s_[[4, 2, 2], [0, 1, 2]],
-    np.s_[[4, 2], 1:3],
-    np.s_[[4, 2], 1],
-    np.s_[...],
-    np.s_[..., 2],
-    np.s_[None, 3],
-    np.s_[()],
-    np.s_[np.arange(40) % 3 == 0],
-    np.s_[np.arange(40) % 3 == 0, 1],
-    np.s_[np.arange(4).reshape(2, 2)],
-    np.s_[np.int64(7)],
-    np.s_[[]],
-    np.s_[2:4, None],
-]
-
-
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory: pytest.TempPathFactory) -> Iterator[mcz.Clip]:
     path = tmp_path_factory.mktemp("clip") / "a.mcz"
     mcz.write(smooth(40), path)
     with mcz.open(path) as file:
         yield file.only_clip()
-
-
-@pytest.mark.parametrize("key", KEYS, ids=str)
-def test_values_are_indexed_as_an_array_is(clip: mcz.Clip, key: Any) -> None:
-    np.testing.assert_array_equal(clip.values[key], clip.read()[key])
-
-
-@pytest.mark.parametrize("key", [40, -41, (0, 99), "a", [1.5], [40], np.zeros(3, bool)], ids=str)
-def test_values_refuse_what_an_array_does(clip: mcz.Clip, key: Any) -> None:
-    for values in (clip.values, clip.read()):
-        with pytest.raises(IndexError):
-            values[key]
 
 
 ROWS = st.one_of(
