@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import mcz
-from mcz import Channel, Joint, Motion, Signal, Skeleton
+from mcz import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 
 ROTATIONS = (Channel("rz"), Channel("ry"), Channel("rx"))
@@ -39,6 +40,37 @@ def smooth(n_frames: int = 50, **changes) -> Motion:
     signal = Signal(values, (Grid(GridKind.FIXED, 4),) * 10)
     arguments = {"frame_rate": Fraction(120), "name": "smooth"} | changes
     return Motion(skeleton(), (signal,), **arguments)
+
+
+def rich(n_frames: int = 40) -> Motion:
+    """Masks, exceptions, a change of grid, frame numbers, copied and constant channels."""
+    motion = smooth(n_frames)
+    values = motion.values.copy()
+    values[:, 9] = values[:, 6]  # the knee repeats the spine
+    values[:, 1] = 3.5
+    values[n_frames // 2 :, 4] = np.round(values[n_frames // 2 :, 4], 1)
+    values[2, 0], values[-1, 9] = 1000, np.nan
+    mask = np.ones(values.shape, bool)
+    mask[4:6, 3], mask[-3:, 8] = False, False
+    signal = Signal(
+        values,
+        motion.signals[0].grids,
+        mask=mask,
+        exceptions=Exceptions(np.array([2, n_frames - 1]), np.array([0, 9]), (b"1e3", b"nan")),
+        grid_changes=((n_frames // 2, 4, Grid(GridKind.FIXED, 1)),),
+    )
+    analog = Signal(
+        np.arange(2 * n_frames, dtype=np.int64).reshape(-1, 1) ** 2,
+        name="analog",
+        role="analog",
+        samples_per_frame=2,
+        channels=(Channel("", "emg", "V"),),
+    )
+    numbers = np.arange(n_frames) + 5
+    numbers[n_frames // 3 :] += 4
+    return replace(
+        motion, signals=(signal, analog), frame_numbers=numbers, metadata={"subject": "7"}
+    )
 
 
 def written(motion: Motion, **params: Any) -> bytes:

@@ -1,4 +1,4 @@
-"""Chunks, index, packets, salvage: the container without any codec's help."""
+"""What no vector shows of the container: parts of attachments, salvage of what is no chunk."""
 
 from __future__ import annotations
 
@@ -9,27 +9,13 @@ import pytest
 import mcz
 from conformance.run import VECTORS
 from mcz.codecs import by_name
-from mcz.container.chunks import HEADER
+from mcz.container.chunks import FOOT, HEADER
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
-from mcz.errors import (
-    FormatError,
-    MotionError,
-    TruncatedError,
-    UnsupportedError,
-)
+from mcz.errors import FormatError, MotionError, TruncatedError, UnsupportedError
 from mcz.writing.clip_writer import write_clip
 from tests.motions import smooth
-
-
-def written(*names: str, index: bool = True, n_frames: int = 30) -> bytes:
-    out = io.BytesIO()
-    writer = Writer(out)
-    writer.attachment("notes/read me.txt", b"kept as it is\r\n" * 9)
-    for name in names:
-        write_clip(writer, smooth(n_frames, name=name), by_name("raw"), {})
-    writer.finish(index=index)
-    return out.getvalue()
+from tests.repair import joined, parts_of
 
 
 def test_clips_are_unique() -> None:
@@ -51,6 +37,22 @@ def test_attachment_of_several_parts() -> None:
         assert file.attachments["empty"].read() == b""
         rows = file.container.directory.attachments
         assert [len(row.parts) for row in rows.values()] == [3, 1]
+
+
+def test_salvage_goes_on_behind_garbage() -> None:
+    out = io.BytesIO()
+    writer = Writer(out)
+    for name in "ab":
+        write_clip(writer, smooth(30, name=name), by_name("raw"), {})
+    writer.finish()
+    parts = parts_of(out.getvalue())
+    second = [i for i, (c, _) in enumerate(parts) if c.type == b"CLIP"][1]
+    head, rest = joined(parts[:second])[: -FOOT.size], joined(parts[second:])[8:]
+    with mcz.open(head + b"rubbish, not a chunk" * 9 + rest, salvage=True) as file:
+        assert list(file.clips) == ["a", "b"]
+        for clip in file.clips.values():
+            assert clip.read().shape == (30, 10)
+        assert len(file.damage) == 1
 
 
 def test_salvage_takes_nothing_of_another_version_for_its_own() -> None:

@@ -23,14 +23,13 @@ from mcz.container.segments import FRESH
 from mcz.container.source import open_source
 from mcz.container.value_hash import canonical
 from mcz.container.writer import Writer
-from mcz.motion import Exceptions, Signal
-from mcz.numbers import Grid, GridKind
+from mcz.motion import Signal
 from mcz.reading.report import validate
 from mcz.schema import EXTENDED, parse
 from mcz.writing.clip_writer import write_clip
 from tests import overlap_codec
 from tests.commands import run
-from tests.motions import smooth
+from tests.motions import rich, smooth
 from tests.repair import flipped, flips, joined, parts_of, replaced, use
 from tools.records import built, update
 
@@ -70,37 +69,6 @@ def extracted(data: bytes, **how: Any) -> bytes:
     out = io.BytesIO()
     mcz.extract(data, out, **how)
     return out.getvalue()
-
-
-def rich(n_frames: int = 40) -> mcz.Motion:
-    """Masks, exceptions, a change of grid, frame numbers, copied and constant channels."""
-    motion = smooth(n_frames)
-    values = motion.values.copy()
-    values[:, 9] = values[:, 6]  # the knee repeats the spine
-    values[:, 1] = 3.5
-    values[n_frames // 2 :, 4] = np.round(values[n_frames // 2 :, 4], 1)
-    values[2, 0], values[-1, 9] = 1000, np.nan
-    mask = np.ones(values.shape, bool)
-    mask[4:6, 3], mask[-3:, 8] = False, False
-    signal = Signal(
-        values,
-        motion.signals[0].grids,
-        mask=mask,
-        exceptions=Exceptions(np.array([2, n_frames - 1]), np.array([0, 9]), (b"1e3", b"nan")),
-        grid_changes=((n_frames // 2, 4, Grid(GridKind.FIXED, 1)),),
-    )
-    analog = Signal(
-        np.arange(2 * n_frames, dtype=np.int64).reshape(-1, 1) ** 2,
-        name="analog",
-        role="analog",
-        samples_per_frame=2,
-        channels=(mcz.Channel("", "emg", "V"),),
-    )
-    numbers = np.arange(n_frames) + 5
-    numbers[n_frames // 3 :] += 4
-    return replace(
-        motion, signals=(signal, analog), frame_numbers=numbers, metadata={"subject": "7"}
-    )
 
 
 def check(whole: bytes, part: bytes, start: int, stop: int, joints: Any, resolution: int) -> None:
@@ -511,27 +479,6 @@ def test_resolution_beside_a_signal_without_any() -> None:
 
 
 # Decimation
-
-
-@pytest.mark.parametrize("step", [2, 3, 8, 64])
-def test_decimated_motions(step: int) -> None:
-    from mcz.reading.decimation import decimated
-
-    motion = rich()
-    thin = decimated(motion, step)
-    assert thin.frame_rate == motion.frame_rate / step
-    assert motion.frame_numbers is not None
-    assert list(thin.frame_numbers) == list(motion.frame_numbers[::step])
-    np.testing.assert_array_equal(thin.values, motion.values[::step])
-    with mcz.open(written(thin)) as file:  # exceptions and grids still fit
-        back = file.clips["smooth"].motion()
-    np.testing.assert_array_equal(back.values, thin.values)
-    frames = np.arange(motion.n_frames)
-    for frame in frames[::step]:
-        before = motion.signals[0].cut(int(frame), int(frame) + 1)
-        after = thin.signals[0].cut(int(frame) // step, int(frame) // step + 1)
-        assert before.grids == after.grids
-        assert before.exceptions.texts == after.exceptions.texts
 
 
 def test_motion_at_a_resolution() -> None:

@@ -202,16 +202,6 @@ def test_no_kernel_writes_what_is_read_only(name: str, mode: str) -> None:
     assert np.asarray(array).tobytes() == before == bytes(32)
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_bytes_stay_what_they_are(mode: str) -> None:
-    text = b"\0\0\0"
-    with pytest.raises(ValueError, match="read-only"):
-        sample("store_bytes", mode)(
-            np.arange(3), np.frombuffer(text, np.uint8), np.zeros((2, 1), np.uint8)
-        )
-    assert text == bytes(3)
-
-
 ROW = np.arange(5)
 WRONG: list[Any] = [
     ROW.astype(np.int32),

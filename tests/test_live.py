@@ -32,7 +32,6 @@ from mcz.container.packets import (
     Packet,
     build_packet,
 )
-from mcz.container.scan import scan
 from mcz.container.writer import Writer
 from mcz.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.live.strict_reader import live_frames
@@ -252,28 +251,6 @@ def test_clips_that_are_not_live_are_followed_too() -> None:
         parts = found[:12], found[12:18], found[18:]
         for clip, part in zip(file.clips.values(), parts, strict=True):
             np.testing.assert_array_equal(np.array([row for _, row, _ in part]), clip.read())
-
-
-def test_appending_to_a_live_clip_cut_off_behind_its_end(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcz"
-    data = live(frames())
-    foot = scan(source_of(data)).feet[0]
-    path.write_bytes(data[: foot - 3])
-    bvh = tmp_path / "one.bvh"
-    bvh.write_text(
-        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\n"
-        "Frame Time: 1\n2\n"
-    )
-    mcz.append([bvh], path, salvage=True)
-    assert mcz.verify(path) == []
-    with mcz.open(path) as file:
-        assert list(file.clips) == ["live", "one"]
-
-
-def source_of(data: bytes):
-    from mcz.container.source import ByteSource
-
-    return ByteSource(io.BytesIO(data))
 
 
 def test_sizes_count_the_framing() -> None:

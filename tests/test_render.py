@@ -19,7 +19,7 @@ import mcz
 from mcz import Channel, Joint, MczError, Motion, MotionError, OptionError, Signal, Skeleton, extras
 from mcz.pictures import libraries, tracks
 from mcz.pictures.bodies import MIDDLE, body_of, fitted
-from mcz.pictures.cameras import VIEWS, Viewport, axes_of, framed
+from mcz.pictures.cameras import VIEWS, Viewport
 from mcz.pictures.capsules import Shapes, capsules
 from mcz.pictures.rendering import drawn_frames
 from mcz.pictures.stages import stage_of
@@ -340,19 +340,6 @@ def test_capsules_hold_their_circles() -> None:
     assert (
         np.maximum(ra, rb)[:, None] + np.linalg.norm(b - a, axis=1)[:, None] + 1e-9 >= apart[0]
     ).all()
-
-
-def test_a_camera_is_a_rotation() -> None:
-    for view in VIEWS:
-        axes = axes_of(view, np.array([0.6, 0.8, 0.0]))
-        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
-        assert np.linalg.det(axes) == pytest.approx(1)
-        camera = framed(
-            axes, np.array([-3.0, -1, -2]), np.array([1.0, 5, 2]), Viewport(0, 0, 50, 50)
-        )
-        corners = np.array([[x, y, z] for x in (-3, 1) for y in (-1, 5) for z in (-2, 2)]) @ axes
-        seen, _ = camera.seen(corners)
-        assert ((seen > -1e-9) & (seen < 50 + 1e-9)).all()
 
 
 def test_the_command(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

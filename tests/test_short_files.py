@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz import FormatError, MczError
 from mcz.container import payloads
-from mcz.container.limits import BASE
-from mcz.container.packed import pack_skeleton, parse_skel, smallest, unpacked, words
-from mcz.container.skeletons import build_skeleton
+from mcz.container.packed import smallest, words
 from mcz.schema import deflate, inflate
-from tests.motions import skeleton
 
 TINY = """HIERARCHY
 ROOT Hips
@@ -49,33 +44,6 @@ def test_what_follows_words_comes_back(text: bytes | str) -> None:
     assert len(found) <= min(len(data), len(deflate(data)), len(packed))
     assert encoding in (payloads.STORED, payloads.DEFLATED, payloads.AFTER_WORDS)
     assert smallest(data, short=False)[0] != payloads.AFTER_WORDS
-
-
-def test_skeletons_are_packed_where_that_is_shorter() -> None:
-    payload = build_skeleton(skeleton(), None)
-    packed = pack_skeleton(payload)
-    assert len(packed) < len(payload)
-    assert unpacked(packed, "SKEL", BASE) == unpacked(payload, "SKEL", BASE) == payload
-
-
-@given(st.integers(0, 200), st.integers(0, 255), st.integers(0, 200))
-def test_hostile_packed_skeletons(place: int, byte: int, cut: int) -> None:
-    data = bytearray(pack_skeleton(build_skeleton(skeleton(), None)))
-    data[place % len(data)] = byte
-    for hostile in (bytes(data), bytes(data[: cut % len(data)])):
-        try:
-            parse_skel(hostile, "SKEL", BASE)
-        except MczError as error:
-            assert "SKEL" in str(error)
-
-
-def test_a_size_that_is_not_that_of_the_fields() -> None:
-    payload = build_skeleton(skeleton(), None)
-    packed = pack_skeleton(payload)
-    at = 1 + payload[0]
-    wrong = packed[: at + 1] + bytes((packed[at + 1] ^ 1,)) + packed[at + 2 :]
-    with pytest.raises(FormatError):
-        unpacked(wrong, "SKEL", BASE)
 
 
 def test_a_file_of_a_few_hundred_bytes(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import mcz
 from mcz import ChecksumError, OptionError
 from mcz.codecs import CODECS
-from mcz.codecs.ahead import Ahead
 from mcz.codecs.contract import Layout
 from mcz.codecs.segments import Sizing, guessing
 from mcz.threads import in_force, in_order, limited
@@ -85,22 +84,6 @@ def test_how_many_threads_there_are() -> None:
         mcz.write(MOTION, io.BytesIO(), threads=-1)
 
 
-@given(st.integers(1, 4), st.integers(0, 12), st.integers(0, 12))
-def test_results_come_in_order(threads: int, n: int, fault: int) -> None:
-    def square(item: int) -> int:
-        if item == fault:
-            raise ValueError(item)
-        return item * item
-
-    found = []
-    if fault < n:
-        with pytest.raises(ValueError, match=str(fault)):
-            found.extend(in_order(square, range(n), threads))
-    else:
-        found.extend(in_order(square, range(n), threads))
-    assert found[: min(n, fault)] == [item * item for item in range(min(n, fault))]
-
-
 def test_few_results_wait() -> None:
     begun: list[int] = []
     before = threading.active_count()
@@ -110,28 +93,6 @@ def test_few_results_wait() -> None:
     results.close()
     assert len(begun) <= 5
     assert threading.active_count() == before
-
-
-@pytest.mark.parametrize("threads", [1, 3])
-def test_what_follows_is_a_guess(threads: int) -> None:
-    prepared: list[tuple[int, int]] = []
-
-    def prepare(first: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
-        assert threading.current_thread() is threading.main_thread()
-        prepared.append((first, stop))
-        return lambda: (f"{first}-{stop}".encode(),)
-
-    def spans(first: int, length: int) -> Iterator[tuple[int, int]]:
-        for at in range(first, 100, length):
-            yield at, at + length
-
-    with Ahead(prepare, threads) as ahead:
-        for first, length in ((0, 10), (10, 10), (20, 5), (25, 5), (95, 5)):
-            following = spans(first, length)
-            span = next(following)
-            assert ahead.code(span, following) == (f"{span[0]}-{span[1]}".encode(),)
-    assert len(set(prepared)) == len(prepared) or threads == 1
-    assert len(prepared) <= 5 * threads + 5
 
 
 @given(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import random
+import re
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -138,6 +140,13 @@ def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(requirements, "ARGUED", {"RAW-01": "as well"})
     with pytest.raises(ValueError, match="both shown and argued"):
         requirements.requirements(names)
+
+
+def test_tests_that_argue_for_rules_are_there() -> None:
+    for id_, text in requirements.ARGUED.items():
+        for file, name in re.findall(r"(\w+\.py)::(\w+)", text):
+            places = Path(__file__).parent.rglob(file)
+            assert any(f"def {name}(" in path.read_text("utf-8") for path in places), id_
 
 
 def test_facts_are_those_of_the_files() -> None:
