@@ -73,10 +73,10 @@ def rich(n_frames: int = 40) -> Motion:
     )
 
 
-def written(motion: Motion, **params: Any) -> bytes:
+def written(motion: Motion, *codec: str, **params: Any) -> bytes:
     """The file that ``mcz.write`` makes."""
     out = io.BytesIO()
-    mcz.write(motion, out, **params)
+    mcz.write(motion, out, *codec, **params)
     return out.getvalue()
 
 

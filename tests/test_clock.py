@@ -20,6 +20,7 @@ from mcz.tables.events import EVENT_EXPORTS
 from tests.clocked_files import motive, npz, sto, trc, vicon
 from tests.commands import run
 from tests.formats.c3d_files import Made
+from tests.motions import written
 
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
 
@@ -31,9 +32,7 @@ def markers(n: int, rate: Fraction | int | None = 100, **facts: object) -> Motio
 
 
 def stored(motion: Motion) -> Motion:
-    out = io.BytesIO()
-    mcz.write(motion, out)
-    with mcz.open(out.getvalue()) as file:
+    with mcz.open(written(motion)) as file:
         clip = file.only_clip()
         np.testing.assert_array_equal(clip.times, clip.motion().times)
         return clip.motion()

@@ -27,7 +27,7 @@ from mcz.reading.report import info
 from mcz.sample import write_samples
 from mcz.writing.draft import Draft
 from tests.commands import run
-from tests.motions import smooth
+from tests.motions import smooth, written
 from tests.repair import use
 
 VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
@@ -230,10 +230,9 @@ def test_another_skeleton_is_not_taken_for_it(folder: Path, tmp_path: Path) -> N
     skeleton = FORMATS["asf"].read((folder / "walk.asf").read_bytes(), "walk")
     odd = replace(skeleton, up_axis="z")
     motion = FORMATS["amc"].read((folder / "walk.amc").read_bytes(), "walk", skeleton)
-    out = io.BytesIO()
-    mcz.write(replace(motion, skeleton=odd, source=None), out, codec="raw")
-    skel, *_ = chunks(out.getvalue(), b"SKEL")
-    with mcz.open(changed(out.getvalue(), skel.offset + 20), salvage=True) as file:
+    data = written(replace(motion, skeleton=odd, source=None), codec="raw")
+    skel, *_ = chunks(data, b"SKEL")
+    with mcz.open(changed(data, skel.offset + 20), salvage=True) as file:
         assert not any("made again" in line for line in file.damage)
         with pytest.raises(FormatError, match="no SKEL"):
             file.clips["walk"].read()
@@ -393,9 +392,7 @@ def test_a_model_is_copied_where_it_is_small_beside_the_rest(size: int, copied: 
 
 def test_the_same_with_every_byte_cut_or_changed() -> None:
     """No byte string is too odd for a reader, and a strict one takes no false copy."""
-    out = io.BytesIO()
-    mcz.write(smooth(3), out, codec="raw", copies=True)
-    data = out.getvalue()
+    data = written(smooth(3), codec="raw", copies=True)
     (copy,) = chunks(data, ChunkType.COPY)
     for at in range(copy.offset, copy.offset + copy.size):
         use(changed(data, at), salvage=True)

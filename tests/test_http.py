@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import ssl
 from collections.abc import Iterator
@@ -17,15 +16,13 @@ import mcz
 from mcz import AccessError
 from mcz.container import http, http_connections
 from tests.commands import run
-from tests.motions import smooth
+from tests.motions import smooth, written
 from tests.web_server import Answering, Server, ranged, served
 
 
 @pytest.fixture(scope="module")
 def data() -> bytes:
-    out = io.BytesIO()
-    mcz.write(smooth(2000), out, "raw")
-    return out.getvalue()
+    return written(smooth(2000), "raw")
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Si
 from mcz.kinematics import origins_of, points_of, reach
 from mcz.retargeting.sides import counterparts
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
-from tests.motions import POSITIONS, ROTATIONS, smooth
+from tests.motions import POSITIONS, ROTATIONS, smooth, written
 from tests.skeletons import joints as random_joints
 from tests.skeletons import skeletons, values_for
 
@@ -89,9 +88,7 @@ def test_the_walk_in_the_mirror_is_a_file_again(form: str) -> None:
     assert missed(motion, mirrored) < 1e-9 * reach(motion.skeleton) + 1e-12
     assert mirrored.source is None
     assert not np.signbit(mirrored.signals[0].values[mirrored.signals[0].values == 0]).any()
-    stream = io.BytesIO()
-    mcz.write(mirrored, stream)
-    with mcz.open(stream.getvalue()) as file:
+    with mcz.open(written(mirrored)) as file:
         again = file.only_clip("walk").motion()
     assert np.array_equal(again.values, mirrored.values, equal_nan=True)
     assert again.skeleton == mirrored.skeleton

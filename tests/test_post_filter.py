@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from dataclasses import replace
@@ -22,6 +21,7 @@ from mcz.reading.post_filtering import filtered_motion, filtered_part
 from mcz.sample import acclaim_walk, marker_walk
 from mcz.transforms.post_filter import CUTOFFS, DELAY, SCALE, PostFilter, filter_rows
 from mcz.transforms.post_filter import filter_taps as taps_of
+from tests.motions import written
 from tools.vectors.valid.filtered import plain_rows, plain_taps
 
 ROOT = Path(__file__).parents[1]
@@ -179,17 +179,11 @@ def test_what_cannot_be_filtered() -> None:
     assert given.frame_rate == 120
 
 
-def written(motion: Motion, **params) -> io.BytesIO:
-    stream = io.BytesIO()
-    mcz.write(motion, stream, **params)
-    return stream
-
-
 def test_parts_are_cut_out_of_the_whole() -> None:
     motion = walk()
     whole = mcz.post_filter(motion)
     rows = whole.signals[0].values
-    with mcz.open(written(motion).getvalue()) as file:
+    with mcz.open(written(motion)) as file:
         clip = next(iter(file.clips.values()))
         values, mask = filtered_part(clip, (9, 30), [2, 0])
         columns = [6, 7, 8, 0, 1, 2]
@@ -209,7 +203,7 @@ def test_resolutions_are_filtered_before_they_are_thinned() -> None:
     values = motion.signals[0].values[:, 3:12]
     bones = replace(motion.skeleton, joints=motion.skeleton.joints[1:4])
     plain = replace(motion, skeleton=bones, signals=(Signal(values),), frame_numbers=None)
-    with mcz.open(written(plain, codec="mrdwt", T_g=1.0).getvalue()) as file:
+    with mcz.open(written(plain, codec="mrdwt", T_g=1.0)) as file:
         clip = next(iter(file.clips.values()))
         meant = mcz.post_filter(replace(clip.motion(resolution=2), source=None))
         made = filtered_motion(clip, (4, 40), 2, decimate=True)

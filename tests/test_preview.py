@@ -7,7 +7,6 @@ import io
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,12 +17,11 @@ import mcz
 from mcz import codecs
 from mcz.errors import OptionError
 from mcz.motion import Motion, Signal
-from mcz.reading.clip import Clip
 from mcz.reading.preview_motion import preview_motion
 from mcz.reading.signal_info import SignalInfo
 from tests import overlap_codec
 from tests.commands import run
-from tests.motions import skeleton, smooth
+from tests.motions import skeleton, smooth, written
 
 
 @pytest.fixture(autouse=True)
@@ -31,21 +29,11 @@ def overlap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, overlap_codec.CODEC)
 
 
-def written(motion: Motion, codec: str, **params: Any) -> bytes:
-    out = io.BytesIO()
-    mcz.write(motion, out, codec, **params)
-    return out.getvalue()
-
-
-def only(file: mcz.File) -> Clip:
-    return file.only_clip()
-
-
 @given(st.integers(0, 400), st.integers(1, 90), st.integers(1, 200))
 def test_marks_are_what_they_decode_to(n_frames: int, delta: int, length: int) -> None:
     data = written(smooth(n_frames), "qbc", delta=delta, segment_frames=length)
     with mcz.open(data) as file:
-        clip = only(file)
+        clip = file.only_clip()
         frames, values = clip.preview()
         whole = clip.read()
     wanted = {*range(0, n_frames, delta)} | ({n_frames - 1} if n_frames else set())
@@ -55,7 +43,7 @@ def test_marks_are_what_they_decode_to(n_frames: int, delta: int, length: int) -
 
 def test_joints_in_their_order() -> None:
     with mcz.open(written(smooth(300), "qbc", segment_frames=80)) as file:
-        clip = only(file)
+        clip = file.only_clip()
         frames, values = clip.preview(["knee", "hips"])
         assert np.array_equal(values, clip.read(joints=["knee", "hips"])[frames])
 
@@ -63,7 +51,7 @@ def test_joints_in_their_order() -> None:
 def test_the_coarsest_resolution_where_no_frame_is_exact() -> None:
     for codec, step in (("mrdwt", 16), ("overlap", 2)):
         with mcz.open(written(smooth(301), codec)) as file:
-            clip = only(file)
+            clip = file.only_clip()
             frames, values = clip.preview()
             resolution = step.bit_length() - 1
             assert frames.tolist() == list(range(0, 301, step))
@@ -76,7 +64,7 @@ def test_one_resolution_has_no_preview() -> None:
         mcz.open(written(smooth(30), "lossless")) as file,
         pytest.raises(OptionError, match="codec lossless has stored it in one resolution"),
     ):
-        only(file).preview()
+        file.only_clip().preview()
 
 
 @pytest.mark.parametrize("frames", [(0, 95), (33, 200), (90, 91), (160, 240), (215, 333)])
@@ -85,7 +73,7 @@ def test_of_a_clip_that_was_cut(frames: tuple[int, int], tmp_path: Path) -> None
     mcz.write(smooth(333), whole, "qbc", segment_frames=80, delta=40)
     mcz.extract(whole, part, frames=frames)
     with mcz.open(part) as file:
-        clip = only(file)
+        clip = file.only_clip()
         shown, values = clip.preview()
         marks = [*range(0, 333, 40), 332]
         assert shown.tolist() == [m - frames[0] for m in marks if frames[0] <= m < frames[1]]
@@ -97,7 +85,7 @@ def test_of_a_clip_without_its_curves(tmp_path: Path) -> None:
     mcz.write(smooth(333), whole, "qbc", segment_frames=80, delta=40)
     mcz.extract(whole, part, resolution=1)
     with mcz.open(part) as file, mcz.open(whole) as other:
-        (a, x), (b, y) = only(file).preview(), only(other).preview()
+        (a, x), (b, y) = file.only_clip().preview(), other.only_clip().preview()
     assert np.array_equal(a, b)
     assert np.array_equal(x, y)
 
@@ -108,7 +96,7 @@ def test_what_is_invalid_is_nan() -> None:
     mask[70:130, 4] = False
     motion = replace(motion, signals=(replace(motion.signals[0], mask=mask),))
     with mcz.open(written(motion, "qbc", delta=40)) as file:
-        clip = only(file)
+        clip = file.only_clip()
         frames, values = clip.preview()
         assert np.array_equal(values, clip.read()[frames], equal_nan=True)
         assert np.isnan(values[:, 4]).tolist() == [70 <= f < 130 for f in frames.tolist()]
@@ -118,16 +106,16 @@ def test_what_is_invalid_is_nan() -> None:
 def test_as_a_motion_at_a_lower_rate() -> None:
     motion = smooth(201, metadata={"subject": "x"})
     with mcz.open(written(motion, "qbc", delta=40)) as file:
-        found = preview_motion(only(file))
+        found = preview_motion(file.only_clip())
         assert found.frame_rate == 3
         assert found.frame_numbers.tolist() == [1, 41, 81, 121, 161, 201]
         assert found.metadata == {"subject": "x"} and found.source is None
     with mcz.open(written(smooth(190), "qbc", delta=40)) as file:
-        found = preview_motion(only(file))  # the last frame is nearer: it does not fit a rate
+        found = preview_motion(file.only_clip())  # the last frame is nearer: it does not fit a rate
         assert found.frame_numbers.tolist() == [1, 41, 81, 121, 161]
-        assert not only(file).previewed().is_regular
+        assert not file.only_clip().previewed().is_regular
     with mcz.open(written(smooth(0), "qbc")) as file:
-        assert preview_motion(only(file)).n_frames == 0
+        assert preview_motion(file.only_clip()).n_frames == 0
 
 
 class Watched(io.BytesIO):
@@ -165,7 +153,7 @@ def test_details_are_not_read(codec: str) -> None:
     data = written(long_motion(), codec)
     stream = Watched(data)
     with mcz.open(stream, unverified=True) as file:
-        clip = only(file)
+        clip = file.only_clip()
         clip.preview()
         assert file.unverified == len(clip.signals[0].rows)
         n_bytes = file.container.source.n_bytes
@@ -189,8 +177,8 @@ def walk(samples: Path, tmp_path: Path) -> Path:
 
 def test_command_numbers(walk: Path, tmp_path: Path) -> None:
     with mcz.open(walk) as file:
-        frames, values = only(file).preview(joints=[1])
-        joint = only(file).skeleton.addresses()[1]
+        frames, values = file.only_clip().preview(joints=[1])
+        joint = file.only_clip().skeleton.addresses()[1]
     assert run("decode", walk, "--preview", "--to", "csv", "--joints", joint) == 0
     rows = list(csv.reader(io.StringIO((tmp_path / "walk.csv").read_text("utf-8"))))
     assert [int(row[0]) for row in rows[1:]] == (frames + 1).tolist()
@@ -206,7 +194,7 @@ def test_command_converts(walk: Path, tmp_path: Path, target: str) -> None:
     assert run("decode", walk, "--preview", "--to", target, "-o", tmp_path / f"a.{target}") == 0
     found = mcz.read(tmp_path / f"a.{target}")
     with mcz.open(walk) as file:
-        wanted = preview_motion(only(file))
+        wanted = preview_motion(file.only_clip())
     assert found.n_frames == wanted.n_frames
     assert found.frame_rate == pytest.approx(float(wanted.frame_rate or 0), rel=1e-3)
 

@@ -356,9 +356,7 @@ def test_salvage_of_a_c3d_without_frames() -> None:
     first = motion.signals[0]
     nothing = replace(first, values=first.values[:0], mask=None)
     data = c3d.write(replace(motion, signals=(nothing,), source=None))
-    out = io.BytesIO()
-    mcz.write(c3d.read(data, "none"), out)
-    with mcz.open(out.getvalue(), salvage=True) as file:
+    with mcz.open(written(c3d.read(data, "none")), salvage=True) as file:
         assert file.only_clip().source_bytes() == data
 
 

@@ -22,7 +22,6 @@ from mcz.editing.recoding import recorded_options
 from mcz.errors import AccessError, MotionError, OptionError
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.reading.clip import Clip
 from tests import overlap_codec
 from tests.commands import run
 from tests.motions import motions, smooth
@@ -58,33 +57,25 @@ def written(motion: Motion, codec: str = "lossless", **params: Any) -> bytes:
     return out.getvalue()
 
 
-def only(file: mcz.File) -> Clip:
-    return file.only_clip()
-
-
 def edited(data: bytes, joint: int | str, values: Any, **options: Any) -> tuple[bytes, Any]:
     """The file with other values, checked as a whole."""
     out = io.BytesIO()
     with mcz.open(data) as file:
         found = mcz.replace(file, None, joint, values, out, **options)
     assert found.size == len(out.getvalue())
-    _check(out.getvalue())
+    assert mcz.verify(out.getvalue()) == []
     return out.getvalue(), found
-
-
-def _check(target: Any) -> None:
-    assert mcz.verify(target) == []
 
 
 def values_of(data: bytes, joint: str | None = None) -> np.ndarray:
     with mcz.open(data) as file:
-        return only(file).read(joints=None if joint is None else [joint])
+        return file.only_clip().read(joints=None if joint is None else [joint])
 
 
 def check_others(before: bytes, after: bytes, *joints: str) -> None:
     """All joints but these have the bits that they had, segments and headers are the same."""
     with mcz.open(before) as a, mcz.open(after) as b:
-        old, new = only(a), only(b)
+        old, new = a.only_clip(), b.only_clip()
         others = [n for n in old.skeleton.addresses() if n not in joints]
         assert new.read(joints=others).tobytes() == old.read(joints=others).tobytes()
         for one, other in zip(old.signals, new.signals, strict=True):
@@ -188,14 +179,14 @@ def test_the_source_file_is_the_edited_one(samples: Path, tmp_path: Path) -> Non
         values[10:20, :3] += [0.25, 0.5, 1e-7]  # the last has more digits than the grid
         mcz.replace(target, None, joint, values[:, : len(motion.skeleton.joints[0].channels)])
         with mcz.open(target) as file:
-            clip = only(file)
+            clip = file.only_clip()
             text = clip.source_bytes()
             assert clip.source and clip.source.size == len(text)
             assert clip.read().tolist() == values.tolist()
         expected = io.BytesIO()
         mcz.write(motion.with_values(values), expected)
         with mcz.open(expected.getvalue()) as file:
-            assert only(file).source_bytes() == text
+            assert file.only_clip().source_bytes() == text
         assert mcz.verify(target) == []
         assert text != source.read_bytes()
 
@@ -211,7 +202,7 @@ def test_on_grid_rounds_to_what_the_source_prints(samples: Path) -> None:
     assert found_rounded.joint_bytes <= found.joint_bytes + 8
     assert len(rounded) < len(exact)
     with mcz.open(rounded) as file:
-        assert not len(only(file).motion().signals[0].exceptions)
+        assert not len(file.only_clip().motion().signals[0].exceptions)
     assert np.abs(values_of(rounded) - values_of(exact)).max() < 1e-3
 
 
@@ -223,7 +214,7 @@ def test_markers_keep_their_source(samples: Path) -> None:
     moved = values + np.float32(8)
     after, _ = edited(data, name, moved, on_grid=True)
     with mcz.open(after) as file:
-        clip = only(file)
+        clip = file.only_clip()
         assert np.allclose(clip.read(joints=[name]), moved, equal_nan=True, atol=1e-3)
         assert clip.source and len(clip.source_bytes()) == clip.source.size
     check_others(data, after, name)
@@ -293,7 +284,7 @@ def test_a_clip_that_was_cut(case: str, tmp_path: Path) -> None:
     assert np.abs(values_of(after, "spine") - new).max() == found.max_error < 8
     assert np.array_equal(values_of(after)[:, :6], values_of(data)[:, :6])
     with mcz.open(after) as file:
-        quality = only(file).quality
+        quality = file.only_clip().quality
         assert quality and quality["cut-frames"] == "230:415"
         assert quality["edit-joints"] == "spine"
 
@@ -312,10 +303,10 @@ def test_a_clip_without_its_finest_details(codec: str, tmp_path: Path) -> None:
 def test_the_quality_record_says_what_is_known() -> None:
     data = written(smooth(200), "qbc")
     with mcz.open(data) as file:
-        before = only(file).quality
+        before = file.only_clip().quality
     after, found = edited(data, "knee", np.zeros(200))
     with mcz.open(after) as file:
-        record = only(file).quality
+        record = file.only_clip().quality
     assert before and record
     assert record["edit-joints"] == "knee"
     assert record["codec"] == "qbc" and record["param.preset"] == "default"
@@ -323,7 +314,7 @@ def test_the_quality_record_says_what_is_known() -> None:
     assert float(record["edit_mse"]) <= found.max_error**2
     twice, _ = edited(after, "spine", np.ones((200, 3)))
     with mcz.open(twice) as file:
-        again = only(file).quality
+        again = file.only_clip().quality
     assert again and again["edit-joints"] == "knee,spine"
     assert again["unedited_mse"] == before["mse"] and "unedited_edit_mse" not in again
     assert "edit_mse" in again and "edit_edit_mse" not in again
@@ -332,7 +323,7 @@ def test_the_quality_record_says_what_is_known() -> None:
 def test_a_lossless_clip_has_no_record() -> None:
     after, _ = edited(written(smooth(20)), "knee", np.zeros(20))
     with mcz.open(after) as file:
-        assert only(file).quality is None
+        assert file.only_clip().quality is None
 
 
 def test_recorded_options_forgive() -> None:
@@ -370,7 +361,7 @@ def test_other_clips_and_files_stay(tmp_path: Path, samples: Path) -> None:
             n: [file.container.payload(s.chunk()) for s in rows[n].segments] for n in file.clips
         }
         attachments = {n: a.read() for n, a in file.attachments.items()}
-    _check(out)
+    assert mcz.verify(out) == []
     with mcz.open(out) as file:
         rows = file.container.directory.clips
         assert list(file.clips) == list(before)
@@ -494,8 +485,8 @@ def walk(samples: Path, tmp_path: Path) -> Path:
 def test_command(walk: Path, suffix: str, capsys: pytest.CaptureFixture[str]) -> None:
     table, out = walk.with_suffix(f".{suffix}"), walk.with_name("out.mcz")
     with mcz.open(walk) as file:
-        joint = only(file).skeleton.addresses()[2]
-        before = only(file).read()
+        joint = file.only_clip().skeleton.addresses()[2]
+        before = file.only_clip().read()
     assert run("decode", walk, "--to", suffix, "-o", table) == 0
     assert run("replace", walk, out, "--joint", joint, "--values", table) == 0
     assert joint in capsys.readouterr().out
@@ -519,7 +510,7 @@ def test_command(walk: Path, suffix: str, capsys: pytest.CaptureFixture[str]) ->
 
 def test_command_takes_columns_alone(walk: Path, tmp_path: Path) -> None:
     with mcz.open(walk) as file:
-        clip = only(file)
+        clip = file.only_clip()
         joint, n = clip.skeleton.addresses()[2], clip.n_frames
     table = tmp_path / "plain.csv"
     table.write_text("1,2,3\n" * n)

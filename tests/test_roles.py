@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,6 +15,7 @@ from mcz import Channel, Motion, MotionError, Signal, sample
 from mcz.formats import c3d
 from tests.commands import run
 from tests.formats.c3d_files import made
+from tests.motions import written
 
 C3D = c3d.read(made(3, 2, 2, 2, size=2).build(), "gait")
 
@@ -32,9 +32,7 @@ def walk(*more: Signal, n: int = 4) -> Motion:
 
 
 def stored(motion: Motion) -> mcz.File:
-    out = io.BytesIO()
-    mcz.write(motion, out)
-    return mcz.open(out.getvalue())
+    return mcz.open(written(motion))
 
 
 def test_signals_that_say_no_role_are_the_motion_and_others() -> None:

@@ -18,7 +18,7 @@ from mcz.codecs import CODECS
 from mcz.codecs.contract import Layout
 from mcz.codecs.segments import Sizing, guessing
 from mcz.threads import in_force, in_order, limited
-from tests.motions import smooth
+from tests.motions import smooth, written
 
 MOTION = smooth(1800)
 SEGMENTED = sorted(
@@ -29,9 +29,7 @@ SEGMENTED = sorted(
 
 
 def file_of(codec: str, threads: int | None = None, **params: object) -> bytes:
-    out = io.BytesIO()
-    mcz.write(MOTION, out, codec=codec, threads=threads, **params)
-    return out.getvalue()
+    return written(MOTION, codec=codec, threads=threads, **params)
 
 
 @pytest.mark.parametrize("codec", SEGMENTED)

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz import Motion, MotionError, OptionError
-from mcz.bench.cases import Case
-from mcz.bench.tables import Table
 from mcz.codecs.basis_models import parse_bases
 from mcz.training import (
     Recipe,
@@ -37,9 +35,7 @@ from mcz.transforms.lsdt import (
     start_basis,
 )
 from tests.commands import run
-from tools.papers.curves import bases, references
 from tools.papers.hou2016 import training as study
-from tools.papers.hou2016.spatial import measured_convergence, measured_distortions
 
 Floats = NDArray[np.float64]
 
@@ -385,23 +381,6 @@ def test_distortion_of_kept_coefficients() -> None:
     kept = np.where(np.abs(coefficients) >= limit, coefficients, 0)
     back = np.stack([kept[:, a] @ matrices[a] for a in range(3)], axis=2)
     assert half == pytest.approx(np.linalg.norm(back - positions, axis=2).mean())
-
-
-def test_study_tables(samples: Path) -> None:
-    case = Case(str(samples / "walk.amc"))
-    clips = references([case])
-    fig_3 = measured_convergence(clips, 3, 1)["table"]
-    assert len(fig_3["rows"]) == 2 * 2 * 3
-    given = ("iterations", 3), ("kind", "frames")
-    named = [(f"P = {P}", bases(clips, (*given, ("sparsity", P)))["data"]) for P in (2, 8)]
-    found = measured_distortions(clips, [("LSDT", named[1][1]), *named])
-    fig_5, fig_4 = found["fig_5"]["rows"], found["by_sparsity"]["rows"]
-    assert [row[1] for row in fig_5[:4]] == ["LSDT", "LSDT, as shipped", "DCT", "Haar"]
-    assert [row[1] for row in fig_4[:2]] == ["P = 2", "P = 8"]
-    learned, cosine = fig_5[0], fig_5[2]
-    assert all(a < b for a, b in zip(learned[2:], cosine[2:], strict=True))
-    for kept in (fig_3, *found.values()):
-        assert Table.of(kept).cells()
 
 
 @pytest.mark.real

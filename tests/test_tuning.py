@@ -19,6 +19,7 @@ from mcz.codecs.parameters import Dial
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.reading.sizes import clip_sizes
 from mcz.writing.tuning import GOAL, PROMISED, Target, search
+from tests.motions import written
 
 DIAL = Dial("T_g", 2.0**-20, 2.0**20)
 RISING = Dial("a_w", 2.0**-20, 2.0**20, rises=True)
@@ -43,9 +44,7 @@ WALK = walk()
 
 
 def saved(motion: Motion, **params: object) -> bytes:
-    out = io.BytesIO()
-    mcz.write(motion, out, codec="mrdwt", **params)
-    return out.getvalue()
+    return written(motion, codec="mrdwt", **params)
 
 
 class Found:
@@ -379,9 +378,7 @@ def test_a_rising_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
     ],
 )
 def test_targets_of_other_codecs(codec: str, name: str, limit: float) -> None:
-    out = io.BytesIO()
-    mcz.write(WALK, out, codec=codec, **{name: limit})
-    Found(WALK, out.getvalue()).check(name, limit)
+    Found(WALK, written(WALK, codec=codec, **{name: limit})).check(name, limit)
 
 
 def test_targets_that_components_cannot_meet() -> None:

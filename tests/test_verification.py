@@ -25,16 +25,14 @@ from mcz.container.source import open_source
 from mcz.errors import UnsupportedError
 from tests import live_codec
 from tests.commands import Call
-from tests.motions import skeleton, smooth
+from tests.motions import skeleton, smooth, written
 
 DATE = "2026-11-24"
 
 
 def archive() -> bytes:
     """A clip in chunks."""
-    out = BytesIO()
-    mcz.write(smooth(12), out, "raw")
-    return out.getvalue()
+    return written(smooth(12), "raw")
 
 
 def live() -> bytes:

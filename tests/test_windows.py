@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +13,14 @@ import mcz
 from mcz import ChecksumError, Signal
 from mcz.container.runs import MOST_BYTES, Run, Runs
 from mcz.container.segments import FRESH
-from tests.motions import smooth
+from tests.motions import smooth, written
 
 LENGTH = 90
 VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
 
 
 def file_of(codec: str, **options: object) -> bytes:
-    out = io.BytesIO()
-    mcz.write(smooth(LENGTH), out, codec=codec, **options)
-    return out.getvalue()
+    return written(smooth(LENGTH), codec=codec, **options)
 
 
 FILES = {codec: file_of(codec, segment_frames=16) for codec in ("fast", "lossless", "mrdwt")}
@@ -91,9 +88,7 @@ def test_damage_later_in_a_run_leaves_what_is_before(name: str) -> None:
 
 def test_segments_that_no_channel_needs_are_checked() -> None:
     still = mcz.Motion(mcz.Skeleton((mcz.Joint("rock"),)), (Signal(np.zeros((7, 0))),), name="rock")
-    out = io.BytesIO()
-    mcz.write(still, out)
-    data = bytearray(out.getvalue())
+    data = bytearray(written(still))
     with mcz.open(bytes(data)) as file:
         row = file.only_clip().signals[0].rows[0]
     data[row.offset + 1] ^= 4
