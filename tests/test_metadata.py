@@ -117,15 +117,6 @@ def test_a_key_that_is_said_behind_costs_one_read(archive: Path) -> None:
         assert all("_fields" not in vars(clip) for clip in file)
 
 
-def test_what_readers_interpret_is_not_said_behind(archive: Path) -> None:
-    before = archive.read_bytes()
-    with pytest.raises(AssertionError):
-        said(archive, Record("walk", {"name-encoding": "9"}))
-    with mcz.open(archive) as file, pytest.raises(mcz.FormatError, match="name-encoding"):
-        _ = file.clips["walk"].metadata
-    assert archive.read_bytes()[: len(before)] == before
-
-
 def test_it_goes_along(archive: Path, tmp_path: Path) -> None:
     said(archive, Record("walk", {"subject": "05"}), Record("walk.c3d", {"subject": "Ada"}))
     mcz.rename_clips(archive, {"walk": "first"})

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mcz import FormatError, OptionError, SourceError
+from mcz import FormatError, SourceError
 from mcz.numbers import (
     Grid,
     GridFlag,
@@ -20,9 +20,7 @@ from mcz.numbers import (
     Tokens,
     choose_grid,
     fit,
-    ordinals_of,
     scan,
-    values_of,
 )
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
@@ -488,49 +486,6 @@ def test_vax_values(stored: str, value: float) -> None:
     assert grid.bits(ordinals).tobytes().hex() == stored
     found = grid.values(ordinals)[0]
     assert found == value or math.isnan(value) == math.isnan(found) is True
-
-
-def test_scaled_and_integer() -> None:
-    grid = Grid(GridKind.SCALED, scale=0.1)
-    assert grid.values(np.array([-3, 0, 7])).tolist() == [-3 * 0.1, 0.0, 7 * 0.1]
-    whole = Grid(GridKind.INTEGER)
-    assert whole.values(np.array([-3, 0, 2**53])).tolist() == [-3.0, 0.0, 2.0**53]
-    with pytest.raises(OptionError):
-        whole.texts(np.array([1]))
-    with pytest.raises(OptionError):
-        Grid(GridKind.FIXED, 4).bits(np.array([1]))
-
-
-@pytest.mark.parametrize("grid", GRIDS, ids=repr)
-@given(data=st.data())
-def test_values_of_a_matrix_are_those_of_each_grid(grid: Grid, data: st.DataObject) -> None:
-    grids = [grid, data.draw(st.sampled_from(GRIDS)), grid]
-    columns = []
-    for own in grids:
-        low = -1 - own.limit if own.signed_magnitude else -own.limit
-        near = st.integers(max(low, -(10**7)), min(own.limit, 10**7))
-        columns.append(st.one_of(near, st.integers(low, own.limit)))
-    rows = data.draw(st.lists(st.tuples(*columns), max_size=9))
-    ordinals = np.array(rows, np.int64).reshape(len(rows), 3)
-    found = values_of(ordinals, grids)
-    for column, own in enumerate(grids):
-        wanted = own.values(ordinals[:, column])
-        np.testing.assert_array_equal(found[:, column].view(np.int64), wanted.view(np.int64))
-
-
-@pytest.mark.parametrize("grid", GRIDS, ids=repr)
-@given(data=st.data())
-def test_ordinals_of_a_matrix_are_those_of_each_grid(grid: Grid, data: st.DataObject) -> None:
-    values = DOUBLES | st.sampled_from([0.0, -0.0, np.nan, np.inf, -np.inf, 5e-324, 1e308, 0.5])
-    held = INT64.map(lambda o: float(grid.values(np.array([o % (grid.limit + 1)]))[0]))
-    rows = data.draw(st.lists(st.tuples(values | held, values), min_size=1, max_size=6))
-    table = np.array(rows)
-    grids = (grid, GRIDS[0])
-    ordinals, exact = ordinals_of(table, grids)
-    for c, own in enumerate(grids):
-        wanted, back = own.ordinals(np.ascontiguousarray(table[:, c]))
-        assert ordinals[:, c].tolist() == wanted.tolist()
-        assert exact[:, c].tolist() == back.tolist()
 
 
 @pytest.mark.parametrize(

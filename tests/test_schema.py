@@ -28,7 +28,7 @@ from mcz.schema import (
     types,
     varint,
 )
-from tools.records import empty_context, record_of, span
+from tools.records import empty_context, record_of
 from tools.spec_tables import is_record, structures
 
 RECORDS = {name: thing for name, thing in structures().items() if "." in name and is_record(thing)}
@@ -217,14 +217,6 @@ def test_fields_are_read() -> None:
     assert [leaf.size for leaf in full.leaves] == [7, 128]
     assert build(full, "tree") == b"\3ab\4\5\2\7\x80\1"
     assert build(replace(full, label=b"cd"), "tree") == b"\3cd\4\5\2\7\x80\1"
-
-
-@pytest.mark.parametrize(
-    ("path", "place"),
-    [("flags", (0, 1)), ("weight", (3, 5)), ("leaves", (5, 9)), ("leaves.1.size", (7, 9))],
-)
-def test_places_of_fields(path: str, place: tuple[int, int]) -> None:
-    assert span(Tree, b"\3ab\4\5\2\7\x80\1", path) == place
 
 
 @pytest.mark.parametrize(
