@@ -58,19 +58,6 @@ def test_range_outside_the_clip(frames: tuple[int, int]) -> None:
         file.clips["smooth"].read(frames)
 
 
-def test_invalid_values_are_nan_and_kept_beneath() -> None:
-    motion = smooth(10)
-    mask = np.ones((10, 10), bool)
-    mask[3:5, 2] = False
-    signal = replace(motion.signals[0], mask=mask)
-    with mcz.open(written(replace(motion, signals=(signal,)))) as file:
-        clip = file.clips["smooth"]
-        assert np.isnan(clip.read()[3:5, 2]).all()
-        values, back = clip.read_masked()
-        np.testing.assert_array_equal(values, motion.signals[0].values)
-        np.testing.assert_array_equal(back, mask)
-
-
 def test_values_off_their_grid_become_exceptions() -> None:
     motion = smooth(10)
     values = motion.values.copy()
@@ -100,17 +87,6 @@ def test_grid_changes_begin_a_segment() -> None:
         np.testing.assert_array_equal(clip.read(), values)
         np.testing.assert_array_equal(clip.read((7, 9), ["spine"]), values[7:9, 6:9])
         assert clip.motion().signals[0].grid_changes == changes
-
-
-@pytest.mark.parametrize(
-    "numbers", [[5, 6, 7, 8], [1, 2, 10, 11], [-9, -3, 0, 1], [1, 2, 3, 4], [1, 3, 5, 2**52 - 1]]
-)
-def test_frame_numbers(numbers: list[int]) -> None:
-    motion = replace(smooth(4), frame_numbers=np.array(numbers))
-    with mcz.open(written(motion)) as file:
-        np.testing.assert_array_equal(file.clips["smooth"].frame_numbers, numbers)
-        cut = file.clips["smooth"].motion((2, 4))
-        assert cut.frame_numbers is None or list(cut.frame_numbers) == numbers[2:]
 
 
 @pytest.mark.parametrize(
@@ -200,17 +176,6 @@ def test_skeleton_comes_back_to_the_bit() -> None:
         back = file.clips["motion"].motion()
     assert repr(back.skeleton.joints[0].offset) == "(0.0, 1.0, -0.0)"
     assert back.frame_rate == Fraction(30000, 1001)
-
-
-def test_nan_payloads_survive_in_ordinals() -> None:
-    words = np.array([[0x7FC00000], [0xFFC00000], [0x7F800001], [0x3F800000]], "<u4")
-    grid = Grid(GridKind.BINARY32)
-    ordinals = grid.ordinals_of_bits(words)
-    bones = mcz.Skeleton((mcz.Joint("m", channels=(mcz.Channel("tx"),)),))
-    signal = Signal(grid.values(ordinals), (grid,), ordinals=ordinals)
-    with mcz.open(written(mcz.Motion(bones, (signal,)))) as file:
-        back = file.clips["motion"].motion().signals[0]
-    np.testing.assert_array_equal(grid.bits(back.to_ordinals()[0]), words)
 
 
 def test_reading_a_closed_file() -> None:
