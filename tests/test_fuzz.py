@@ -23,7 +23,9 @@ from tools.fuzz.targets import TARGETS
 
 ODD = (  # vectors that this package reads but would write otherwise, or cannot hash
     "/random/",
+    "by-hand",
     "extension-INDX",
+    "index-continued",
     "newer",
     "older",
     "unknown",
