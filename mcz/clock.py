@@ -170,7 +170,7 @@ def unit_of_times(signal: Timed) -> str:
 
 
 def times_form_fault(signal: Timed) -> str:
-    """Why a signal cannot be one of times by its form, "" where it can."""
+    """The fault in the form of a signal of times, "" where there is none."""
     own = signal.channels or ()
     if signal.samples_per_frame != 1 or len(own) != 1:  # ROLE-03
         return f"{len(own)} channels of its own, {signal.samples_per_frame} rows a frame"
@@ -224,7 +224,7 @@ def timeline_of(
 
 
 def times_fault(times: Values) -> str:
-    """Why numbers are no times, "" where they are."""
+    """The fault in numbers that should be times, "" where there is none."""
     if not np.isfinite(times).all():
         return f"that of frame {int(np.flatnonzero(~np.isfinite(times))[0])} is unknown"
     falls = np.flatnonzero(np.diff(times) < 0)

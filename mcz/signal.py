@@ -188,7 +188,7 @@ class Signal:
 
     @property
     def has_poses(self) -> bool:
-        """Whether it is a motion whose channels are those of the skeleton."""
+        """True of a motion whose channels are those of the skeleton."""
         return self.role == "motion" and self.channels is None
 
     @property

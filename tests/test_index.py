@@ -113,7 +113,7 @@ def test_appends_leave_few_indexes_and_write_little() -> None:
 
 
 def test_four_requests_open_a_file_of_many_appends(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nothing is taken in because it is small, and each INDX lies far from the next one."""
+    """Nothing is taken in for being small, and each INDX lies far from the next one."""
     monkeypatch.setattr(index, "GROWTH", 0)
     monkeypatch.setattr(http, "TAIL", 2000)
     sink, directory = BytesIO(), None

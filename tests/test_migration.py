@@ -45,7 +45,7 @@ def unpacked(path: Path) -> dict[str, str]:
 
 
 def test_times_of_a_table_are_a_signal_of_their_own(tmp_path: Path) -> None:
-    """Where the old file has them before the channels of the motion."""
+    """The old file has them before the channels of the motion."""
     text = "walk\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\ta\tb\n"
     text += "".join(f"{0.5 + i / 60:.4f}\t{i}.5\t-{i}\n" for i in range(3))
     (tmp_path / "walk.mot").write_text(text)

@@ -1,4 +1,4 @@
-"""Who compares the hash of the values, and when; known answers of the codecs."""
+"""Comparing the hash of the values, by readers and writers; known answers of the codecs."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def signal(found: Any, sha256: bytes, folder: Folder) -> dict[str, Any]:
 
 
 def is_times(found: Any) -> bool:
-    """Whether a signal is a column of times, as SPEC.md 0.9, "Time", has it but for its name."""
+    """True of a column of times as SPEC.md 0.9, "Time", has it, whatever its name."""
     one = len(found.channels or ()) == found.samples_per_frame == 1
     if not one or found.channels[0].kind or found.channels[0].unit not in ("s", "ms", "us", "ns"):
         return False

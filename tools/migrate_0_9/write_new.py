@@ -97,7 +97,7 @@ class Old:
         return next(possible, 1 + rows)
 
     def metadata(self, clip: Content) -> dict[str, str]:
-        """That of the clip, with the frame numbers that it cannot have."""
+        """The metadata of the clip, with the frame numbers that it cannot have."""
         kept = {key: value for key, value in clip["metadata"].items() if key != START}
         if _numbers_fault(np.frombuffer(self.data(clip["frame_numbers"]), "<i8")):
             kept[NUMBERS] = clip["numbers_text"]
@@ -131,7 +131,7 @@ class Old:
 
 
 def _numbers_fault(numbers: np.ndarray[Any, np.dtype[np.int64]]) -> str:
-    """Why no clip can have these frame numbers, "" where one can."""
+    """The fault in frame numbers that no clip can have, "" where there is none."""
     try:
         check_numbers(numbers, "")
     except mcz.MotionError as error:
@@ -297,7 +297,7 @@ def _role(held: Content, index: int) -> tuple[str, int | None]:
 def differences(
     old: Old, path: Path, split: Collection[str], untimed: Collection[str] = ()
 ) -> Iterator[str]:
-    """What of the old file the new one does not give back; ``split``: whose times moved.
+    """List what the new file does not give back of the old one; ``split``: whose times moved.
 
     ``untimed``: whose times are not to be compared.
     """
