@@ -34,6 +34,7 @@ ODD = (  # vectors that this package reads but would write otherwise, or cannot 
     "model-later",
     "appended-nothing",
     "end-not-fresh",
+    "/extensions/",
 )
 EVERY = 23  # vectors between two that are looked at
 
