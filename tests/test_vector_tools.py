@@ -116,21 +116,21 @@ def test_every_invalid_vector_has_a_fault() -> None:
 def test_faults_refuse_what_they_do_not_know() -> None:
     names = [name for name in ROWS if name.startswith("invalid/")]
     assert set(faults.faults(names)) == set(names)
-    with pytest.raises(ValueError, match="nothing is said of invalid/raw/new"):
-        faults.faults([*names, "invalid/raw/new"])
-    with pytest.raises(ValueError, match="no vector needs .*width-9"):
-        faults.faults([name for name in names if "invalid/raw/width-9" not in name])
+    with pytest.raises(ValueError, match="nothing is said of invalid/parts-of/new"):
+        faults.faults([*names, "invalid/parts-of/new"])
+    with pytest.raises(ValueError, match="no vector needs .*c3d-range-"):
+        faults.faults([name for name in names if "c3d-range" not in name])
 
 
 def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ["valid/raw/plain", "valid/raw/widths", "invalid/raw/absent"]
+    names = ["valid/raw/plain", "valid/raw/widths", "invalid/parts/crc"]
     monkeypatch.setattr(requirements, "ARGUED", {})
     monkeypatch.setattr(requirements, "caught", dict)
     monkeypatch.setattr(requirements, "VECTORS", {"RAW-01": ("valid/*",), "A-02": ("*/plain",)})
     assert requirements.requirements(names) == {
         "valid/raw/plain": ["A-02", "RAW-01"],
         "valid/raw/widths": ["RAW-01"],
-        "invalid/raw/absent": [],
+        "invalid/parts/crc": [],
     }
     for table in ({"RAW-01": ("valid/lossless/*",)}, {"RAW-01": ()}, {"RAW": ("valid/*",)}):
         monkeypatch.setattr(requirements, "VECTORS", table)

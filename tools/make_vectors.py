@@ -24,6 +24,7 @@ sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
 from mcz.container.versions import FORMAT_NAME  # noqa: E402 - needs the path
 from tools.vectors import invalid, uncommon, valid  # noqa: E402 - needs the path
+from tools.vectors.bases import MADE  # noqa: E402
 from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402
 from tools.vectors.contents import codecs_of, formats_of  # noqa: E402
 from tools.vectors.engine.tables import Row, tables  # noqa: E402
@@ -44,6 +45,7 @@ def vectors(without: Collection[ModuleType] = ()) -> list[Vector]:
         start = group.__name__.rpartition(".")[2] + "/"
         made += [row.vector() for row in table_rows().values() if row.name.startswith(start)]
         found += sorted(made, key=lambda vector: vector.name)
+        MADE.update({vector.name: vector.data for vector in made if group is valid})
     names = [vector.name for vector in found]
     assert len(names) == len(set(names)), sorted(n for n in names if names.count(n) > 1)
     return found

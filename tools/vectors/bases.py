@@ -1,6 +1,7 @@
 """Base files of the tables, by name: motions that the encoders of mcz write, and whole files.
 
-A row names one as ``dance(8)``, several clips as ``dance() + dance(3, name='encore')``.
+A row names one as ``dance(8)``, several clips as ``dance() + dance(3, name='encore')``, a vector
+as ``valid/qbc/plain``.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,7 @@ from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.edits import Made, both, indexed, put, raw_stream
 from tools.vectors.build.files import Crafter, file_of, finished, rehash
 from tools.vectors.build.source_files import ODD, PLAIN, take
+from tools.vectors.codec_bases import coded
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,8 @@ class Base:
 
 
 BASES: dict[str, Callable[..., Base]] = {}
+MADE: dict[str, bytes] = {}  # valid vectors of this run, that rows name as bases
+VECTORS = Path(__file__).resolve().parents[2] / "conformance/vectors"
 
 
 def base(make: Callable[..., Any]) -> Callable[..., Any]:
@@ -70,6 +75,7 @@ for _make in (
     motions.with_exceptions,
     motions.with_grid_changes,
     motions.with_mask,
+    coded,
 ):
     base(_make)
 
@@ -299,6 +305,14 @@ def _limited(found: Base, options: dict[str, Any]) -> bytes:
 
 
 @base
+def parted(name: str, *pieces: str) -> bytes:
+    """An attachment in these parts, and no INDX."""
+    crafter = Crafter()
+    crafter.parts(name, *(piece.encode() for piece in pieces))
+    return finished(crafter, index=False)
+
+
+@base
 def attached(name: str, content: str, alias: str = "") -> Base:
     """An attachment, and an alias of it, before the clips."""
     return Base((), None, ((name, content.encode()),), ((name, alias),))
@@ -339,6 +353,8 @@ def _evaluated(node: ast.expr) -> Any:
 @cache
 def base_of(text: str) -> Base:
     """The base that a row names."""
+    if text.startswith("valid/"):
+        return Base((), MADE.get(text) or (VECTORS / f"{text}.mcz").read_bytes())
     found: Base = _evaluated(ast.parse(text, mode="eval").body)
     return found
 

@@ -6,6 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from mcz.codecs.curves.qbc import QbcHeader
+from mcz.codecs.online.coder import OnlineHeader
+from mcz.codecs.pca.pca import PcaHeader
+from mcz.codecs.posewave.header import PosewaveHeader
+from mcz.codecs.spatial.lsdt_frame import FrameHeader
+from mcz.codecs.spatial.windows import WindowsHeader
+from mcz.codecs.wavelet.shared import WaveletHeader
 from mcz.container import copy_records, index_records, note_records, payloads
 from mcz.container.index_records import Index
 from mcz.container.packed import decoded, words
@@ -119,6 +126,18 @@ VIEWS: dict[str, View] = {
     "COPIED": View(b"COPY", CopiedChunks, _copy_list, _with_copy_list),
     "RECORDS": View(b"META", None, _copied, _with_copied),
     "HEADER": View(b"CLIP", None, *_inside(payloads.Clip, "signals.0.header")),
+    **{
+        f"{codec}_HEADER": View(b"CLIP", record, *_inside(payloads.Clip, "signals.0.header"))
+        for codec, record in {
+            "CLIP": WindowsHeader,
+            "FRAME": FrameHeader,
+            "ONLINE": OnlineHeader,
+            "PCA": PcaHeader,
+            "POSEWAVE": PosewaveHeader,
+            "QBC": QbcHeader,
+            "WAVELET": WaveletHeader,
+        }.items()
+    },
     "HEADER1": View(b"CLIP", None, *_inside(payloads.Clip, "signals.1.header")),
 }
 STREAMS: dict[str, type[Record] | None] = {

@@ -23,7 +23,7 @@ from mcz.container.chunks import (
     build_foot,
     parse_header,
 )
-from mcz.container.directory import ClipRow, Directory, SegmentRow
+from mcz.container.directory import ClipRow, Directory, SegmentRow, signal_rows
 from mcz.container.feeding import packets
 from mcz.container.index import Listing, end_of, segment_rows
 from mcz.container.index_reader import ClipTables, directory_of, parse_index
@@ -271,7 +271,9 @@ class Layout:
             return
         cend, last = clip.cend, end_of(clip, segment_rows(clip))
         was = {row.offset: row for row in clip.segments}
-        clip.name = self._name(moved[clip.clip.payload_offset], clip.name)
+        part = moved[clip.clip.payload_offset]
+        if part.payload != self.payloads[part]:
+            self._follow(clip, part)
         clip.clip, clip.segments = start, list(self._segment_rows(start, was))
         end = clip.segments[-1].stop if clip.segments else start.stop
         found = None if cend is None else _moved(cend, moved)
@@ -283,11 +285,14 @@ class Layout:
             key=lambda chunk: chunk.offset,
         )
 
-    def _name(self, part: Part, was: str) -> str:
-        try:
-            return parse(payloads.Clip, part.payload, "CLIP").name
-        except MczError:
-            return was
+    def _follow(self, clip: ClipRow, part: Part) -> None:
+        """Let a row say what the edited CLIP says, as far as it can be read."""
+        with suppress(MczError):
+            fields = parse(payloads.Clip, part.payload, "CLIP")
+            clip.name = fields.name
+            clip.signals = signal_rows(fields, "CLIP") or clip.signals
+            if not fields.flags & payloads.OPEN_CLIP:
+                clip.n_frames = fields.n_frames
 
     def _segment_rows(self, clip: Chunk, was: Mapping[int, SegmentRow]) -> Iterator[SegmentRow]:
         """The segments between a CLIP and what ends the clip."""

@@ -84,7 +84,10 @@ class Row:
             arrays=arrays(*held.motions),
             sources=held.sources if "sources" in modes else (),
             modes=modes,
-            parts=tuple(_part(held, text) for text in fields.get("parts", ())),
+            parts=tuple(
+                _part(held, text) if OK in exit_ else (tuple(text.split()), ())
+                for text in fields.get("parts", ())
+            ),
             since=fields.get("since", FORMAT_NAME),
         )
 
@@ -102,6 +105,7 @@ def rows_of(path: Path) -> Iterator[Row]:
     """The rows of one table; raises ValueError for what no table has."""
     found = tomllib.loads(path.read_text("utf-8"))
     head, constants = found.pop("TABLE"), found.pop("BYTES", {})
+    bases = found.pop("BASES", {})
     faults = {key: Fault.of(text) for key, text in found.pop("FAULTS", {}).items()}
     if set(head) - HEAD:
         raise ValueError(f"{path.name}: TABLE has no {sorted(set(head) - HEAD)}")
@@ -113,6 +117,7 @@ def rows_of(path: Path) -> Iterator[Row]:
             if unknown or ("fault" in row) != folder.startswith("invalid/"):
                 raise ValueError(f"{path.name}: {name}: {unknown or 'fault'}")
             fields = _filled({**head, **row}, folder.rpartition("/")[2])
+            fields["base"] = bases.get(fields["base"], fields["base"])
             fields["also"] = f"{head.get('also', '')} {row.get('also', '')}"
             used.add(row.get("fault"))
             fault = faults[row["fault"]] if "fault" in row else None
