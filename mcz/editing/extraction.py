@@ -243,7 +243,7 @@ class Copier(Carrier):
         missing = cend.missing if cend is not None and cut.is_whole else []
         self.writer.end_clip(cut.n_frames, source, hashes, extension, missing)
         self.quality(cut, row)
-        self._note(cut)
+        self.note(cut)
 
     def segment(
         self, cut: ClipCut, part: SignalCut, row: SegmentRow, *, noted: bool
@@ -262,7 +262,7 @@ class Copier(Carrier):
                 self._leave_out(cut, f"its {name}, which other joints have a part in")
         if clip.source is not None and cut.joints is not None:
             self._leave_out(cut, "its source file, as joints were cut")
-        self._note(cut)
+        self.note(cut)
 
     def _leave_out(self, cut: ClipCut, text: str) -> None:
         self.left_out.append(f"clip {cut.clip.name}: {text}")
@@ -372,7 +372,8 @@ class Copier(Carrier):
         """Entries of the quality record from those of before; None: there is no record."""
         return cut_quality(cut, old or {})
 
-    def _note(self, cut: ClipCut) -> None:
+    def note(self, cut: ClipCut) -> None:
+        """Keep what was written."""
         written = self.writer.directory.clips[self.name_of(cut)].segments
         before = [row for info in cut.clip.signals for row in info.rows]
         stored = cut.n_frames

@@ -82,6 +82,11 @@ class SomeSignals(Clip):
         return self.whole.is_scaled(self.kept[signal])
 
 
+def has_motion(clip: Clip) -> bool:
+    """Whether a clip, or the rest of one, has its first signal."""
+    return not isinstance(clip, SomeSignals) or 0 in clip.kept
+
+
 class WholeRun(ClipCut):
     """A run of frames of a damaged clip: hashes and source are made anew, whatever its length."""
 
@@ -94,10 +99,9 @@ class WholeRun(ClipCut):
     @property
     def name(self) -> str:
         """The name of the clip where all frames of its motion are there."""
-        has_motion = not isinstance(self.clip, SomeSignals) or 0 in self.clip.kept
-        if has_motion and self.n_frames == stated_frames(self.clip):
+        if has_motion(self.clip) and self.n_frames == stated_frames(self.clip):
             return self.clip.name
-        of = "" if has_motion else f".{self.clip.signals[0].name}"
+        of = "" if has_motion(self.clip) else f".{self.clip.signals[0].name}"
         return f"{self.clip.name}.{self.start}-{self.stop}{of}"
 
 
@@ -131,30 +135,25 @@ class Repairer(Copier):
 
     def quality(self, cut: ClipCut, row: ClipRow) -> None:
         """Figures are of the motion."""
-        has_motion = not isinstance(cut.clip, SomeSignals) or 0 in cut.clip.kept
-        if has_motion and self._degree(cut) == FULL:
+        if has_motion(cut.clip) and self._degree(cut) == FULL:
             super().quality(cut, row)
 
     def _degree(self, cut: ClipCut) -> int:
         return self.degrees.get(self.name_of(cut), FULL)
 
     def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> None:
-        super().run([cut for cut in cuts if self._is_kept(cut)], alone=alone)
+        for cut in cuts:
+            if degree := self._degree(cut):
+                what = "chunks that belong to it, which break a rule"
+                what = "all of it, which breaks a rule" if degree == NOTHING else what
+                self.repair.lost.append(f"clip {self.name_of(cut)!r}: {what}")
+        super().run([cut for cut in cuts if self._degree(cut) < NOTHING], alone=alone)
 
-    def _is_kept(self, cut: ClipCut) -> bool:
-        """Return whether a clip is written; note what of it is not, as it breaks a rule."""
-        name, degree = self.name_of(cut), self._degree(cut)
-        if degree == NOTHING:
-            self.repair.lost.append(f"clip {name!r}: all of it, which breaks a rule")
-            if not isinstance(cut, WholeRun):
-                self.repair.clips.remove(name)
-            elif self.repair.runs[cut.clip.name] == [(cut.start, cut.stop)]:
-                del self.repair.runs[cut.clip.name]
-            else:
-                self.repair.runs[cut.clip.name].remove((cut.start, cut.stop))
-        elif degree:
-            self.repair.lost.append(f"clip {name!r}: chunks that belong to it, which break a rule")
-        return degree < NOTHING
+    def note(self, cut: ClipCut) -> None:
+        if isinstance(cut, WholeRun):
+            self.repair.runs.setdefault(cut.clip.name, []).append((cut.start, cut.stop))
+        else:
+            self.repair.clips.append(cut.clip.name)
 
     def skeletons(self) -> None:
         for kind, id_ in self.container.directory.shared:

@@ -150,13 +150,10 @@ def _cuts(file: File, found: Repair) -> Iterator[ClipCut]:
         problems = clip_problems(sound, sound.clips[name])
         # What only an unknown codec can decode is whole, if not for us.
         if not _faults(problems) and not (problems := problems and _unhashed(sound.clips[name])):
-            found.clips.append(name)
             yield plan_cut(sound.clips[name], None, None, 0)
             continue
         runs = list(_planned(clip))
         yield from runs
-        if runs:
-            found.runs[name] = [(run.start, run.stop) for run in runs]
         found.lost += _lost(clip, runs, problems)
 
 
