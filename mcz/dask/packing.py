@@ -6,13 +6,13 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from mcz.container.limits import profile_named
 from mcz.dask.cluster import Cluster, connected
 from mcz.dask.sources import FarAsk, Found, coded_there, listed, skeletons_beside
 from mcz.editing.archive import write_in_turn
-from mcz.editing.coded_parts import Far
+from mcz.editing.coded_parts import Far, Part, ask_of
 from mcz.editing.folders import NO_MOTION, motion_files
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
@@ -22,7 +22,7 @@ from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
 from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry
-from mcz.writing.options import EncodingOptions, WritingOptions, encoding_options
+from mcz.writing.options import WritingOptions, encoding_options
 
 
 def pack(
@@ -72,16 +72,18 @@ def pack(
     inputs = (*paths, *encoding.params.values())
     report, writing = Report(), WritingOptions(force, profile_named(profile), copies)
     skeletons = [one.name for one in found if one.name.lower().endswith(".asf")]
-    beside = {one.name: skeletons_beside(one.name, skeletons) for one in taken}
+    entries = [Entry(Path(root, one.name), one.name, options, encoding) for one in taken]
     asks = (
-        FarAsk(root, one.name, beside[one.name], options, encoding, writing.profile)
-        for one in taken
+        FarAsk(root, ask_of(entry, writing.profile), skeletons_beside(entry.name, skeletons))
+        for entry in entries
     )
     with connected(client) as used, replacing(target, force=force, inputs=inputs) as stream:
         draft = Draft(stream, writing.profile, copies=writing.copies)
         with closing(Cluster(used).in_order(coded_there, asks, None)) as answers:
-            entries = _entries(root, taken, (options, encoding), answers)
-            write_in_turn(draft, entries, len(taken), report, progress, {})
+            given = cast(Iterator[Answer[Part]], answers)  # none is None
+            made = zip(entries, given, taken, strict=True)
+            parts = (Far(entry, answer, one.size) for entry, answer, one in made)
+            write_in_turn(draft, parts, len(taken), report, progress, {})
         draft.finish()
     report.size = draft.writer.offset
     report.note(notes_on(one.name for one in taken))
@@ -95,14 +97,3 @@ def _chosen(found: Sequence[Found], keep_all: bool) -> tuple[list[Found], list[O
     known = {path.as_posix() for path in motions}
     left = [Outcome(o.name, "skipped", o.size, NO_MOTION) for o in found if o.name not in known]
     return (list(found), []) if keep_all else ([o for o in found if o.name in known], left)
-
-
-def _entries(
-    root: str,
-    found: Sequence[Found],
-    options: tuple[SourceOptions, EncodingOptions],
-    answers: Iterator[Answer[Any] | None],
-) -> Iterator[Entry]:
-    for one, answer in zip(found, answers, strict=True):
-        assert answer is not None  # every file was asked for
-        yield Far(Entry(Path(root, one.name), one.name, *options), answer, one.size)

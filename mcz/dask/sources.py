@@ -10,7 +10,6 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from mcz.container.limits import Profile
 from mcz.container.source import file_system
 from mcz.editing.coded_parts import Ask, Part, coded
 from mcz.editing.folders import files_below, size_of
@@ -18,9 +17,7 @@ from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, MczError, OptionError, SourceError
 from mcz.formats import wants_skeleton
 from mcz.hints import Remark
-from mcz.reading.source_options import SourceOptions
 from mcz.types import Target
-from mcz.writing.options import EncodingOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,14 +30,11 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class FarAsk:
-    """Which file below ``root`` is to be coded; ``beside``: names of the ASFs that it may need."""
+    """A file below ``root`` that is to be coded; ``beside``: names of the ASFs that it may need."""
 
     root: str
-    name: str
+    ask: Ask
     beside: tuple[str, ...]
-    options: SourceOptions
-    encoding: EncodingOptions
-    profile: Profile
 
 
 def is_url(root: str) -> bool:
@@ -104,8 +98,7 @@ def coded_there(state: object, ask: FarAsk) -> Part:
             root = str(Path(own, "root"))  # around it there is nothing that may be taken for an ASF
             _fetch(ask, Path(root))
         try:
-            near = Ask(Path(root, ask.name), ask.name, ask.options, ask.encoding, ask.profile)
-            part = coded(state, near)
+            part = coded(state, replace(ask.ask, path=Path(root, ask.ask.name)))
         except MczError as error:
             if error.path is not None:
                 error.path = _named(error.path, root, ask.root)
@@ -129,7 +122,7 @@ def _named(text: str, copy: str, root: str) -> str:
 def _fetch(ask: FarAsk, folder: Path) -> None:
     """Copy the file, and the skeletons that it may need, below ``folder``."""
     fs, base = _opened(ask.root)
-    for name in (ask.name, *ask.beside):
+    for name in (ask.ask.name, *ask.beside):
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         try:

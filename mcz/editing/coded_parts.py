@@ -60,6 +60,11 @@ class Ask:
     profile: Profile
 
 
+def ask_of(entry: Entry, profile: Profile) -> Ask:
+    """What is asked for so that ``entry`` can be joined."""
+    return Ask(entry.path, entry.name, entry.options, entry.encoding, profile)
+
+
 def coded(state: object, ask: Ask) -> Part:
     """The part of a file; raises as ``Entry.write`` does."""
     entry, sink = Entry(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
@@ -160,8 +165,7 @@ def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask 
             yield None
             continue
         sent.add(digest)
-        profile = draft.writer.profile
-        yield Ask(entry.path, entry.name, entry.options, entry.encoding, profile)
+        yield ask_of(entry, draft.writer.profile)
 
 
 @contextmanager
