@@ -45,28 +45,21 @@ def settings_of(clip: Clip) -> Settings:
     return {name: value for name, value in found.items() if value != usual[name]}
 
 
-def source_file(motion: Motion) -> bytes:
-    """The source file of a motion whose values are not those of the file that it came from."""
-    assert motion.source is not None
-    source = motion.source.of_no_file()
-    data: bytes = FORMATS[source.format].write(replace(motion, source=source))
-    return data
-
-
 def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
     """The rest of ``clip`` with a source of its own values, or none and the reason for that."""
     motion = stating_rate(motion, clip.frame_numbers)
     if motion.source is None:
         return motion, None
+    source = motion.source.of_no_file()
     try:
-        source_file(motion)
+        FORMATS[source.format].write(replace(motion, source=source))
     except MotionError as error:
         metadata = dict(motion.metadata)
         add_note(metadata, "source-note", f"the source file was left out: {error}")
         left = replace(motion, metadata=metadata).without_source()
         return left.at_times(motion.timeline), str(error)
     signals = tuple(map(_on_binary_grids, motion.signals))
-    return replace(motion, signals=signals, source=motion.source.of_no_file()), None
+    return replace(motion, signals=signals, source=source), None
 
 
 def _on_binary_grids(signal: Signal) -> Signal:

@@ -18,7 +18,6 @@ from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.segments import SegmentHeader
 from mcz.container.value_hash import ValueDigest, value_hash
-from mcz.container.writer import Writer
 from mcz.editing.anew import (
     OF_JOINTS,
     check_anew,
@@ -145,17 +144,6 @@ def extract(
             check_values(stream, [cut.clip.name for cut in cuts if not copier.is_same(cut)])
             size = copier.writer.offset
             return Extraction(copier.clips, copier.left_out, list(opened.damage), size)
-
-
-def with_stated_rate(
-    writer: Writer, motion: Motion, held: payloads.ClipSource, clip: Clip
-) -> tuple[Motion, payloads.ClipSource]:
-    """``motion`` and its ``held`` source with a template that states the rate of ``clip``."""
-    changed = stating_rate(motion, clip.frame_numbers)
-    if changed is motion or changed.source is None:
-        return motion, held
-    template = writer.template(held.format, changed.source.template)
-    return changed, replace(held, template=template)
 
 
 @dataclass(frozen=True, slots=True)
@@ -326,22 +314,26 @@ class Copier(Carrier):
             if motion.source is None:  # of a damaged file; the template may say why
                 self.container.template(held.template, held.format)
                 raise FormatError("it cannot be put together")
-            motion, held = with_stated_rate(self.writer, motion, held, cut.clip)
-            assert motion.source is not None
-            try:
-                data = FORMATS[motion.source.format].write(motion)
-            except MotionError as error:
-                self.without_source(cut, new, error)
-                return b"", hashes
-            new.source = replace(held, size=len(data))
-            return hashlib.sha256(data).digest(), hashes
+            return self.put_source(cut, new, motion), hashes
         return b"", [self._value_hash(cut, part) for part in cut.signals]
 
-    def without_source(self, cut: ClipCut, new: payloads.Clip, error: MotionError) -> None:
-        """Leave out a source that cannot be written, and say so."""
-        new.source = None
-        note_source(new, f"the source file was left out: {error}", None if cut.is_whole else cut)
-        self._leave_out(cut, f"its source file, as {error}")
+    def put_source(self, cut: ClipCut, new: payloads.Clip, motion: Motion) -> bytes:
+        """Let the source of a clip be that of ``motion``; its hash, b"" where it cannot be."""
+        held, changed = new.source, stating_rate(motion, cut.clip.frame_numbers)
+        assert held is not None and changed.source is not None
+        if changed is not motion:
+            template = self.writer.template(held.format, changed.source.template)
+            held = replace(held, template=template)
+        try:
+            data = FORMATS[changed.source.format].write(changed)
+        except MotionError as error:
+            new.source = None
+            text = f"the source file was left out: {error}"
+            note_source(new, text, None if cut.is_whole else cut)
+            self._leave_out(cut, f"its source file, as {error}")
+            return b""
+        new.source = replace(held, size=len(data))
+        return hashlib.sha256(data).digest()
 
     def _value_hash(self, cut: ClipCut, part: SignalCut) -> bytes:
         """The hash of what is left of a signal, a few segments in memory at a time."""

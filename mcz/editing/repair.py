@@ -87,8 +87,7 @@ def _repaired(
         if not wanted <= _content(better):  # it was made of another file
             better = source
         file = file_of(Container(better, salvage=True, max_decoded=max_decoded))
-        write_whole(file, out, found, progress)
-    return found
+        return write_whole(file, out, found, progress)
 
 
 def _size_of_whole(out: BinaryIO, stop: int, wanted: Content, found: Repair) -> int:

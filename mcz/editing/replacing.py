@@ -7,7 +7,6 @@ it has coded. Where all joints are coded in one and a caller allows it, the clip
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -21,12 +20,11 @@ from mcz.container import note_records, payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.segments import GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
-from mcz.editing.anew import check_anew, settings_of, source_file
+from mcz.editing.anew import check_anew, settings_of
 from mcz.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
-from mcz.editing.extraction import Copier, Copying, with_stated_rate
+from mcz.editing.extraction import Copier, Copying
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.editing.rewriting import disk_path, hold
-from mcz.errors import MotionError
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.quality_joints import with_indices
@@ -184,24 +182,13 @@ class _StreamEditor(_Editor):
     def finish_record(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
         if self.is_same(cut):
             return super().finish_record(cut, new)
-        source = self._source(cut, new)
+        source, motion = b"", self.recoded.decoded
+        if new.source is not None and motion.source is not None:
+            motion = dataclasses.replace(motion, source=motion.source.of_no_file())
+            source = self.put_source(cut, new, motion)
         _, hashes = super().finish_record(cut, new)
-        signal = self.recoded.decoded.signals[0]
+        signal = motion.signals[0]
         return source, [value_hash(signal.values, signal.mask), *hashes[1:]]
-
-    def _source(self, cut: ClipCut, record: payloads.Clip) -> bytes:
-        """Put the size of the new source file into CLIP; return its hash."""
-        motion, held = self.recoded.decoded, record.source
-        if motion.source is None or held is None:
-            return b""
-        motion, held = with_stated_rate(self.writer, motion, held, cut.clip)
-        try:
-            data = source_file(motion)
-        except MotionError as error:
-            self.without_source(cut, record, error)
-            return b""
-        record.source = dataclasses.replace(held, size=len(data))
-        return hashlib.sha256(data).digest()
 
     def segment(
         self, cut: ClipCut, part: SignalCut, row: SegmentRow, *, noted: bool

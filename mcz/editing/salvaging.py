@@ -49,7 +49,7 @@ TOLD = (
 )
 
 
-def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress | None) -> None:
+def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress | None) -> Repair:
     """Write all that is whole in ``file``, opened for salvage, to ``stream``, and read it again.
 
     What breaks a rule there, though its checksums are right, is left out: of a clip first what
@@ -69,15 +69,13 @@ def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress 
             raise FormatError("no clip, skeleton or attachment in it is whole", path=file.name)
         problems = _problems(stream, attempt.size, file.container.max_decoded)
         if not problems:
-            break
+            return attempt
         for name in {_clip_at(repairer, problem.offset) for problem in problems}:
             if not name or degrees.get(name, FULL) == NOTHING:
                 raise FormatError(f"the repaired file is not sound: {problems[0].message}")
             degrees[name] = degrees.get(name, FULL) + 1
         stream.seek(0)
         stream.truncate()
-    for one in fields(Repair):
-        setattr(found, one.name, getattr(attempt, one.name))
 
 
 def _clip_at(repairer: Repairer, offset: int) -> str:
