@@ -1,7 +1,7 @@
 """What of a file goes into a new one, and the writing of that: chunks are carried over, not coded.
 
 ``carrying.py`` carries, this module plans. The old file keeps its name until the new one is whole
-and was walked from end to end.
+and was walked from end to end. ``protect``, which may rewrite a file, is here as well.
 """
 
 from __future__ import annotations

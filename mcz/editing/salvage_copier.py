@@ -145,7 +145,8 @@ class Repairer(Copier):
         for cut in cuts:
             if degree := self._degree(cut):
                 what = "chunks that belong to it, which break a rule"
-                what = "all of it, which breaks a rule" if degree == NOTHING else what
+                if degree == NOTHING:
+                    what = "all of it, which breaks a rule"
                 self.repair.lost.append(f"clip {self.name_of(cut)!r}: {what}")
         super().run([cut for cut in cuts if self._degree(cut) < NOTHING], alone=alone)
 
