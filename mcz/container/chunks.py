@@ -226,14 +226,3 @@ def check_signature_in(data: bytes) -> None:
         raise FormatError(f"not an MCZ file: it begins with {data!r}")
     if len(data) < len(SIGNATURE):
         raise TruncatedError(f"the file ends at {len(data)}, in its signature")
-
-
-def is_foot_at(source: ByteSource, offset: int) -> bool:
-    """Whether a FOOT begins at ``offset``: a chunk begins with a letter, a FOOT never does."""
-    if source.read(offset, 1).isalpha():
-        return False
-    if offset + FOOT.size > source.size:
-        raise TruncatedError(f"the file ends at {source.size}, in a FOOT at {offset}")
-    if parse_foot(source.read(offset, FOOT.size), offset) is None:
-        raise FormatError(f"at {offset} there is neither a chunk nor a FOOT")
-    return True

@@ -11,18 +11,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from mcz.container import copy_records, payloads
-from mcz.container.chunks import (
-    COPIED,
-    FOOT,
-    FRAMING,
-    SIGNATURE,
-    Chunk,
-    ChunkType,
-    build_chunk,
-    is_foot_at,
-    read_chunk,
-)
+from mcz.container.chunks import COPIED, FRAMING, SIGNATURE, Chunk, ChunkType, build_chunk
 from mcz.container.directory import Directory
+from mcz.container.feeding import chunks
 from mcz.container.limits import check
 from mcz.container.packed import decoded
 from mcz.container.source import ByteSource
@@ -120,16 +111,9 @@ def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
     """The COPY chunks of a file that belong to a clip; without clips all, up to a fault."""
     if directory.clips:
         return directory.clips.ancillary(ChunkType.COPY)
-    found, at = [], len(SIGNATURE)
+    found: list[Chunk] = []
     with suppress(FormatError):
-        while at < source.size:
-            if is_foot_at(source, at):
-                at += FOOT.size
-                continue
-            chunk = read_chunk(source, at)
-            if chunk.type == ChunkType.COPY:
-                found.append(chunk)
-            at += chunk.size
+        found.extend(chunk for chunk, _ in chunks(source) if chunk.type == ChunkType.COPY)
     return found
 
 
@@ -139,14 +123,14 @@ def uncopied(
     """Copies of the chunks behind the last COPY of a file; of aliases the directory knows none."""
     held = copy_chunks(source, directory)
     last = held[-1].offset if held else 0
-    chunks = [
+    later = [
         Chunk(ChunkType.HEAD, 0, len(SIGNATURE), len(directory.head)),
         *directory.shared.values(),
     ]
     for row in directory.clips.values():
-        chunks += [chunk for chunk in (row.clip, row.cend) if chunk is not None]
-    chunks = sorted((c for c in chunks if c.offset > last), key=lambda chunk: chunk.offset)
-    return [Copy(chunk.offset, chunk.type, payload_of(chunk)) for chunk in chunks]
+        later += [chunk for chunk in (row.clip, row.cend) if chunk is not None]
+    later = sorted((c for c in later if c.offset > last), key=lambda chunk: chunk.offset)
+    return [Copy(chunk.offset, chunk.type, payload_of(chunk)) for chunk in later]
 
 
 def check_copies(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import BinaryIO
 
 from mcz.container.chunks import Chunk
-from mcz.container.events import Event, Fault, PacketEvent
-from mcz.container.grammar import PACKETS
-from mcz.container.packets import END
-from mcz.container.parser import Parser
+from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
+from mcz.container.grammar import PACKETS, SIGNATURE
+from mcz.container.parser import PASS, Parser
 from mcz.container.source import ByteSource
 
 MOST_AT_ONCE = 64 * 1024  # bytes that are taken from a stream where it has them
@@ -17,35 +16,53 @@ MOST_AT_ONCE = 64 * 1024  # bytes that are taken from a stream where it has them
 
 def events(source: ByteSource, parser: Parser) -> Iterator[Event]:
     """The events of a file; bytes that the parser passes over are not read."""
-    while True:
+
+    def feed() -> None:
+        at, size = parser.wants
+        parser.feed(source.read(at, min(max(size, source.block), source.size - at)))
+
+    return _driven(parser, feed)
+
+
+def _driven(parser: Parser, feed: Callable[[], None]) -> Iterator[Event]:
+    """The events of a parser, for which ``feed`` feeds it where it needs more."""
+    while not parser.is_done:
         event = parser.next()
         if event is not None:
             yield event
-        elif parser.is_done:
-            return
-        else:
-            at, size = parser.wants
-            parser.feed(source.read(at, min(max(size, source.block), source.size - at)))
+        elif not parser.is_done:
+            feed()
+
+
+def sound_events(
+    source: ByteSource, parser: Parser
+) -> Iterator[ChunkEvent | PacketEvent | FootEvent]:
+    """The events of a file; raises FormatError at the first fault."""
+    for event in events(source, parser):
+        if isinstance(event, Fault):
+            raise event.error
+        yield event
+
+
+def chunks(source: ByteSource, at: int = 0, state: str = SIGNATURE) -> Iterator[tuple[Chunk, int]]:
+    """The chunks from ``at`` on, and where each ends; raises FormatError at a fault.
+
+    Of their payloads packets alone are read.
+    """
+    parser = Parser(source.size, at=at, state=state, want=lambda _: PASS)
+    for event in sound_events(source, parser):
+        if not isinstance(event, FootEvent) and parser.state != PACKETS:
+            yield event.chunk, event.end
 
 
 def packets(source: ByteSource, chunk: Chunk) -> Iterator[PacketEvent]:
     """The packets of the open DATA ``chunk``, its end packet too; raises FormatError."""
     parser = Parser(source.size, at=chunk.payload_offset, state=PACKETS, chunk=chunk)
-    for event in events(source, parser):
-        if isinstance(event, Fault):
-            raise event.error
-        if isinstance(event, PacketEvent):
-            yield event
-            if event.packet.kind == END:
-                return
-
-
-def end_of(source: ByteSource, chunk: Chunk) -> int:
-    """Where the open DATA ``chunk`` ends; raises FormatError."""
-    end = chunk.payload_offset
-    for event in packets(source, chunk):
-        end = event.end
-    return end
+    for event in sound_events(source, parser):
+        assert isinstance(event, PacketEvent)
+        yield event
+        if parser.state != PACKETS:
+            return
 
 
 class Stream:
@@ -60,14 +77,7 @@ class Stream:
 
     def events(self, parser: Parser) -> Iterator[Event]:
         """The events of the stream, each as soon as its bytes are there."""
-        while True:
-            event = parser.next()
-            if event is not None:
-                yield event
-            elif parser.is_done:
-                return
-            else:
-                self._feed(parser)
+        return _driven(parser, lambda: self._feed(parser))
 
     def _feed(self, parser: Parser) -> None:
         at, size = parser.wants

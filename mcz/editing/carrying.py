@@ -9,19 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import takewhile
 
 from mcz.container import payloads
-from mcz.container.chunks import (
-    FOOT,
-    SIGNATURE,
-    Chunk,
-    ChunkFlag,
-    ChunkType,
-    is_foot_at,
-    read_chunk,
-)
+from mcz.container.chunks import Chunk, ChunkFlag, ChunkType, read_chunk
 from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
-from mcz.container.feeding import end_of
+from mcz.container.feeding import chunks
+from mcz.container.grammar import CLIP
 from mcz.container.index import segment_rows
 from mcz.container.index_reader import parse_segments
 from mcz.container.metadata import Record, as_one
@@ -101,17 +95,13 @@ class Carrier:
 
     def before_clips(self) -> None:
         """Carry over the ancillary chunks before the first clip, to which they do not belong."""
-        source, at = self.container.source, len(SIGNATURE)
         clips = self.container.directory.clips.values()
-        end = min((row.clip.offset for row in clips), default=at)
-        while at < end:
-            if is_foot_at(source, at):
-                at += FOOT.size
-                continue
-            chunk = read_chunk(source, at)
+        first = min((row.clip.offset for row in clips), default=0)
+        for chunk, _ in chunks(self.container.source):
+            if chunk.offset >= first:
+                break
             if chunk.flags and chunk.type != ChunkType.INDX:
                 self.ancillary(chunk)
-            at += chunk.size
 
     def ancillary(self, chunk: Chunk) -> bool:
         """Carry an ancillary chunk over where that is safe; return whether it was.
@@ -176,10 +166,9 @@ class Carrier:
         """The chunks between CLIP and CEND, and where each ends."""
         if row.cend is None:  # of a damaged file
             raise FormatError(f"clip {row.name!r} has no CEND")
-        source, at = self.container.source, row.clip.stop
-        while at < row.cend.offset:
-            chunk = read_chunk(source, at)
-            at = end_of(source, chunk) if chunk.length is None else chunk.stop
+        at, stop = row.clip.stop, row.cend.offset
+        found = chunks(self.container.source, at, CLIP)
+        for chunk, at in takewhile(lambda one: one[0].offset < stop, found):
             yield chunk, at
         if at != row.cend.offset:
             raise FormatError(f"{row.cend.label} is not where the index says", clip=row.name)

@@ -26,7 +26,7 @@ from mcz.container.chunks import (
     build_chunk,
     build_foot,
     build_header,
-    is_foot_at,
+    parse_foot,
     read_chunk,
 )
 from mcz.container.directory import Directory
@@ -69,7 +69,9 @@ def pieces_of(data: bytes) -> Pieces:
     pieces: Pieces = []
     indexed = False
     while at < len(data):
-        if is_foot_at(source, at):
+        if not data[at : at + 1].isalpha():
+            if parse_foot(data[at : at + FOOT.size], at) is None:
+                raise FormatError(f"at {at} there is neither a chunk nor a FOOT")
             pieces.append(Piece(b"FOOT", 0, b"indexed" if indexed else b""))
             at += FOOT.size
             continue
