@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.container import payloads
+from mcz.container import limits, payloads
 from mcz.container.chunks import (
     OPEN_LENGTH,
     SIGNATURE,
@@ -830,6 +830,15 @@ def test_a_model_that_is_lost_comes_again() -> None:
         bad = flipped(opening, event.offset + 18, 1)
         found, _ = read(b"".join([bad, *parts[1:]]), lost="hold")
         assert states(found) == "m" * 10 + "d" * 50, event.chunk.label
+
+
+def test_a_stream_of_the_small_profile() -> None:
+    parts = pieces(repeat=0)
+    head, *others = chunks_in(parts[0].removeprefix(SIGNATURE), 0)
+    small = replace(parse(payloads.Head, head.payload, "HEAD"), profile=limits.SMALL.id)
+    opening = [SIGNATURE, build_chunk(b"HEAD", build(small, "HEAD"))]
+    data = b"".join([*opening, *(event.data for event in others), *parts[1:]])
+    assert states(read(data, lost="hold")[0]) == "d" * 60
 
 
 # The post filter ---------------------------------------------------------------------------

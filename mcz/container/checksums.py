@@ -6,12 +6,14 @@ all are named. SPEC.md, "Chunks", "Open DATA and packets", "INDX" and "FOOT", ar
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
+import zlib
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
 from mcz.container.chunks import Chunk, ChunkType
-from mcz.container.directory import parse_head
+from mcz.container.directory import ClipRow, Directory, parse_head
 from mcz.container.events import ChunkEvent, Event, Fault, PacketEvent
 from mcz.container.feeding import events
 from mcz.container.grammar import INDEX, START
@@ -20,12 +22,12 @@ from mcz.container.limits import index_limit
 from mcz.container.packed import chunk_id
 from mcz.container.packets import END
 from mcz.container.parser import ALL, Parser
-from mcz.container.places import Places
 from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, UnsupportedError
 
 SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)
 KEPT = (ChunkType.HEAD, *SHARED)  # chunks whose payloads the pass needs
+_PLACE = struct.Struct("<QQB")  # of a segment: offset, size, kind of its packet
 
 Told = Callable[[int, int], object]
 
@@ -67,7 +69,7 @@ class _Check:
         self._source = source
         self.parser = Parser(source.size, want=lambda chunk: ALL * (chunk.type in KEPT))
         self.seen = Checked()
-        self._places = Places()
+        self._places = _Places()
         self._index: Chunk | None = None  # that the last FOOT closes
         self._end = 0  # of the last FOOT
         self._has_lost = False  # some of what is there is not known
@@ -148,3 +150,79 @@ class _Check:
             for text in found:
                 self._note(index.offset, f"chunk {index.label}: {text}")
             self.seen.indexed = True
+
+
+@dataclass(slots=True)
+class _ClipPlaces:
+    """The chunks of a clip; of its segments, which may be many, a count and a CRC-32 of places."""
+
+    clip: Chunk
+    n_segments: int = 0
+    segments: int = 0
+    cend: Chunk | None = None
+    ancillary: list[Chunk] = field(default_factory=list)
+
+    def segment(self, offset: int, size: int, packet: int = 0) -> None:
+        """Add a segment; ``packet`` is the kind of its packet, as of ``SegmentRow``."""
+        self.n_segments += 1
+        self.segments = zlib.crc32(_PLACE.pack(offset, size, packet), self.segments)
+
+
+@dataclass(slots=True)
+class _Places:
+    """The chunks of a file, in file order."""
+
+    head: bytes = b""
+    shared: dict[tuple[bytes, bytes], Chunk] = field(default_factory=dict)
+    attachments: list[Chunk] = field(default_factory=list)
+    n_aliases: int = 0
+    clips: list[_ClipPlaces] = field(default_factory=list)
+
+    def add(self, chunk: Chunk) -> None:
+        """Take in the next chunk, whatever it is; those in ``shared`` come by themselves."""
+        clip = self.clips[-1] if self.clips else None
+        if chunk.type == ChunkType.CLIP:
+            self.clips.append(_ClipPlaces(chunk))
+        elif chunk.type == ChunkType.ATTA:
+            self.attachments.append(chunk)
+        elif chunk.type == ChunkType.ALIA:
+            self.n_aliases += 1
+        elif clip is None:
+            return
+        elif chunk.type == ChunkType.CEND:
+            clip.cend = chunk
+        elif chunk.type == ChunkType.DATA and chunk.length is not None:
+            clip.segment(chunk.payload_offset, chunk.length)
+        elif chunk.flags and chunk.type != ChunkType.INDX and clip.cend is not None:
+            clip.ancillary.append(chunk)
+
+    def differences(self, listed: Directory) -> list[str]:
+        """What an index says that is not so, in words; empty where it is right."""
+        found = []
+        if listed.head != self.head:
+            found.append("its copy of HEAD differs from HEAD")
+        if list(listed.shared.items()) != list(self.shared.items()):
+            found.append("it lists other skeletons, models or sources than there are")
+        if [part for row in listed.attachments.values() for part in row.parts] != self.attachments:
+            found.append("it lists other attachments than there are")
+        if self.n_aliases != len(listed.aliases):
+            found.append(f"it lists {len(listed.aliases)} aliases, there are {self.n_aliases}")
+        return found + _differing(self.clips, list(listed.clips.values()))
+
+
+def _differing(places: Sequence[_ClipPlaces], rows: Sequence[ClipRow]) -> list[str]:
+    if len(places) != len(rows):
+        return [f"it lists {len(rows)} clips, there are {len(places)}"]
+    return [
+        f"clip {row.name!r} does not lie where it says"
+        for place, row in zip(places, rows, strict=True)
+        if place != places_of(row)
+    ]
+
+
+def places_of(row: ClipRow) -> _ClipPlaces:
+    """Those of a clip that an index lists; raises FormatError where the index is wrong."""
+    places = _ClipPlaces(row.clip, cend=row.cend, ancillary=row.ancillary)
+    for segment in row.segments:
+        places.segment(segment.offset, segment.size, segment.packet)
+    return places

@@ -28,7 +28,6 @@ from mcz.container.packets import SEGMENT
 from mcz.container.parser import ALL, PASS, Parser
 from mcz.container.plain import check_plain
 from mcz.container.segments import GROUP_NOTES, parse_header
-from mcz.container.strict_ancillary import check_ancillary
 from mcz.errors import FormatError, LimitError
 from mcz.schema import parse
 
@@ -259,4 +258,4 @@ class Scanner:
         if chunk.type == ChunkType.META and self.clip is not None:  # META-02
             raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
         size = chunk.offset + chunk.size if self._size is None else self._size
-        check_ancillary(chunk, payload, size, self.found, self._payload_of)
+        strict.check_ancillary(chunk, payload, size, self.found, self._payload_of)

@@ -1,17 +1,20 @@
 """What a strict walk checks within the chunks that it passes, beside their grammar.
 
-What only decoding shows is checked where clips are decoded. SPEC.md, "Strict reading".
+What only decoding shows is checked where clips are decoded. SPEC.md, "Strict reading", "QUAL",
+"META" and "COPY", are normative.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import PurePosixPath
 
 from mcz.container import payloads
-from mcz.container.chunks import ChunkType
-from mcz.container.directory import Directory
+from mcz.container.chunks import Chunk, ChunkType
+from mcz.container.copies import check_copies, parse_copies
+from mcz.container.directory import Directory, Found
 from mcz.container.limits import Profile
+from mcz.container.metadata import parse_meta
 from mcz.container.skeletons import parse_skeleton
 from mcz.errors import FormatError
 from mcz.schema import parse
@@ -93,3 +96,26 @@ def check_target(fields: payloads.Alia, where: str, sourced: Collection[tuple[in
     """Check that what an alias stands for is there before it, and can be restored."""
     if (fields.of, bytes(fields.target)) not in sourced:  # GRAM-04
         raise FormatError(f"chunk {where}: nothing before it with a source is {fields.target!r}")
+
+
+def check_ancillary(
+    chunk: Chunk,
+    payload: bytes,
+    file_bytes: int,
+    found: Found,
+    payload_of: Callable[[Chunk], bytes] | None,
+) -> None:
+    """Check ``chunk`` of a file of ``file_bytes``; ``found`` lies before it. Raises FormatError.
+
+    Without ``payload_of``, which reads that again, copies are not compared with it.
+    """
+    if chunk.type == ChunkType.QUAL:
+        parse(payloads.Qual, payload, chunk.label)  # QUAL-02
+    elif chunk.type == ChunkType.META:
+        if not found.directory.clips:  # META-01
+            raise FormatError(f"chunk {chunk.label} lies before the first clip")
+        parse_meta(payload, chunk, file_bytes)
+    elif chunk.type == ChunkType.COPY:
+        copies = parse_copies(payload, chunk, file_bytes)
+        if payload_of is not None:
+            check_copies(copies, chunk, found.chunks, payload_of)

@@ -168,7 +168,7 @@ class LiveReader:
         self.summary = StreamSummary()
         self.clip: LiveClip | None = None
         if lost == "refuse" and not join:
-            self._source: StrictFrames | FramesWithLosses = StrictFrames(stream)
+            self._source: StrictFrames | FramesWithLosses = StrictFrames(stream, self.summary)
         else:
             self._source = FramesWithLosses(stream, lost, join, self.summary)
         self._filter_rate = rate
@@ -183,15 +183,10 @@ class LiveReader:
     def _counted(self) -> Iterator[LiveFrame]:
         source, summary = self._source, self.summary
         try:
-            for found in source.frames():
-                frame = found if isinstance(found, LiveFrame) else LiveFrame(*found)
-                if isinstance(source, StrictFrames):
-                    summary.payload_bytes = source.payload_bytes
+            for frame in source.frames():
                 self.clip, summary.stream_bytes = source.clip, source.size
                 summary.count(frame)
                 yield frame
-            if isinstance(source, StrictFrames):
-                summary.is_checked = source.is_checked
         except TruncatedError:
             summary.is_cut = True
             raise

@@ -18,7 +18,7 @@ from mcz.container.chunks import ChunkType
 from mcz.container.directory import parse_head
 from mcz.container.events import ChunkEvent, Fault, FootEvent, PacketEvent
 from mcz.container.feeding import Stream
-from mcz.container.limits import check
+from mcz.container.limits import BASE, check
 from mcz.container.packed import chunk_id
 from mcz.container.repeats import chunks_in
 from mcz.container.segments import FRESH, SegmentHeader, parse_header
@@ -147,7 +147,11 @@ class FramesWithLosses:
         elif kind in (ChunkType.SKEL, ChunkType.MODL):
             self._shared.setdefault((kind, chunk_id(kind, event.payload)), event.data)
             kept = sum(map(len, self._shared.values()))
-            check("SKEL and MODL: bytes", kept, 2 * self._parser.profile.model_bytes)
+            check(
+                "SKEL and MODL: bytes",
+                kept,
+                2 * max(self._parser.profile.model_bytes, BASE.model_bytes),
+            )
         elif kind == ChunkType.CLIP:
             yield from self._begin(event)
         elif kind == ChunkType.REPT:  # REPT-04

@@ -25,6 +25,8 @@ from mcz.container.segments import FRESH
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, OptionError
 from mcz.live.clip_state import ClipState, LiveClip, Shared, begin, opening
+from mcz.live.concealment import LiveFrame
+from mcz.live.reader_with_losses import StreamSummary
 from mcz.reading.clip import Clip
 from mcz.schema import parse
 from mcz.types import Values
@@ -44,29 +46,25 @@ def live_frames(stream: BinaryIO) -> Iterator[Frame]:
     """
     if not hasattr(stream, "read"):
         raise OptionError(f"cannot read from {stream!r}: not a binary stream")
-    return StrictFrames(stream).frames()
+    found = StrictFrames(stream, StreamSummary()).frames()
+    return ((frame.number, frame.values, frame.valid) for frame in found)
 
 
 class StrictFrames:
-    """The frames of a stream, and what is known while they come.
+    """The frames of a stream; ``clip`` is the one that the last is of."""
 
-    ``clip`` is the one that the last frame is of, ``payload_bytes`` are those of streams so far,
-    ``is_checked`` is True where a value hash was right.
-    """
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = Stream(stream)
+    def __init__(self, stream: BinaryIO, summary: StreamSummary) -> None:
+        self._stream, self.summary = Stream(stream), summary
         self.scanner = Scanner(None)
         self.clip: LiveClip | None = None
-        self.payload_bytes = 0
-        self.is_checked = False
+        self.is_checked = False  # a value hash was right
 
     @property
     def size(self) -> int:
         """The bytes that came."""
         return self._stream.size
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Iterator[LiveFrame]:
         """As ``live_frames``."""
         head = b""
         shared: Shared = {}
@@ -96,12 +94,13 @@ class StrictFrames:
                 yield from clip.take(self, kind, event)
             self.scanner.forget()
             clip = None if kind == ChunkType.CEND else clip
+        self.summary.is_checked = self.is_checked
 
-    def _frame(self, clip: ClipState, row: SegmentRow, payload: bytes) -> Iterator[Frame]:
+    def _frame(self, clip: ClipState, row: SegmentRow, payload: bytes) -> Iterator[LiveFrame]:
         if row.header.signal:
             return
         stream, mask = clip.parts(row.header, row.packet, payload)
-        self.payload_bytes += len(stream)
+        self.summary.payload_bytes += len(stream)
         frame = row.header.first
         fresh = bool(row.header.flags & FRESH)
         if not (frame or fresh):
@@ -114,9 +113,9 @@ class StrictFrames:
         clip.digest(values, mask)
         self.clip = clip.clip
         if mask is None:
-            yield frame, values, np.ones(values.shape, np.bool_)
+            yield LiveFrame(frame, values, np.ones(values.shape, np.bool_))
         else:
-            yield frame, np.where(mask, values, np.nan), mask
+            yield LiveFrame(frame, np.where(mask, values, np.nan), mask)
 
 
 class _Held:
@@ -127,7 +126,7 @@ class _Held:
 
     def take(
         self, reader: StrictFrames, kind: bytes, event: ChunkEvent | PacketEvent
-    ) -> Iterator[Frame]:
+    ) -> Iterator[LiveFrame]:
         self._parts.append(event.data)
         if kind != ChunkType.CEND:
             return
@@ -136,7 +135,7 @@ class _Held:
         clip = Clip(container, container.directory.clips[self._name])
         values, mask = clip.read_masked()
         reader.clip = LiveClip(clip.name, clip.skeleton, clip.frame_rate, clip.codec)
-        reader.payload_bytes += sum(row.size for row in clip.signals[0].rows)
+        reader.summary.payload_bytes += sum(row.size for row in clip.signals[0].rows)
         reader.is_checked = True
         per_frame = clip.signals[0].layout.samples_per_frame
         valid = np.ones(values.shape, np.bool_) if mask is None else mask
@@ -144,4 +143,4 @@ class _Held:
             values = np.where(valid, values, np.nan)
         for frame in range(clip.n_frames):
             rows = frame if per_frame == 1 else slice(frame * per_frame, (frame + 1) * per_frame)
-            yield frame, values[rows], valid[rows]
+            yield LiveFrame(frame, values[rows], valid[rows])

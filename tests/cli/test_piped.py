@@ -345,7 +345,7 @@ def test_nothing_is_kept_that_was_used() -> None:
     encode_live(
         lines(text), out, "bvh", SourceOptions(), EncodingOptions("lsdt-frame", {"step": 0.01})
     )
-    reader = StrictFrames(io.BytesIO(out.getvalue()))
+    reader = StrictFrames(io.BytesIO(out.getvalue()), mcz.StreamSummary())
     for _ in reader.frames():
         assert reader.scanner.clip is not None
         assert len(reader.scanner.clip.segments) == 1
