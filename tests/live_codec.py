@@ -13,6 +13,7 @@ import numpy as np
 from mcz import FormatError, LostFrameError, OptionError
 from mcz.codecs.contract import Codec, Encoded, LiveEncoder, Segment
 from mcz.codecs.parameters import Parameter, integer, number
+from mcz.live.text_writer import begin_live
 from mcz.schema import read_varint, varint
 
 ID = 252
@@ -130,6 +131,14 @@ CODEC = Codec(
         Parameter("domain", "channels", "channels or positions", str),
     ),
 )
+
+
+def encode_live(*arguments):
+    """The live clip of ``begin_live``, with all of its frames."""
+    live = begin_live(*arguments)
+    with live.writer:
+        live.push_all()
+    return live
 
 
 class Trickle(io.RawIOBase):

@@ -13,10 +13,10 @@ import pytest
 
 import mcz
 from mcz import SkeletonWarning, SourceError
-from mcz.live.text_writer import encode_live
 from mcz.reading.source_options import SourceOptions
 from mcz.writing.options import EncodingOptions
 from tests.commands import Call
+from tests.live_codec import encode_live
 
 ASF = b""":name small
 :units

@@ -35,7 +35,11 @@ class LiveText:
         self._arriving = arriving
 
     def push_all(self) -> None:
-        """Write each frame before the next line is read; raises as ``encode_live`` does."""
+        """Write each frame before the next line is read.
+
+        Raises SourceError at text that is none of the format, at a last line without a line end,
+        and where fewer frames came than are declared; the clip has all frames before that.
+        """
         due, is_renumbered = self._arriving.first_number, False
         for number, values in self._arriving.frames:
             if number is not None and number != due:
@@ -56,26 +60,6 @@ class LiveText:
             self.remarks = (*self.remarks, remark)
 
 
-def encode_live(
-    lines: Iterable[bytes],
-    sink: Sink,
-    source_format: str,
-    options: SourceOptions,
-    encoding: EncodingOptions,
-) -> LiveText:
-    """Write the motion that ``lines`` spell to ``sink``, each frame before the next line is read.
-
-    ``source_format`` is ``bvh`` or ``amc``; an AMC needs the ``skeleton`` of ``options``, its
-    ASF. Raises SourceError at text that is none of the format, at a last line without a line
-    end, and where fewer frames came than are declared; the clip has all frames before that and no
-    end then. Otherwise raises as ``LiveWriter`` does.
-    """
-    live = begin_live(lines, sink, source_format, options, encoding)
-    with live.writer:
-        live.push_all()
-    return live
-
-
 def begin_live(
     lines: Iterable[bytes],
     sink: Sink,
@@ -83,7 +67,12 @@ def begin_live(
     options: SourceOptions,
     encoding: EncodingOptions,
 ) -> LiveText:
-    """The same up to the first frame; the caller uses the writer as a context manager."""
+    """A live clip, up to its first frame, of the motion that ``lines`` spell.
+
+    The caller uses its writer as a context manager. ``source_format`` is ``bvh`` or ``amc``; an AMC
+    needs the ``skeleton`` of ``options``, its ASF. Raises SourceError at text that is none of the
+    format, and otherwise as ``LiveWriter`` does.
+    """
     arriving, base = _arriving(_whole_lines(lines), source_format, options)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}

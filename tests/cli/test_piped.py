@@ -16,9 +16,9 @@ import mcz
 from mcz import live_frames
 from mcz.formats import FORMATS
 from mcz.live.strict_reader import StrictFrames
-from mcz.live.text_writer import encode_live
 from mcz.reading.source_options import SourceOptions
 from mcz.writing.options import EncodingOptions
+from tests.live_codec import encode_live
 
 ROOT = Path(mcz.__file__).parent.parent
 HEADER = (
