@@ -63,7 +63,7 @@ def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str
     if not found.damage:
         return None, []
     notes: list[str] = []
-    sound = _Sound(found)
+    sound = _sound_spans(found)
     parts: dict[int, bytes] = {}
     for copy, shift in _placed(source, found, list(_copies(source, found, notes))):
         if shift is None:
@@ -76,7 +76,7 @@ def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str
         if source.read(copy.offset, len(chunk)) == chunk:
             continue
         fault = _fault(source, copy)
-        if not fault or sound.meets(copy.offset, copy.stop):  # SALV-08
+        if not fault or _meet(sound, copy.offset, copy.stop):  # SALV-08
             notes.append(f"a copy of {copy.label} is not used: what lies there is sound")
             continue
         notes.append(f"{copy.label}: {fault}; its copy is used")  # SALV-07
@@ -165,18 +165,16 @@ def _copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy
         yield from copies
 
 
-class _Sound:
-    """Where the chunks and FOOTs lie that were found whole."""
+def _sound_spans(found: Found) -> list[tuple[int, int]]:
+    """Where the chunks and FOOTs lie that were found whole, in file order."""
+    feet = [(at, at + FOOT.size) for at in found.feet]
+    return sorted(feet + [(chunk.offset, _end(chunk, found)) for chunk in found.chunks])
 
-    def __init__(self, found: Found) -> None:
-        spans = [(at, at + FOOT.size) for at in found.feet]
-        spans += [(chunk.offset, _end(chunk, found)) for chunk in found.chunks]
-        self.spans = sorted(spans)
 
-    def meets(self, start: int, stop: int) -> bool:
-        """Whether one of them has bytes of ``start`` <= offset < ``stop``."""
-        index = bisect_right(self.spans, (start, stop))
-        return any(a < stop and start < b for a, b in self.spans[max(0, index - 1) : index + 1])
+def _meet(spans: list[tuple[int, int]], start: int, stop: int) -> bool:
+    """Whether one of them has bytes of ``start`` <= offset < ``stop``."""
+    index = bisect_right(spans, (start, stop))
+    return any(a < stop and start < b for a, b in spans[max(0, index - 1) : index + 1])
 
 
 def _end(chunk: Chunk, found: Found) -> int:

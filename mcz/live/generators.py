@@ -51,7 +51,7 @@ def stream_encode(
     before the next is asked for. Where ``frames`` raises, so does this, and the stream has no end.
     ``repeat`` and what is raised: see ``LiveWriter``.
     """
-    sink = _Bytes()
+    sink = io.BytesIO()
     known = skeleton if isinstance(skeleton, Skeleton) else markers(skeleton)
     writer = LiveWriter(
         sink,
@@ -63,15 +63,15 @@ def stream_encode(
         metadata=metadata,
         repeat=repeat,
     )
-    yield sink.take()
+    yield _taken(sink)
     for row in frames:
         if isinstance(row, Mapping):
             writer.change(**{str(name): value for name, value in row.items()})
         else:
             writer.push(_numbers(row))
-            yield sink.take()
+            yield _taken(sink)
     writer.close()
-    yield sink.take()
+    yield _taken(sink)
 
 
 def _numbers(row: ArrayLike) -> NDArray[np.float64]:
@@ -81,20 +81,12 @@ def _numbers(row: ArrayLike) -> NDArray[np.float64]:
         raise MotionError(f"a row that is not one of numbers: {error}") from None
 
 
-class _Bytes:
-    """What was written and not yet taken."""
-
-    def __init__(self) -> None:
-        self._parts: list[bytes] = []
-
-    def write(self, data: bytes, /) -> int:
-        self._parts.append(bytes(data))
-        return len(data)
-
-    def take(self) -> bytes:
-        data = b"".join(self._parts)
-        self._parts.clear()
-        return data
+def _taken(sink: io.BytesIO) -> bytes:
+    """The bytes in ``sink``, which it has no longer."""
+    data = sink.getvalue()
+    sink.seek(0)
+    sink.truncate()
+    return data
 
 
 def markers(names: Sequence[str]) -> Skeleton:
