@@ -1,4 +1,4 @@
-"""Files of every format that states times, of frames with these numbers."""
+"""Small files of every format that states times, of frames with these numbers."""
 
 from __future__ import annotations
 
@@ -54,3 +54,9 @@ def npz(numbers: Sequence[int], hz: float = 100) -> bytes:
     times = np.array(numbers) / hz
     np.savez(buffer, joints=np.arange(6.0 * len(numbers)).reshape(-1, 2, 3), times=times)
     return buffer.getvalue()
+
+
+def bvh(*rows: str, time: str = "0.01") -> str:
+    """One joint that turns about x."""
+    head = "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\n"
+    return f"{head}Frames: {len(rows)}\nFrame Time: {time}\n" + "".join(f"{row}\n" for row in rows)

@@ -19,6 +19,7 @@ from mcz.container import payloads
 from mcz.container.writer import Writer
 from mcz.editing.unpacking import safe_path
 from mcz.motion import joint_columns
+from tests.clocked_files import bvh
 from tests.web_server import Server, served
 
 
@@ -81,13 +82,9 @@ def test_a_file_that_fails_leaves_no_trace(folder: Path, tmp_path: Path) -> None
 
 def small(tmp_path: Path) -> tuple[Path, Path]:
     """Two BVH files of a few frames."""
-    text = (
-        "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n  End Site\n  {\n"
-        "    OFFSET 0 1 0\n  }\n}\nMOTION\nFrames: %d\nFrame Time: 0.01\n%s"
-    )
     paths = tmp_path / "one.bvh", tmp_path / "two.bvh"
     for n, path in enumerate(paths, 3):
-        path.write_text(text % (n, "".join(f"{v}.25\n" for v in range(n))))
+        path.write_text(bvh(*(f"{v}.25" for v in range(n))))
     return paths
 
 

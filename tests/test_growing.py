@@ -15,18 +15,14 @@ import pytest
 import mcz
 from mcz.editing.appending import growing
 from mcz.sample import write_samples
-
-TEXT = (
-    "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 2\n"
-    "Frame Time: 0.01\n%s\n2.5\n"
-)
+from tests.clocked_files import bvh
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """a.mcz with the clip "one", and sources one, two, three."""
     for n, name in enumerate(("one", "two", "three")):
-        (tmp_path / f"{name}.bvh").write_text(TEXT % f"{n}.25")
+        (tmp_path / f"{name}.bvh").write_text(bvh(f"{n}.25", "2.5"))
     mcz.encode(tmp_path / "one.bvh", tmp_path / "a.mcz")
     return tmp_path
 
@@ -155,7 +151,7 @@ def test_equal_names(folder: Path) -> None:
     path = folder / "a.mcz"
     (folder / "d").mkdir()
     other = folder / "d/one.bvh"
-    other.write_text(TEXT % "9.75")
+    other.write_text(bvh("9.75", "2.5"))
     before = path.read_bytes()
     with pytest.raises(mcz.SourceError, match=r"already restores another 'one\.bvh'"):
         mcz.append([other], path)
@@ -203,7 +199,7 @@ BAD_NAME = os.fsdecode(b"bad\xff.bvh")
 
 def test_names_that_are_not_utf8(folder: Path) -> None:
     bad = folder / BAD_NAME
-    bad.write_text(TEXT % "7.5")
+    bad.write_text(bvh("7.5", "2.5"))
     with pytest.raises(mcz.MotionError, match=r"bad\\xff\.bvh' is not UTF-8"):
         mcz.encode(bad, folder / "b.mcz")
     with pytest.raises(mcz.SourceError, match="not UTF-8"):
@@ -216,7 +212,7 @@ def test_names_that_are_not_utf8(folder: Path) -> None:
 
 def test_names_that_would_not_unpack(folder: Path) -> None:
     """Neither a duplicate nor an attachment gets a name that a reader must refuse."""
-    (folder / "back\\slash.bvh").write_text(TEXT % "0.25")
+    (folder / "back\\slash.bvh").write_text(bvh("0.25", "2.5"))
     (folder / "x\\y.txt").write_text("hello")
     report = mcz.pack(folder, folder / "all.mcz", keep_all=True)
     assert {outcome.path for outcome in report.failures} == {"back\\slash.bvh", "x\\y.txt"}
@@ -260,9 +256,9 @@ def test_verbatim_does_not_hide_a_missing_skeleton(tmp_path: Path) -> None:
 
 def test_verbatim_keeps_what_is_over_a_limit(tmp_path: Path) -> None:
     channels = "CHANNELS 20000 " + " ".join(["Xrotation"] * 20000)
-    text = TEXT.replace("CHANNELS 1 Xrotation", channels) % " ".join(["1.5"] * 20000)
+    text = bvh(*(" ".join([number] * 20000) for number in ("1.5", "2.5")))
     wide = tmp_path / "wide.bvh"
-    wide.write_text(text.replace("2.5\n", " ".join(["2.5"] * 20000) + "\n"))
+    wide.write_text(text.replace("CHANNELS 1 Xrotation", channels))
     with pytest.raises(mcz.LimitError, match="channels"):
         mcz.encode(wide, tmp_path / "a.mcz")
     mcz.encode(wide, tmp_path / "a.mcz", verbatim=True)

@@ -108,10 +108,6 @@ def pybvh_agrees(path: Path) -> None:
     agree(positions(motion), other.node_positions() + added, reach(motion.skeleton))
 
 
-def test_pybvh_on_the_walk(samples: Path) -> None:
-    pybvh_agrees(samples / "walk.bvh")
-
-
 @pytest.mark.real
 @pytest.mark.parametrize(
     "name",

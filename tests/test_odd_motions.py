@@ -364,15 +364,6 @@ def test_a_replaced_skeleton_has_no_file_of_its_own(samples: Path) -> None:
     assert written(replace(motion, skeleton=other)).skeleton.source is None
 
 
-def test_what_is_masked_is_invalid() -> None:
-    values = np.ma.masked_less(smooth(20).values, 0)
-    motion = replace(smooth(20), signals=(mcz.Signal(values),))
-    assert np.isnan(motion.values).sum() == values.mask.sum() > 0
-    found = written(motion)
-    np.testing.assert_array_equal(found.signals[0].mask, ~values.mask)
-    np.testing.assert_array_equal(found.signals[0].values, values.data)
-
-
 @pytest.mark.parametrize("arguments", [
     {"channels": (mcz.Channel("", "a"),)},
     {"channels": ()},

@@ -21,13 +21,11 @@ from mcz.recovery.field import logarithms, over, times
 from mcz.recovery.packets import build_packet, read_packet
 from mcz.recovery.shape import Shape, shape_for
 from mcz.sample import write_samples
+from tests.clocked_files import bvh
 
 SHARED = [HealthCheck.function_scoped_fixture]
 ELEMENTS = st.integers(0, 65535)
-TINY = (
-    "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 2\n"
-    "Frame Time: 0.01\n1.5\n2.25\n"
-)
+TINY = bvh("1.5", "2.25")
 
 
 @given(ELEMENTS, ELEMENTS, ELEMENTS)

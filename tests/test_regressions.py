@@ -31,13 +31,11 @@ from mcz.sample import marker_walk, write_samples
 from mcz.transforms import dwt
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import write_clip
+from tests.clocked_files import bvh
 from tests.commands import run
 from tests.motions import smooth, written
 
-BVH = (
-    "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 3\n"
-    "Frame Time: 0.01\n1.25\n1.23456789e-01\n2.50\n"
-)
+BVH = bvh("1.25", "1.23456789e-01", "2.50")
 
 
 def test_exceptions_do_not_outlive_their_values(tmp_path: Path) -> None:

@@ -44,6 +44,7 @@ from mcz.live.reader_with_losses import MOST_MADE_UP
 from mcz.reading.report import info, layout
 from mcz.schema import build, parse
 from tests import live_codec
+from tests.clocked_files import bvh
 from tests.repair import flipped, parts_of, use
 from tools.records import built
 
@@ -163,12 +164,9 @@ def test_rewriting_drops_it(tmp_path) -> None:
     found, _ = read(other.read_bytes(), lost="hold")
     assert states(found) == "d" * 35
     assert [frame.number for frame in found] == list(range(35))
-    bvh = tmp_path / "one.bvh"
-    bvh.write_text(
-        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\n"
-        "Frame Time: 1\n2\n"
-    )
-    mcz.append([bvh], path)
+    one = tmp_path / "one.bvh"
+    one.write_text(bvh("2", time="1"))
+    mcz.append([one], path)
     assert mcz.verify(path) == []
 
 
