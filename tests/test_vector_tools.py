@@ -16,10 +16,11 @@ from mcz import MczError
 from mcz.cli import conformance
 from mcz.codecs import CODECS, bitstream, by_name
 from tools import make_vectors
-from tools.vectors import faults, requirements
+from tools.vectors import requirements
 from tools.vectors.build.files import Vector, arrays
 from tools.vectors.build.random_parts import NAMES
 from tools.vectors.contents import codecs_of, formats_of
+from tools.vectors.engine import tables
 from tools.vectors.valid.random import COUNT, _parts, random_file
 
 ROWS = {row["file"].removesuffix(".mcz"): row for row in run.load_manifest()}
@@ -103,34 +104,25 @@ def test_every_invalid_vector_has_a_fault() -> None:
     for name, row in ROWS.items():
         own = {"fault", "effect", "reason"} & set(row)
         assert len(own) == (3 if row["group"] == "invalid" else 0), name
-    others = [row for name, row in ROWS.items() if not name.startswith(faults.PARTS)]
+    others = [row for name, row in ROWS.items() if not name.startswith(tables.PARTS)]
     kinds = Counter(row["fault"] for row in others if "fault" in row)
-    assert kinds["checksum"] <= faults.MOST_CHECKSUMS
+    assert kinds["checksum"] <= tables.MOST_CHECKSUMS
     assert min(kinds["malformed"], kinds["impossible"]) > 150
     effects = {row["effect"] for row in ROWS.values() if "effect" in row}
-    assert effects == set(faults.EFFECTS)
+    assert effects == set(tables.EFFECTS)
     every = {name for row in ROWS.values() if "fault" in row for name in row["codecs"]}
     assert every == {bitstream(by_name(name).id) for name in NAMES}
 
 
-def test_faults_refuse_what_they_do_not_know() -> None:
-    names = [name for name in ROWS if name.startswith("invalid/")]
-    assert set(faults.faults(names)) == set(names)
-    with pytest.raises(ValueError, match="nothing is said of invalid/parts-of/new"):
-        faults.faults([*names, "invalid/parts-of/new"])
-    with pytest.raises(ValueError, match="no vector needs .*c3d-range-"):
-        faults.faults([name for name in names if "c3d-range" not in name])
-
-
 def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ["valid/raw/plain", "valid/raw/widths", "invalid/parts/crc"]
+    names = ["valid/raw/plain", "valid/raw/widths", "uncommon/lossless/newer-version"]
     monkeypatch.setattr(requirements, "ARGUED", {})
     monkeypatch.setattr(requirements, "caught", dict)
     monkeypatch.setattr(requirements, "VECTORS", {"RAW-01": ("valid/*",), "A-02": ("*/plain",)})
     assert requirements.requirements(names) == {
         "valid/raw/plain": ["A-02", "RAW-01"],
         "valid/raw/widths": ["RAW-01"],
-        "invalid/parts/crc": [],
+        "uncommon/lossless/newer-version": [],
     }
     for table in ({"RAW-01": ("valid/lossless/*",)}, {"RAW-01": ()}, {"RAW": ("valid/*",)}):
         monkeypatch.setattr(requirements, "VECTORS", table)

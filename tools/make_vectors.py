@@ -23,29 +23,29 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
 from mcz.container.versions import FORMAT_NAME  # noqa: E402 - needs the path
-from tools.vectors import invalid, uncommon, valid  # noqa: E402 - needs the path
+from tools.vectors import uncommon, valid  # noqa: E402 - needs the path
 from tools.vectors.bases import MADE  # noqa: E402
 from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402
 from tools.vectors.contents import codecs_of, formats_of  # noqa: E402
-from tools.vectors.engine.tables import Row, tables  # noqa: E402
+from tools.vectors.engine.tables import Fault, Row, tables  # noqa: E402
 from tools.vectors.engine.tables import rows as table_rows  # noqa: E402
-from tools.vectors.faults import Fault, faults  # noqa: E402
 from tools.vectors.requirements import requirements  # noqa: E402
 
 CONFORMANCE = ROOT / "conformance"
-GROUPS = (valid, uncommon, invalid)
+GROUPS = {"valid": valid.MODULES, "uncommon": uncommon.MODULES, "invalid": ()}
 
 
 def vectors(without: Collection[ModuleType] = ()) -> list[Vector]:
     """Every vector, by group and name, but for those of the modules ``without``."""
     found = []
-    for group in GROUPS:
-        modules = [module for module in group.MODULES if module not in without]
-        made = [vector for module in modules for vector in module.vectors()]
-        start = group.__name__.rpartition(".")[2] + "/"
+    for group, modules in GROUPS.items():
+        made = [
+            vector for module in modules if module not in without for vector in module.vectors()
+        ]
+        start = f"{group}/"
         made += [row.vector() for row in table_rows().values() if row.name.startswith(start)]
         found += sorted(made, key=lambda vector: vector.name)
-        MADE.update({vector.name: vector.data for vector in made if group is valid})
+        MADE.update({vector.name: vector.data for vector in made if group == "valid"})
     names = [vector.name for vector in found]
     assert len(names) == len(set(names)), sorted(n for n in names if names.count(n) > 1)
     return found
@@ -55,7 +55,7 @@ def rows(made: Sequence[Vector], names: Sequence[str] = ()) -> list[dict[str, An
     """The manifest's rows of vectors: of all, or of some among ``names``, those of all."""
     names = names or [vector.name for vector in made]
     ids = requirements(names)
-    wrong = faults([name for name in names if name.startswith("invalid/")])
+    wrong = {name: row.fault for name, row in table_rows().items()}
     return [row(vector, ids[vector.name], wrong.get(vector.name)) for vector in made]
 
 
@@ -128,7 +128,7 @@ def files_of(names: Collection[str]) -> dict[str, bytes]:
     listed = json.loads((CONFORMANCE / "manifest.json").read_text("utf-8"))["vectors"]
     kept = [fields for fields in listed if fields["file"].removesuffix(".mcz") not in own]
     every = [*own, *(fields["file"].removesuffix(".mcz") for fields in kept)]
-    groups = [group.__name__.rpartition(".")[2] for group in GROUPS]
+    groups = list(GROUPS)
     whole = [*kept, *rows(made, every)]
     whole.sort(key=lambda fields: (groups.index(fields["group"]), fields["file"][:-4]))
     return {f"vectors/{vector.name}.mcz": vector.data for vector in made} | {

@@ -23,13 +23,14 @@ from mcz.container.segments import SegmentHeader
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
+from tools.vectors import source_bases
 from tools.vectors.build import by_hand as written
 from tools.vectors.build import extensions, motions
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.edits import Made, both, indexed, put, raw_stream
 from tools.vectors.build.files import Crafter, file_of, finished, rehash
 from tools.vectors.build.source_files import ODD, PLAIN, take
-from tools.vectors.codec_bases import coded
+from tools.vectors.codec_bases import coded, noted
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,17 @@ for _make in (
     motions.with_grid_changes,
     motions.with_mask,
     coded,
+    noted,
+    source_bases.table,
+    source_bases.many_sections,
+    source_bases.c3d,
+    source_bases.outputs,
+    source_bases.array,
+    source_bases.two_arrays,
+    source_bases.one,
+    source_bases.mannequin,
+    source_bases.acclaim_take,
+    source_bases.acclaim_example,
 ):
     base(_make)
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded, Model, Segment
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from tools.vectors.build import motions, pose_clips
-from tools.vectors.build.files import file_of
+from tools.vectors.build.files import Crafter, file_of, finished
 
 SKELETONS: dict[str, Callable[[], Skeleton]] = {
     "acclaim": pose_clips.acclaim,
@@ -37,6 +37,23 @@ def skeleton_of(shape: str) -> Skeleton:
         for j, size in enumerate(kinds)
     )
     return Skeleton(tuple(joints), name="dials")
+
+
+def noted(codec: str, packets: bool = False) -> bytes:
+    """96 frames of a group a channel, with masks, and with exceptions in two of the groups."""
+    motion = motions.dance(96)
+    signal = motion.signals[0]
+    mask = np.ones(signal.values.shape, np.bool_)
+    mask[3:5, 1] = mask[6:9, 5] = False
+    values = signal.values.copy()
+    values[12, [0, 4]] = 7.5
+    exceptions = Exceptions(np.array([12, 12]), np.array([0, 4]), (b"7.500", b"7.5000"))
+    noted = replace(signal, values=values, mask=mask, exceptions=exceptions)
+    crafter = Crafter(packets=packets)
+    levels = {"N": 2} if codec == "mrdwt" else {}
+    motion = replace(motion, signals=(noted,))
+    crafter.clip(motion, grouping="channel", codec=by_name(codec), **levels)
+    return finished(crafter)
 
 
 def coded(

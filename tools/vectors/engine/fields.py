@@ -17,8 +17,10 @@ from mcz.container import copy_records, index_records, note_records, payloads
 from mcz.container.index_records import Index
 from mcz.container.packed import decoded, words
 from mcz.formats import notes
-from mcz.formats.c3d_layout import C3dDetail, C3dTemplate
+from mcz.formats.arrays.layout import ArrayTemplate
+from mcz.formats.c3d_layout import C3dDetail, C3dOutputsTemplate, C3dTemplate
 from mcz.formats.layout import Detail, Template
+from mcz.formats.table_layout import TableDetail, TableTemplate
 from mcz.schema import (
     Record,
     build,
@@ -121,6 +123,10 @@ VIEWS: dict[str, View] = {
     "TEMPLATE": View(b"SRCE", Template, _content, _with_content),
     "C3DTEMPLATE": View(b"SRCE", C3dTemplate, _content, _with_content),
     "DETAIL": View(b"CLIP", Detail, *_inside(payloads.Clip, "source.0.detail")),
+    "OUTPUTSTEMPLATE": View(b"SRCE", C3dOutputsTemplate, _content, _with_content),
+    "ARRAYTEMPLATE": View(b"SRCE", ArrayTemplate, _content, _with_content),
+    "TABLETEMPLATE": View(b"SRCE", TableTemplate, _content, _with_content),
+    "TABLEDETAIL": View(b"CLIP", TableDetail, *_inside(payloads.Clip, "source.0.detail")),
     "C3DDETAIL": View(b"CLIP", C3dDetail, *_inside(payloads.Clip, "source.0.detail")),
     "COPIES": View(b"COPY", None, _copied, _with_copied),
     "COPIED": View(b"COPY", CopiedChunks, _copy_list, _with_copy_list),

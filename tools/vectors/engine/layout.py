@@ -243,7 +243,9 @@ class Layout:
     def indexed(self, listing: Listing) -> Listing:
         """What an INDX has to say where it said ``listing`` of the base file."""
         moved = {part.place: part for part in self.parts if part.place is not None}
-        was, new = listing.new, Directory(aliases=listing.new.aliases)
+        was, new = listing.new, Directory()
+        for name, (kind, target) in was.aliases.items():
+            new.aliases[name] = kind, self.renamed.get(target, target)
         heads = [part for part in self.parts if part.type == b"HEAD"]
         new.head = heads[0].payload if heads else was.head
         shared = [
@@ -290,6 +292,8 @@ class Layout:
         with suppress(MczError):
             fields = parse(payloads.Clip, part.payload, "CLIP")
             clip.name = fields.name
+            clip.rate_numerator = fields.rate_numerator
+            clip.rate_denominator = fields.rate_denominator
             clip.signals = signal_rows(fields, "CLIP") or clip.signals
             if not fields.flags & payloads.OPEN_CLIP:
                 clip.n_frames = fields.n_frames

@@ -20,6 +20,7 @@ ROW = {"purpose", "spec", "rules", "also", "fault", "base", "file", "edit"} | {
     "exit", "modes", "parts", "holds", "since",
 }  # fmt: skip
 KINDS = MALFORMED, IMPOSSIBLE, CHECKSUM = "malformed", "impossible", "checksum"
+PARTS, MOST_CHECKSUMS = "invalid/parts/", 3  # a folder about checksums; vectors beside it
 EFFECTS = ("crash", "memory", "hang", "wrong data", "silent loss")
 
 
@@ -155,4 +156,7 @@ def rows() -> dict[str, Row]:
             if row.name in found:
                 raise ValueError(f"{table}: {row.name} is in two tables")
             found[row.name] = row
+    alone = [name for name, row in found.items() if row.fault and row.fault.kind == CHECKSUM]
+    if sum(not name.startswith(PARTS) for name in alone) > MOST_CHECKSUMS:
+        raise ValueError(f"more than {MOST_CHECKSUMS} vectors of checksums alone")
     return found

@@ -1,0 +1,91 @@
+"""Base files of faulty sources: tables, C3D files, arrays, Acclaim skeletons."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mcz.container import payloads
+from mcz.formats import amc, asf
+from mcz.formats.layout import Detail
+from mcz.formats.table_layout import SectionFields, TableDetail, TableTemplate
+from mcz.motion import Motion
+from mcz.schema import parse, varint
+from mcz.writing.clip_writer import write_skeleton
+from tools.records import built
+from tools.vectors.build.array_files import floats, npy, plain_npz, take_arrays
+from tools.vectors.build.c3d_files import c3d_file, c3d_outputs, take_c3d
+from tools.vectors.build.files import Crafter, finished
+from tools.vectors.build.source_files import AMC, ASF, EXAMPLE, called, with_source
+from tools.vectors.build.table_files import MARKERS, TIMES, VICON
+from tools.vectors.valid.sources.tables import take_table
+
+
+def table(path: str) -> Motion:
+    """A table that stands in ``table_files``."""
+    texts = {"plain.trc": MARKERS, "times.trc": TIMES, "sections.csv": VICON}
+    return take_table(texts[path], path)
+
+
+def c3d(**fields: Any) -> Motion:
+    """A C3D file with these fields of ``c3d_file``."""
+    return take_c3d(c3d_file(**fields).build(), "prop")
+
+
+def outputs() -> Motion:
+    """A C3D file of five points, of which two are outputs."""
+    return take_c3d(c3d_outputs().build(), "prop")
+
+
+def array() -> Motion:
+    """An NPY file of four rows of two numbers."""
+    return take_arrays(npy(floats(4, 2)), "plain.npy")
+
+
+def two_arrays() -> Motion:
+    """An NPZ file of two arrays."""
+    return take_arrays(plain_npz({"a": floats(3, 2), "b": floats(3, 1)}), "many.npz")
+
+
+def one() -> Motion:
+    """An NPY file of a single 1."""
+    return take_arrays(npy(np.ones((1, 1), np.int8)), "ones.npy")
+
+
+def mannequin() -> bytes:
+    """A skeleton with the ASF file that it came of."""
+    crafter = Crafter()
+    made = write_skeleton(crafter, asf.read(ASF, "mannequin"))
+    crafter.alias("small.asf", payloads.OF_SKELETON, made)
+    return finished(crafter)
+
+
+def acclaim_take() -> Motion:
+    """The AMC file of the mannequin."""
+    return called(amc.read(AMC, "take", asf.read(ASF, "mannequin")), "take.amc")
+
+
+def acclaim_example() -> Motion:
+    """The worked example of SPEC.md."""
+    return called(amc.read(EXAMPLE, "example"), "example.amc")
+
+
+def many_sections(more: int) -> Motion:
+    """The table of sections with so many more, of signals that say nothing."""
+    plain = table("sections.csv")
+    assert plain.source is not None
+    fields = parse(TableTemplate, plain.source.template, "template")
+    own = parse(TableDetail, plain.source.detail, "detail")
+    first = fields.sections[0]
+    blank = [replace(first, header=b"", patterns=[], gaps=[], signals=[3 + k]) for k in range(more)]
+    usual = {"count": b"", "rows": 0, "gaps": [], "patterns": [], "ends": 0, "ending": b""}
+    every = [built(SectionFields, section, "section") for section in [*fields.sections, *blank]]
+    details = [built(Detail, detail, "detail") for detail in [*own.details, *[usual] * more]]
+    template = varint(len(every)) + b"".join(every)
+    detail = varint(len(details)) + b"".join(details)
+    signals = [replace(plain.signals[2], name=str(k)) for k in range(more)]
+    source = replace(plain.source, template=template, detail=detail)
+    motion = replace(plain, signals=(*plain.signals, *signals), source=source)
+    return with_source(motion, VICON)
