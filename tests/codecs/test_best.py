@@ -11,10 +11,8 @@ from mcz.codecs.lossless import best_streams
 from mcz.codecs.lossless.best_streams import ECHOED, MAX_SEEN, Link
 from mcz.codecs.lossless.echoes import Echo, build_echoes, find_echoes
 from mcz.coding.ordinals.streams import plan_stream
-from mcz.errors import FormatError
 from mcz.numbers import Grid
 from tests.codecs.coders import BEST, GRIDS, columns, linked
-from tests.codecs.lossy import saved
 from tests.motions import smooth
 
 FIXED, SIX = GRIDS[0], GRIDS[3]
@@ -61,33 +59,6 @@ def test_numbers_that_cross_their_classes(size: float) -> None:
     wanted = SIX.ordinals(np.array([float(f"{v:.6g}") for v in values]))[0][:, None]
     wanted[253] = -1  # -0
     np.testing.assert_array_equal(BEST.decoded(BEST.coded(wanted, SIX), 400, 1, SIX), wanted)
-
-
-def test_it_is_smaller_than_codec_1_and_never_much_larger() -> None:
-    sizes = {name: len(saved(name, smooth(600))) for name in ("lossless", "best")}
-    assert sizes["best"] < 0.97 * sizes["lossless"]
-    rng = np.random.default_rng(1)
-    noise = rng.integers(-(10**6), 10**6, (40, 30))
-    own = [(FIXED, FIXED)] * 30
-    simple = best_streams.streams.build_stream(noise, own, 0, {})
-    assert len(best_streams.build_stream(noise, own, 0, {})) <= len(simple) + 1
-
-
-def test_prefixes_and_longer_streams_are_refused() -> None:
-    wanted = np.random.default_rng(2).integers(-900, 900, (30, 3)).cumsum(axis=0)
-    stream = BEST.coded(wanted, FIXED)
-    refused = 0
-    for size in range(len(stream)):
-        try:
-            out = BEST.decoded(stream[:size], 30, 3, FIXED)
-        except FormatError:
-            refused += 1
-        else:  # zeros stand in for the last ones, SPEC.md, "Entropy coding"
-            assert size >= len(stream) - 4 and out.shape == wanted.shape
-    assert refused >= len(stream) - 4
-    for more in (b"\0", b"\1", bytes(5)):
-        with pytest.raises(FormatError, match="bytes"):
-            BEST.decoded(stream + more, 30, 3, FIXED)
 
 
 @st.composite

@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.coding.logistic import NODES, squash_table, stretch_table
 from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.degrees import DEGREE, multiples_of, of_products
 from mcz.coding.ordinals.units import of_multiples
@@ -76,18 +75,6 @@ def test_integers_beyond_any_float() -> None:
     values = np.array([[2**53], [-(2**53)], [0]], np.int64)
     with mcz.open(saved("lossless", Motion(FORCE, (Signal(values),)))) as file:
         np.testing.assert_array_equal(file.only_clip().read(), values)
-
-
-def test_logistic_tables() -> None:
-    nodes = [65536 / (1 + np.exp(-k / 2)) for k in range(-16, 17)]
-    assert list(NODES[:17]) == [round(n) for n in nodes[:17]]
-    assert list(NODES[17:]) == [65536 - n for n in NODES[15::-1]]
-    squash, stretch = squash_table(), stretch_table()
-    assert (np.diff(squash) >= 0).all()
-    assert (np.diff(stretch) >= 0).all()
-    assert (stretch.min(), stretch.max()) == (-2047, 2047)
-    middle = squash[stretch[64:4032] + 2048]
-    assert (np.abs(middle - (16 * np.arange(64, 4032) + 8)) < 200).all()
 
 
 @pytest.mark.parametrize("name", ["walk.bvh", "walk.amc"])

@@ -134,18 +134,6 @@ def test_an_archive_has_the_well_known_models_too() -> None:
         assert (data in out.getvalue()) == (profile == "large")
 
 
-@given(st.integers(1, 12), st.integers(1, 12), st.integers(0, 40), st.integers(0, 2**32 - 1))
-def test_bases_survive(n_vectors, more, shift, seed) -> None:
-    vectors = np.random.default_rng(seed).normal(size=(n_vectors, n_vectors + more - 1))
-    vectors = np.clip(vectors, -0.9, 0.9)
-    first, second = basis_models.rounded(vectors, shift), basis_models.rounded(np.eye(3), 7)
-    found = basis_models.parse_bases(basis_models.build_bases([first, second]))
-    np.testing.assert_array_equal(found[0].entries, first.entries)
-    np.testing.assert_array_equal(found[0].shifts, first.shifts)
-    np.testing.assert_array_equal(found[1].vectors, np.eye(3))
-    assert np.abs(found[0].vectors - vectors).max() <= 0.5 * 2.0**-shift
-
-
 def test_well_known_bases_are_nearly_orthogonal() -> None:
     """Rounding to few digits must not let errors grow."""
     models = basis_models.known_models()

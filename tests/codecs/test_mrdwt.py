@@ -15,24 +15,19 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import by_name
-from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.steps import code_of, ratio_of
-from mcz.codecs.wavelet import streams
 from mcz.codecs.wavelet.shared import WaveletHeader
 from mcz.codecs.weights import weights_of
 from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS, Motion
-from mcz.schema import build, parse
+from mcz.schema import parse
 from mcz.transforms import wavelets
 from tests.codecs import lossy
 from tests.codecs.lossy import bones, clip_of, gapped, wandering
 from tests.formats.c3d_files import INTEL, SGI, made
 from tests.motions import smooth
-from tests.repair import memory_below
 
 Array = np.ndarray
-MEMORY = 32 * 2**20
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx", "length"]), min_size=1, max_size=4)
 NAMES = st.sampled_from(["haar", "db2", "db3", "db8", "sym4", "bior4.4", "coif1"])
 FRAMES = st.one_of(st.integers(1, 20), st.integers(1, 200))
@@ -58,16 +53,6 @@ class Direct(lossy.Direct):
 def small() -> Direct:
     params = {"T_g": 1.0, "N": 2, "wavelet": "db2", "segment_frames": 12}
     return Direct(wandering(20, ["tx", "rx"]), **params)
-
-
-def outcome(coded: Direct, **changes: object) -> str:
-    try:
-        coded.read(changes=changes)
-        coded.read(3, 9, (1,), changes=changes)
-    except mcz.MczError as error:
-        assert str(error)
-        return type(error).__name__
-    return "decoded"
 
 
 @cache
@@ -146,13 +131,6 @@ def test_step_codes_are_the_nearest(ratio: float) -> None:
     assert all(found <= abs(math.log(ratio_of(c) / ratio)) + 1e-12 for c in limited)
 
 
-def test_step_codes_ascend_and_128_is_one() -> None:
-    ratios = [ratio_of(code) for code in range(256)]
-    assert ratios[128] == 1.0 and sorted(ratios) == ratios and len(set(ratios)) == 256
-    assert [code_of(ratio) for ratio in ratios] == list(range(256))
-    assert code_of(0.0) == 0 and code_of(1e300) == 255
-
-
 # A part is the same as in the whole
 
 
@@ -168,29 +146,7 @@ def test_a_long_clip_is_cut_into_segments_by_size() -> None:
     assert many.read().tobytes() == one.read().tobytes()
 
 
-# Resolutions
-
-
-@given(FRAMES, KINDS, NAMES, st.integers(0, 5), st.integers(1, 90), st.data())
-def test_a_resolution_is_that_with_zeros(n_frames, kinds, wavelet, N, length, data) -> None:
-    """The finest k details left out, and stored as zeros."""
-    motion = wandering(n_frames, kinds)
-    coded = Direct(motion, T_g=0.2, wavelet=wavelet, N=N, segment_frames=length)
-    n = coded.layout.n_resolutions
-    k = data.draw(st.integers(0, n - 1))
-
-    def fetch(segment: int, resolution: int, group: int) -> bytes:
-        return b"" if resolution >= n - k else coded.stream(segment, resolution, group)
-
-    np.testing.assert_array_equal(coded.read(resolution=k), coded.read(changes={"fetch": fetch}))
-
-
 # Clips out of the ordinary
-
-
-def test_many_levels_of_one_frame() -> None:
-    found = decoded(clip_of([[5.0]]), preset="khan2016", N=16, Q=6, T_g=0)
-    assert found[0, 0] == pytest.approx(5.0, abs=1e-3)
 
 
 def test_gaps_are_filled_by_straight_lines() -> None:
@@ -212,19 +168,6 @@ def test_a_marker_that_is_never_there() -> None:
     with mcz.open(saved(motion)) as file:
         assert np.isnan(file.only_clip().read()[:, 3:]).all()
         assert not file.only_clip().read_masked()[0][:, 3:].any()
-
-
-def test_details_up_to_the_limit_are_coded() -> None:
-    coding = streams.Coding("mrdwt", False, 1, 1)
-    approximation = np.array([2**40, -(2**40), 0, 5], np.int64)
-    most = 2**40 - 1
-    detail = np.array([most, -most, 0, 1], np.int64)
-    packed = streams.build_streams([approximation, detail], 0, coding)
-    bands, _ = streams.parse_streams(packed.__getitem__, [4, 4], [4, 4], coding)
-    np.testing.assert_array_equal(bands, [approximation, detail])
-    for bands in ([approximation, detail + 1], [approximation * 2, detail]):
-        with pytest.raises(mcz.MotionError, match="a coefficient exceeds 2"):
-            streams.build_streams(bands, 0, coding)
 
 
 def test_radians_are_coded_like_degrees() -> None:
@@ -304,43 +247,6 @@ def test_thresholds_by_depth() -> None:
 
 
 # Hostile bytes
-
-
-def test_the_greatest_that_a_header_allows_is_finite() -> None:
-    """64 taps of 16, 16 levels, the greatest unit, step and coefficient."""
-    levels, taps = 16, 64
-    fields = {
-        "wavelet": 0,
-        "lo": (16.0,) * taps,
-        "hi": (16.0,) * taps,
-        "levels": levels,
-        "coded_frames": 1000,
-        "decimals": 255,
-        "unit": 2.0**100,
-        "least": 2**39,
-    }
-    header = build(WaveletHeader(**fields), "header")
-    layout = Layout(1000, ((0,),), n_resolutions=1)
-    stream = bytes([streams.CONSTANT, 255]) + b"\x80\x80\x80\x80\x80\x40"  # 2^40, zigzag
-    request = Request(0, 1000, (0,))
-    with memory_below(MEMORY):
-        found = by_name("mrdwt").decode(
-            header, layout, [Span(0, 1000)], request, lambda s, r, g: stream
-        )
-    assert np.isfinite(found).all() and found.max() > 1e30
-
-
-def test_frames_that_no_segment_holds_are_not_allocated() -> None:
-    coded = small()
-    far = {
-        "header": build(replace(coded.fields, coded_frames=2**50), "header"),
-        "layout": replace(coded.layout, n_frames=2**50),
-        "spans": [Span(0, 12), Span(12, 2**50 - 32, 6), Span(2**50 - 20, 20, 6)],
-        "fetch": lambda *_: b"",
-    }
-    with memory_below(MEMORY):
-        assert not coded.read(2**50 - 20, 2**50, changes=far).any()
-        assert not coded.read(0, 12, changes=far).any()
 
 
 def test_a_cut_file_refuses_what_it_no_longer_holds() -> None:

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs import by_name
 from mcz.codecs.contract import model_finder
-from mcz.codecs.online.choices import gaussian, laplacian
 from mcz.codecs.online.units import INTRA, LTR, STR, Unit, build_units, parse_units
 from mcz.errors import LostFrameError
 from mcz.writing.signal_source import MemorySource
@@ -32,12 +31,6 @@ def units_of(coded: Direct) -> list[Unit]:
         for segment in coded.segments
         for unit in parse_units("online", segment.streams[0], segment.n_frames)
     ]
-
-
-def params_of(preset: str, step: float = 0.5, rate: float = 40.0) -> dict[str, object]:
-    """A step, or a rate for those that need one."""
-    chosen = {"bitrate": rate} if preset in ("rc", "rca") else {"step": step}
-    return {"preset": preset, **chosen}
 
 
 # Values
@@ -123,21 +116,6 @@ def test_groups_longer_than_a_segment_are_split() -> None:
 
 
 # Rates
-
-
-def test_rates_are_those_of_quantized_variables() -> None:
-    """Against entropies that are summed up."""
-    for step in (0.05, 0.3, 0.5, 1.0, 2.0, 4.0):
-        edges = (np.arange(-4000, 4001) - 0.5) * step
-        tails = 0.5 * np.exp(-math.sqrt(2) * np.abs(edges))
-        below = np.where(edges < 0, tails, 1 - tails)
-        for found, distribution in (
-            (laplacian(step), below),
-            (gaussian(step), np.array([0.5 * math.erfc(-e / math.sqrt(2)) for e in edges])),
-        ):
-            p = np.diff(distribution)
-            p = p[p > 0]
-            assert found == pytest.approx(-(p * np.log2(p)).sum(), abs=1e-6)
 
 
 @settings(max_examples=30)
@@ -264,6 +242,25 @@ def test_a_predicted_ltr_is_not_decoded_from_the_wrong_one() -> None:
     decoder.skip(10)
     with pytest.raises(LostFrameError, match="lost or no LTR"):
         decoder.push(*pushed[20])
+
+
+def test_an_ltr_rests_upon_the_one_before_alone() -> None:
+    """Frames between them may be lost, damaged, or come with a wrong flag."""
+    motion = markers(60, 2)
+    encoder, decoder = live_pair(motion, step=0.5, gof=10, intra_period=0)
+    pushed = [encoder.push(row) for row in motion.values]
+    meant = Direct("online", motion, step=0.5, gof=10, intra_period=0).read()
+    for at, (stream, fresh) in enumerate(pushed):
+        if at % 10 == 5:
+            decoder.skip(1)
+        elif at % 10 in (3, 7):
+            with pytest.raises(mcz.FormatError):
+                decoder.push(stream + bytes(9) if at % 20 == 3 else stream, at % 20 != 3)
+        elif at % 10 > 3:
+            with pytest.raises(LostFrameError):
+                decoder.push(stream, fresh)
+        else:
+            np.testing.assert_array_equal(decoder.push(stream, fresh), meant[at])
 
 
 def test_parameters_change_at_the_border_of_a_group() -> None:

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-import mcz
 from mcz.angles import unwrap
-from mcz.codecs.contract import Layout, Request, Span
-from mcz.codecs.pca import streams
-from mcz.codecs.pca.pca import CODEC
-from mcz.codecs.pca.streams import Components
 from tests.codecs.lossy import Direct, clip_of, decoded, wandering
 from tests.motions import smooth
 
@@ -55,33 +49,6 @@ def test_the_error_is_near_that_of_the_components_left_out(n_frames, kinds, q) -
 
 
 # Streams
-
-
-def test_integers_beyond_the_limit_are_refused() -> None:
-    most = np.array([2**40], np.int64)
-    one, none = np.array([[1]], np.int64), np.zeros(1, np.int64)
-    for place in range(3):
-        parts = [none + 1, one, one]
-        parts[place] = np.broadcast_to(most, parts[place].shape)
-        fits = Components(0, parts[0], none, parts[1], parts[2])
-        data = streams.build_stream(fits, scaled=False)
-        found = streams.parse_stream(data, 1, 1, 1, scaled=False)
-        np.testing.assert_array_equal(found.coefficients, parts[2])
-        parts[place] = parts[place] + 1
-        with pytest.raises(mcz.MotionError, match="exceeds"):
-            streams.build_stream(Components(0, parts[0], none, parts[1], parts[2]), scaled=False)
-
-
-def test_the_greatest_values_are_finite() -> None:
-    """The greatest step, mean, basis and coefficient that bits can spell."""
-    most = np.full((1, 1), 2**40, np.int64)
-    data = streams.build_stream(
-        Components(255, most[0], np.zeros(1, np.int64), most, most), scaled=True
-    )
-    found = CODEC.decode(
-        b"\xff", Layout(1, ((0,),)), [Span(0, 1)], Request(0, 1, (0,)), lambda *_: data
-    )
-    assert np.isfinite(found).all() and found[0, 0] > 1e30
 
 
 def test_a_segment_is_read_up_to_what_is_wanted() -> None:

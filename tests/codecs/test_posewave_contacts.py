@@ -16,9 +16,7 @@ import mcz
 from mcz.codecs import by_name
 from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs_of
 from mcz.codecs.posewave.contact_keeper import Keeper, Outcome, Piece
-from mcz.codecs.posewave.contact_kernels import STANDING, correct, lanes_of, place
-from mcz.codecs.posewave.contact_plan import MOST_STEPS, Contacts, Held, make_held, parse_contacts
-from mcz.codecs.posewave.skeleton_plan import Plan, make_plan
+from mcz.codecs.posewave.contact_plan import Contacts, parse_contacts
 from mcz.errors import ContactWarning, FormatError, MotionError, OptionError
 from mcz.kinematics.points import first_points, positions_of
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
@@ -183,50 +181,6 @@ class Named:
 
     def __init__(self, **fields: object) -> None:
         self.__dict__.update(fields)
-
-
-def leg(bend: float, *points: tuple[int, int]) -> tuple[Plan, Held, np.ndarray]:
-    """Two legs of 40, the left knee bent by ``bend`` degrees, as plan, points and a frame."""
-    skeleton = biped()
-    n = skeleton.n_channels
-    plan = make_plan(skeleton, np.ones(n, np.bool_), np.full(n, 1e-6), radius=1.0)
-    held = make_held(contacts_of(skeleton, *(points or [(3, 0)])), plan, np.arange(n), np.ones(n))
-    values = np.zeros((1, n))
-    values[0, skeleton.columns(2)[1]] = bend
-    return plan, held, values
-
-
-def shifted(
-    plan: Plan, held: Held, values: np.ndarray, shifts: np.ndarray, kind: int = STANDING
-) -> np.ndarray:
-    """How far points have come, (n_points, n_frames, 3); ``values`` are corrected."""
-    n = len(held.joints), len(values)
-    before, after = np.empty((*n, 3)), np.empty((*n, 3))
-    place(plan, held, lanes_of(plan, 1), values, before)
-    wanted = np.broadcast_to(shifts, (*n, 3)).copy()
-    correct(plan, held, lanes_of(plan, 1), values, np.full(n, kind), wanted, 4)
-    place(plan, held, lanes_of(plan, 1), values, after)
-    return after - before
-
-
-@pytest.mark.parametrize("bend", [0.0, 1e-9, 1e-3, 0.5, 5.0, 90.0, 180.0])
-@pytest.mark.parametrize("way", [(0.0, -0.1, 0.0), (0.0, 0.1, 0.0), (0.1, 0.1, 0.1)])
-def test_a_point_comes_to_its_place_by_small_turns(bend: float, way: tuple[float, ...]) -> None:
-    plan, held, values = leg(bend)
-    before = values.copy()
-    assert np.allclose(shifted(plan, held, values, np.array(way)), way, atol=1e-7)
-    skeleton = biped()
-    off = positions_of(skeleton, values) - positions_of(skeleton, before)
-    assert np.linalg.norm(off, axis=2).max() < 1.5 * np.linalg.norm(way)  # no point goes farther
-
-
-@pytest.mark.parametrize("bend", [0.0, 1e-9, 30.0])
-@pytest.mark.parametrize("far", [1e3, 1e12, 1e30])
-def test_what_is_out_of_reach_stays_bounded(bend: float, far: float) -> None:
-    plan, held, values = leg(bend, (3, 0), (4, 1), (7, 0), (3, 0))
-    before = values.copy()
-    shifted(plan, held, values, np.array([far, far, -far]))
-    assert np.abs(values - before).max() <= MOST_STEPS + 1e-9
 
 
 def test_runs_that_cannot_be() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -68,13 +67,3 @@ def test_nothing_changes_while_frames_come() -> None:
     encoder, _ = pair(turning(1), step=0.1)
     with pytest.raises(OptionError, match="step cannot change"):
         encoder.change({"step": 0.2})
-
-
-def test_a_rate_is_told() -> None:
-    out = io.BytesIO()
-    with mcz.LiveWriter(
-        out, turning(1).skeleton, "lossy", {"step": 0.1}, frame_rate=Fraction(120)
-    ) as live:
-        live.push(turning(1).values[0])
-    with mcz.open(out.getvalue()) as file:
-        assert file.clips["live"].frame_rate == 120

@@ -23,7 +23,6 @@ from tests.codecs.lossy import Direct, clip_of
 from tests.motions import smooth
 
 Array = np.ndarray
-POSITION = ("tx", "ty", "tz")
 
 
 def saved(motion: Motion, **params: object) -> bytes:
@@ -217,13 +216,6 @@ def test_a_part_fetches_the_next_segment_only_where_it_must() -> None:
 
         clip.read(start, stop, (2,), resolution, {"fetch": fetch})
         assert asked == meant, (start, stop)
-
-
-def test_marks_are_the_same_at_both_resolutions() -> None:
-    clip = coded(smooth(333), segment_frames=80)
-    marks = [*range(0, 333, 40), 332]
-    np.testing.assert_array_equal(clip.read()[marks], clip.read(resolution=1)[marks])
-    assert (clip.read() != clip.read(resolution=1)).any()
 
 
 # Clips out of the ordinary

@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, reject, settings
-from hypothesis import strategies as st
 
 import mcz
 from conformance import run
@@ -27,15 +25,10 @@ from conformance.child import Limits
 from conformance.server import Server
 from mcz.cli import conformance
 from mcz.codecs import by_name
-from mcz.codecs.posewave import choices
-from mcz.container.writer import Writer
-from mcz.errors import MczError, OptionError
-from mcz.motion import Motion
+from mcz.errors import MczError
 from mcz.reading.lost_skeletons import LOST
-from mcz.writing.clip_writer import write_clip
 from tests.codecs import cases as contract
 from tests.codecs.lossy import gapped, markers, rough, saved, wandering
-from tests.codecs.test_posewave_contacts import RUNS, walking
 from tests.motions import smooth
 from tests.test_vector_tools import vector_of
 from tools import make_vectors
@@ -47,51 +40,7 @@ MOST_OUTPUT = 2**27
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
 
-CONTACTS: tuple[dict[str, Any], ...] = (
-    {"step": 0.1},
-    {"step": 1, "contact_tolerance": 0.1, "segment_frames": 64},
-    {"step": 0.1, "levels": 0},
-    {"step": 0.3, "levels": 8},
-)
-MORE: tuple[tuple[str, dict[str, Any]], ...] = (  # beside the cases of the contract suite
-    ("raw", {"segment_frames": 17}),
-    ("lossless", {"segment_frames": 17}),
-    ("fast", {"segment_frames": 17}),
-    ("best", {"segment_frames": 17}),
-    ("mrdwt", {"T_g": 1e-4, "segment_frames": 32}),
-    ("mrdwt", {"T_g": 1, "segment_frames": 64, "wavelet": "db8", "N": 3}),
-    ("mrdwt", {"T_g": 0.5, "wavelet": "haar", "N": 16}),
-    ("mrdwt", {"T_g": 2, "wavelet": "sym4", "N": 0}),
-    ("qbc", {"d2_lmt": 1e-4, "delta": 7}),
-    ("qbc", {"d2_lmt": 5, "preset": "khan2014", "middle": "least-squares", "segment_frames": 80}),
-    ("qbc", {"d2_lmt": 0.5, "breaks": "fewest", "delta": 16, "segment_frames": 32}),
-    ("qbc", {"d2_lmt": 30, "delta": 1000, "middle": "published"}),
-    ("pca", {"q": 1}),
-    ("pca", {"q": 99, "Q": 5, "segment_frames": 17}),
-    ("lsdt-frame", {}),
-    ("lsdt-frame", {"step": 0.01, "basis": "cosines", "coder": "prefix", "segment_frames": 30}),
-    ("lsdt-frame", {"step": 5, "basis": "learned", "coder": "prefix"}),
-    ("lsdt-frame", {"preset": "hou2016", "step": 1e-4}),
-    ("lsdt-clip", {"window": 1}),
-    ("lsdt-clip", {"step": 1, "basis": "learned", "window": 16, "segment_frames": 40}),
-    ("lsdt-clip", {"preset": "hou2016"}),
-    ("mdtt", {"step": 0.1, "window": 16, "frequencies": 3, "segment_frames": 40}),
-    ("mdtt", {"rank": 2, "window": 1}),
-    ("pca-rdo", {"step": 0.1, "window": 16, "frequencies": 3, "segment_frames": 40}),
-    ("pca-rdo", {"preset": "hou2016"}),
-    ("online", {"step": 0.01, "basis": "cosines", "coder": "golomb", "gof": 7}),
-    ("online", {"step": 1, "basis": "learned", "intra_period": 0, "segment_frames": 17}),
-    ("online", {"step": 0.001, "order": "reordered", "coder": "golomb", "gof": 2, "ltr_step": 1}),
-    ("online", {"preset": "rca", "bitrate": 5, "gof": 12, "intra_period": 2}),
-    ("online", {"bitrate": 0.5, "gof": 4, "coder": "golomb"}),
-    ("posewave", {"step": 0.3, "segment_frames": 17}),
-    ("posewave", {"step": 0.3, "levels": 8}),
-    ("posewave", {"preset": "preview", "levels": 1}),
-)
-CASES = [
-    *((case.name, dict(case.params)) for name, case in contract.CASES.items() if name != "overlap"),
-    *MORE,
-]
+CASES = [(c.name, dict(c.params)) for name, c in contract.CASES.items() if name != "overlap"]
 CODECS = tuple(dict.fromkeys(codec for codec, _ in CASES))
 POINTS = ("lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo", "online")
 
@@ -219,13 +168,6 @@ def test_salvage(codec: str, other: Server) -> None:
     assert found > 10
 
 
-@pytest.mark.parametrize("codec", POINTS)
-def test_places_and_channels(codec: str, other: Server) -> None:
-    for params in ({"domain": "channels"}, {"virtual_markers": True}):
-        for n_frames in (0, 60):
-            check(saved(codec, smooth(n_frames), **params), other, (params, n_frames))
-
-
 CUTS: tuple[dict[str, Any], ...] = (
     {"frames": (70, 90)},
     {"frames": (0, 5)},
@@ -272,37 +214,6 @@ def test_live_clips(codec: str, params: dict[str, Any], other: Server) -> None:
     check(out.getvalue(), other, params)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_finer_steps_of_posewave(seed: int, other: Server) -> None:
-    """Rows that have steps of their own."""
-    wanted = np.random.default_rng(seed).integers(0, 8, 90)
-    for refinement in (wanted, np.where(wanted == 7, 7, 0), np.sort(wanted)):
-        out = io.BytesIO()
-        writer = Writer(out)
-        params = {"step": 0.5, "refinement": refinement, "segment_frames": 50}
-        write_clip(writer, smooth(90), by_name("posewave"), params)
-        writer.finish()
-        check(out.getvalue(), other, refinement)
-
-
-@pytest.mark.parametrize("codes", [(2, 0), (1, 6), (5, 3), (0, 4)], ids=str)
-def test_axis_orders_of_posewave(
-    codes: tuple[int, ...], other: Server, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Joints whose angles are coded in other orders of axes than those of the source."""
-    monkeypatch.setattr(choices, "choose_orders", lambda source, exact: [*codes, 0, 0])
-    for step in (0.01, 1.0):
-        check(saved("posewave", smooth(90), step=step, segment_frames=50), other, step)
-
-
-@pytest.mark.parametrize("unit", ["deg", "rad"])
-def test_contacts_of_posewave(unit: str, other: Server) -> None:
-    """Points of feet that keep their places."""
-    for seed, params in enumerate(CONTACTS):
-        motion = walking(150, seed, unit)
-        check(saved("posewave", motion, contacts=RUNS, **params), other, params)
-
-
 @pytest.mark.parametrize("part", range(4))
 def test_files_made_at_random(part: int, other: Server) -> None:
     """Headers and streams that no encoder of ours would choose, beyond the stored ones."""
@@ -312,55 +223,3 @@ def test_files_made_at_random(part: int, other: Server) -> None:
             told = other.ask(request.arguments, vector.data, MOST_OUTPUT)
             fault = run.judge(request, told.code, told.output)
             assert fault is None, (seed, request.arguments, fault, told.errors)
-
-
-MOTIONS = st.one_of(
-    st.builds(smooth, st.integers(1, 90)),
-    st.builds(rough, st.integers(1, 90), st.integers(0, 99)),
-    st.builds(gapped, st.integers(62, 120)),
-    st.builds(wandering, st.integers(1, 60), st.just(["tx", "ty", "tz", "rx", "ry", "rz"])),
-    st.builds(markers, st.integers(1, 70), st.integers(1, 9), st.integers(0, 99)),
-    st.builds(markers, st.integers(1, 40), st.just(31), st.integers(0, 99)),
-)
-COMMON = {
-    "preset": st.sampled_from(["mod", "rc", "rca"]),
-    "gof": st.integers(1, 50),
-    "intra_period": st.integers(0, 4),
-    "coder": st.sampled_from(["golomb", "mixed"]),
-    "order": st.sampled_from(["apart", "reordered"]),
-    "domain": st.just("channels"),
-    "virtual_markers": st.booleans(),
-    "basis": st.sampled_from(["cosines", "known", "learned"]),
-    "segment_frames": st.integers(1, 70),
-    "threshold": st.sampled_from([0.5, 0.6, 3.0]),
-}
-STEPS = {
-    "step": st.sampled_from([1e-5, 0.01, 0.3, 1.0, 20.0, 1e4]),
-    "ltr_step": st.sampled_from([1e-3, 0.3, 0.5, 1.0, 2.0]),
-}
-RATES = {"bitrate": st.sampled_from([0.01, 1.0, 8.0, 50.0, 1e4])}
-CONTROLS = {"rate_control": st.sampled_from(["rc", "rca", "steady"])}
-PARAMS = st.one_of(
-    st.fixed_dictionaries({}, optional=COMMON | STEPS),
-    st.fixed_dictionaries(RATES, optional=COMMON | CONTROLS),
-)
-KNOWN = st.tuples(
-    st.builds(markers, st.integers(1, 40), st.just(31)),
-    PARAMS.map(lambda params: params | {"basis": "known", "order": "apart"}),
-)
-
-
-@given(case=st.one_of(st.tuples(MOTIONS, PARAMS), KNOWN))
-@settings(
-    max_examples=40,
-    suppress_health_check=[
-        *(HealthCheck.filter_too_much, HealthCheck.too_slow, HealthCheck.function_scoped_fixture)
-    ],
-)
-def test_any_parameters_of_online(case: tuple[Motion, dict[str, Any]], other: Server) -> None:
-    motion, params = case
-    try:
-        data = saved("online", motion, **params)
-    except OptionError:  # parameters that do not go together
-        reject()
-    check(data, other, params)
