@@ -160,6 +160,8 @@ def test_npz(walk: Path, call: Call) -> None:
     "options",
     [
         ["--joints", "Head"],
+        ["--to", "bvh", "--joints", "Head"],
+        ["--rate", "120"],
         ["--resolution", "1"],
         ["--to", "csv", "--joints", "Tail"],
         ["--to", "csv", "--resolution", "9"],
@@ -343,31 +345,3 @@ def test_append_of_a_folder(walk: Path, folder: Path, call: Call) -> None:
     assert {row["result"] for row in shown["files"]} >= {"parsed", "present"}
     assert call("verify", walk).code == 0
     fails(call("append", walk.with_name("nowhere"), walk), 1, "no such file")
-
-
-def test_conversions(folder: Path, call: Call) -> None:
-    """An AMC as BVH, that as AMC with its ASF, that again as C3D."""
-    assert call("encode", folder / "walk.amc", "-o", folder / "clip.mcz").code == 0
-    out = folder / "out"
-    out.mkdir()
-    walk = folder / "clip.mcz"
-    fails(call("decode", walk, "--to", "bvh", "-o", out), 2, "frame rate is unknown")
-    fails(call("decode", walk, "--rate", 120, "-o", out), 2, "--rate needs --to")
-    fails(call("decode", walk, "--to", "bvh", "--joints", "root", "-o", out), 2, "--joints")
-    shown = call("decode", walk, "--to", "bvh", "--rate", 120, "-o", out, "--json").document
-    assert [(row["kind"], Path(row["path"]).name) for row in shown["outputs"]] == [
-        ("bvh", "walk.bvh")
-    ]
-    assert call("encode", out / "walk.bvh", "-o", out / "bvh.mcz").code == 0
-    assert call("decode", out / "bvh.mcz", "--to", "amc", "--with-skeleton", "-o", out).code == 0
-    assert {"walk.amc", "walk.asf"} <= {path.name for path in out.iterdir()}
-    arguments = ("--skeleton", out / "walk.asf", "-o", out / "amc.mcz")
-    assert call("encode", out / "walk.amc", *arguments).code == 0
-    three_d = ("--to", "c3d", "--rate", 120, "--frames", "0:9", "-o", out / "clip.c3d")
-    assert call("decode", out / "amc.mcz", *three_d).code == 0
-    again = folder / "again"
-    again.mkdir()
-    assert call("decode", walk, "--to", "amc", "--with-skeleton", "-o", again).code == 0
-    assert (again / "walk.amc").read_bytes() == (folder / "walk.amc").read_bytes()
-    skeletons = [mcz.read_skeleton(place / "walk.asf") for place in (folder, again)]
-    assert skeletons[0] == skeletons[1]

@@ -187,20 +187,6 @@ def test_records_of_others_are_shown_as_they_are() -> None:
     assert list(figure_lines({"codec": "z", "param.q": "3"})) == ["codec z, q 3"]
 
 
-@pytest.mark.real
-def test_real_rounding(data: Path, tmp_path: Path, call: Call) -> None:
-    """A clip rounded to one decimal, and the figures that the public reader gives of it."""
-    motion = mcz.read(data / "cmu/amc/10_03.amc")
-    rounded = motion.with_values(np.round(motion.values, 1))
-    mcz.write(replace(rounded, source=None), tmp_path / "x.mcz")
-    shown = call("diff", data / "cmu/amc/10_03.amc", tmp_path / "x.mcz", "--json").document
-    (clip,) = shown["clips"]
-    found = mcz.compare(motion, rounded)
-    assert clip["mse"] == found.mse
-    assert clip["virtual_marker_mean_cm"] == found.virtual_marker_mean_cm
-    assert clip["point_set"] == "acclaim"
-
-
 # Shells, joints, contacts
 
 

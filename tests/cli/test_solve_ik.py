@@ -17,7 +17,7 @@ from mcz.container.limits import BASE
 from mcz.container.writer import Writer
 from mcz.kinematics import point_names, points_and_markers_of
 from mcz.kinematics.marker_motion import NOTE, in_positions
-from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.sample import bvh_walk, marker_walk
 from mcz.writing.clip_writer import write_plan
 from mcz.writing.planning import plan_clip
 from mcz.writing.prepare import Prepared, StoredSkeleton
@@ -191,11 +191,3 @@ def test_units_are_converted_and_scalars_reported() -> None:
     assert back.values.tolist() == [[2.0, 4.0, 6.0, 0.0]]
     assert fit.unsolved == ("root.smile",)
     assert fit.mean_error_cm == 0.0
-
-
-def test_no_frames(walk: Motion) -> None:
-    none = replace(walk, signals=(walk.signals[0].cut(0, 0),))
-    back, fit = mcz.from_positions(mcz.in_positions(none, virtual_markers=True), walk.skeleton)
-    assert back.n_frames == 0
-    assert (fit.mean_error, fit.max_error, fit.frame, fit.point) == (None,) * 4
-    assert acclaim_walk().skeleton.n_channels == back.skeleton.n_channels

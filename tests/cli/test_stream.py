@@ -397,22 +397,6 @@ def test_clients_early_and_late() -> None:
         assert started.process.wait() == 0
 
 
-def test_both_ends_of_a_connection() -> None:
-    with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as sender:
-        sender.say(NAMES)
-        with Started("decode", "--connect", sender.address(), "--states") as receiver:
-            for number, row in enumerate(ROWS):
-                sender.say(line(row))
-                if not number:
-                    receiver.stdout.readline()
-                found = receiver.stdout.readline()
-                assert found.startswith(b"%d," % number)
-                assert found.endswith(b",decoded\n")
-            assert sender.end() == 0
-            assert receiver.process.wait() == 0
-            assert "10 frames decoded" in receiver.stderr.read().decode()
-
-
 def test_an_interrupt_ends_a_connection_well() -> None:
     with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as started:
         started.say(NAMES)

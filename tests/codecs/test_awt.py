@@ -12,12 +12,10 @@ import mcz
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.wavelet import awt_choices as choice
 from mcz.codecs.wavelet.awt import CODEC
-from mcz.codecs.wavelet.shared import WaveletHeader, transform_of
+from mcz.codecs.wavelet.shared import transform_of
 from mcz.motion import Motion
-from mcz.schema import parse
-from mcz.transforms import wavelets
 from mcz.writing.signal_source import MemorySource
-from tests.codecs.lossy import Direct, saved, wandering
+from tests.codecs.lossy import saved, wandering
 from tests.motions import smooth
 
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx"]), min_size=1, max_size=5)
@@ -85,12 +83,3 @@ def test_positions_are_better_for_it() -> None:
             quality = file.only_clip().quality
         errors.append(float(quality["mean_position_error_cm"]))
     assert errors[0] < errors[1]
-
-
-def test_presets() -> None:
-    published = Direct("awt", smooth(100), preset="khan2014", a_w=20)
-    fields = parse(WaveletHeader, published.header, "header")
-    assert (fields.wavelet, fields.levels, fields.decimals) == (wavelets.IDS["db2"], 4, 2)
-    assert len(published.segments) == 1
-    default = parse(WaveletHeader, Direct("awt", smooth(400)).header, "header")
-    assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)

@@ -23,7 +23,7 @@ from mcz.codecs import CODECS, by_name
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
 from tests import overlap_codec
 from tests.codecs.cases import CASES, Case, meant, saved, small, written
-from tests.codecs.lossy import bones, clip_of, gapped, markers, wandering
+from tests.codecs.lossy import Direct, bones, clip_of, gapped, markers, wandering
 from tests.motions import smooth
 
 EVERY = pytest.mark.parametrize("name", CASES)
@@ -103,6 +103,21 @@ def test_segments_keep_to_the_memory_that_is_allowed(name: str) -> None:
     assert max(span.n_frames for span in many.spans) <= 48
     if case.is_free:
         assert many.read().tobytes() == small(name).again(motion).read().tobytes()
+
+
+@pytest.mark.parametrize(
+    ("codec", "params", "lead"), [("mrdwt", {}, 8 * 15), ("qbc", {}, 39), ("pca", {"q": 20}, 0)]
+)
+def test_a_long_clip_is_cut_into_segments_by_size(codec: str, params: Any, lead: int) -> None:
+    """Noise fills 64 KiB soon: segments get shorter, the values stay near or those of one."""
+    values = np.random.default_rng(3).normal(0, 1000, (6000, 20))
+    motion = clip_of(values, ["tx"] * 20)
+    many, one = (Direct(codec, motion, **params, **more) for more in ({}, {"segment_frames": 6000}))
+    assert len(many.segments) > 2 and len(one.segments) == 1
+    assert all(sum(map(len, segment.streams)) < 2**16 for segment in many.segments)
+    assert all(segment.lead == min(segment.first, lead) for segment in many.segments)
+    assert lead == 0 or many.read().tobytes() == one.read().tobytes()
+    assert np.abs(many.read() - values).max() < 4
 
 
 # Parts

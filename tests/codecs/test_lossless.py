@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import struct
 from functools import cache
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.coding.ordinals.counts import Law
-from mcz.coding.ordinals.degrees import DEGREE, multiples_of, of_products
+from mcz.coding.ordinals.degrees import DEGREE, of_products
 from mcz.coding.ordinals.units import of_multiples
 from mcz.formats import FORMATS
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
@@ -23,8 +22,6 @@ from tests.codecs.lossy import saved
 
 BINARY32, SIX = Grid(GridKind.BINARY32), Grid(GridKind.GENERAL, 6)
 VOLT = 10 / 65535  # of a converter of 16 bits
-TERMS = st.none() | st.floats(-(2.0**80), 2.0**80)
-LAWS = st.builds(Law, st.floats(2.0**-200, 2.0**80), TERMS, TERMS)
 FORCE = Skeleton((Joint("plate", channels=(Channel("", "force", "V"),)),))
 
 
@@ -109,35 +106,3 @@ def plain_write(motion: mcz.Motion) -> bytes:
     """The source file with the values that the motion has now."""
     assert motion.source is not None
     return FORMATS[motion.source.format].write(motion)
-
-
-@given(
-    st.integers(1, 15),
-    st.floats(2.0**-200, 2.0**80),
-    st.integers(1, 63),
-    st.lists(st.integers(-(2**44), 2**44 - 1) | st.integers(-9, 9), min_size=1),
-)
-def test_products_are_numbers_of_their_grid(
-    digits: int, unit: float, shifts: int, some: list[int]
-) -> None:
-    grid, codes = Grid(GridKind.GENERAL, digits), np.array(some, np.int64)
-    products = multiples_of(codes, shifts) * unit
-    expected = grid.ordinals(products)[0]
-    assert of_products(codes, unit, shifts, grid).tolist() == expected.tolist()
-    last = [float(f"1e{f'{product:.16e}'.split('e')[1]}") for product in products.tolist()]
-    half = 0.5 * np.array(last) * 10.0 ** (1 - digits)  # a unit of the last digit
-    assert (abs(grid.values(expected) - products) <= half + abs(products) * 2.0**-51).all()
-
-
-@given(LAWS, st.lists(st.integers(-(2**44), 2**44 - 1) | st.integers(-9, 9), min_size=1))
-def test_every_step_of_a_law_is_rounded_by_itself(law: Law, counts: list[int]) -> None:
-    expected = []
-    for count in counts:
-        number = float(count) * law.unit
-        number = number if law.offset is None else number + law.offset
-        (number,) = struct.unpack("<f", struct.pack("<f", number))
-        number = number if law.shift is None else number + law.shift
-        expected.append(struct.unpack("<i", struct.pack("<f", number))[0])
-    words = np.array(expected, np.int64)
-    ordinals = np.where(words < 0, -1 - (words & 0x7FFFFFFF), words)
-    assert law.ordinals(np.array(counts, np.int64)).tolist() == ordinals.tolist()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import mcz
@@ -91,35 +91,22 @@ def thresholds(motion: Motion, T_g: float) -> Array:
     KINDS,
     NAMES,
     st.integers(0, 5),
-    st.sampled_from([0.0, 0.001, 0.3, 5.0]),
-    st.sampled_from([0, 1, 4]),
+    st.sampled_from([1e-6, 0.001, 0.3, 1.0, 5.0, 30.0]),
+    st.sampled_from([None, 0, 1, 4]),
     st.integers(0, 9),
 )
-def test_error_with_decimals_is_bounded(n_frames, kinds, name, levels, T_g, decimals, seed) -> None:
+@example(50, ["rx", "tx"], "db2", 3, 0.0, 1, 0)
+def test_errors_are_bounded(n_frames, kinds, name, levels, T_g, decimals, seed) -> None:
     motion = wandering(n_frames, kinds, seed)
-    found = decoded(motion, T_g=T_g, Q=decimals, N=levels, wavelet=name, threshold_rule="flat")
-    meant = unwrap(motion.values, motion.skeleton)
-    half = 0.5 * 10.0**-decimals
-    for column, T in enumerate(thresholds(motion, T_g)):
-        most = bound(name, levels, half, max(T, half)) + 1e-9 * (1 + np.abs(meant).max())
-        assert np.abs(found[:, column] - meant[:, column]).max() <= most
-
-
-@given(
-    FRAMES,
-    KINDS,
-    NAMES,
-    st.integers(0, 5),
-    st.sampled_from([1e-6, 0.01, 1.0, 30.0]),
-    st.integers(0, 9),
-)
-def test_error_with_steps_is_bounded(n_frames, kinds, name, levels, T_g, seed) -> None:
-    motion = wandering(n_frames, kinds, seed)
-    found = decoded(motion, T_g=T_g, N=levels, wavelet=name, threshold_rule="flat")
+    params = {} if decimals is None else {"Q": decimals}
+    params |= {"T_g": T_g, "N": levels, "wavelet": name, "threshold_rule": "flat"}
+    found = decoded(motion, **params)
     meant = unwrap(motion.values, motion.skeleton)
     for column, T in enumerate(thresholds(motion, T_g)):
         step = T / 0.8 * math.sqrt(5 / 4)  # step codes are quarters of an octave or a little more
-        most = bound(name, levels, step / 2, 0.8 * step) + 1e-9 * (1 + np.abs(meant).max())
+        half = 0.5 * 10.0 ** -(decimals or 0)
+        errors = (step / 2, 0.8 * step) if decimals is None else (half, max(T, half))
+        most = bound(name, levels, *errors) + 1e-9 * (1 + np.abs(meant).max())
         assert np.abs(found[:, column] - meant[:, column]).max() <= most
 
 
@@ -129,21 +116,6 @@ def test_step_codes_are_the_nearest(ratio: float) -> None:
     found = abs(math.log(ratio_of(code) / ratio))
     limited = [c for c in (0, 255, code - 1, code + 1) if 0 <= c <= 255]
     assert all(found <= abs(math.log(ratio_of(c) / ratio)) + 1e-12 for c in limited)
-
-
-# A part is the same as in the whole
-
-
-def test_a_long_clip_is_cut_into_segments_by_size() -> None:
-    """Noise fills 64 KiB soon: segments get shorter, the values stay those of one segment."""
-    random = np.random.default_rng(3)
-    motion = clip_of(random.normal(0, 1000, (6000, 20)))
-    many, one = Direct(motion), Direct(motion, segment_frames=6000)
-    assert len(many.segments) > 2 and len(one.segments) == 1
-    assert all(sum(map(len, s.streams)) < 2**16 for s in many.segments)
-    assert [s.lead for s in many.segments[:1]] == [0]
-    assert all(s.lead == min(s.first, 8 * 15) for s in many.segments)
-    assert many.read().tobytes() == one.read().tobytes()
 
 
 # Clips out of the ordinary
@@ -219,20 +191,33 @@ def test_thresholds_beyond_the_range_of_integers(decimals: int) -> None:
         saved(smooth(50), T_g=2.0**20, Q=decimals)
 
 
-def test_presets() -> None:
-    coded = Direct(smooth(100), preset="khan2016")
-    fields = coded.fields
-    assert (fields.wavelet, fields.levels, fields.decimals) == (wavelets.IDS["db3"], 4, 1)
-    assert len(coded.segments) == 1
-    least = {Direct(smooth(100), preset="khan2016", T_g=T).fields.least for T in (12, 12.0)}
-    assert least == {120}  # the root has depth 0
-    same = {"T_g": 12, "Q": 1, "N": 4, "wavelet": "db3", "threshold_rule": "depth"}
-    assert saved(smooth(100), preset="khan2016", **same) != b""
-    assert Direct(smooth(100), preset="khan2016", **same).segments == coded.segments
-    assert Direct(smooth(3), preset="khan2016").fields.levels == 4
-    default = Direct(smooth(400)).fields
+@pytest.mark.parametrize(
+    ("codec", "preset", "params", "wavelet", "decimals"),
+    [
+        ("mrdwt", "khan2016", {}, "db3", 1),
+        ("dwt", "khan2014", {}, "db2", 2),
+        ("awt", "khan2014", {"a_w": 20}, "db2", 2),
+    ],
+)
+def test_presets(codec: str, preset: str, params: Any, wavelet: str, decimals: int) -> None:
+    def fields(n_frames: int, **how: Any) -> tuple[WaveletHeader, int]:
+        coded = lossy.Direct(codec, smooth(n_frames), **how)
+        return parse(WaveletHeader, coded.header, "header"), len(coded.segments)
+
+    found, n_segments = fields(100, preset=preset, **params)
+    assert (found.wavelet, found.levels, found.decimals) == (wavelets.IDS[wavelet], 4, decimals)
+    assert n_segments == 1
+    assert fields(3, preset=preset, **params)[0].levels == 4
+    default, _ = fields(400)
     assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
-    assert default.unit == 0.2 / 0.8
+    assert codec == "awt" or default.unit == 0.2 / 0.8
+    assert found.least == {"mrdwt": 120, "dwt": 300}.get(codec, found.least)  # depth 0: the root
+
+
+def test_a_preset_is_its_parameters() -> None:
+    same = {"T_g": 12, "Q": 1, "N": 4, "wavelet": "db3", "threshold_rule": "depth"}
+    coded = Direct(smooth(100), preset="khan2016")
+    assert Direct(smooth(100), preset="khan2016", **same).segments == coded.segments
 
 
 def test_default_levels_fit_the_clip() -> None:
@@ -267,15 +252,3 @@ def test_dwt_is_mrdwt_with_a_flat_threshold() -> None:
         other = lossy.Direct("mrdwt", motion, T_g=0.7, threshold_rule="flat", **settings)
         assert own.segments == other.segments and own.header == other.header
         assert own.read().tobytes() == other.read().tobytes()
-
-
-def test_presets_of_dwt() -> None:
-    published = lossy.Direct("dwt", smooth(100), preset="khan2014")
-    fields = parse(WaveletHeader, published.header, "header")
-    assert (fields.wavelet, fields.levels, fields.decimals) == (wavelets.IDS["db2"], 4, 2)
-    assert fields.least == 300 and len(published.segments) == 1
-    few = lossy.Direct("dwt", smooth(3), preset="khan2014")
-    assert parse(WaveletHeader, few.header, "header").levels == 4
-    default = parse(WaveletHeader, lossy.Direct("dwt", smooth(400)).header, "header")
-    assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
-    assert default.unit == 0.2 / 0.8

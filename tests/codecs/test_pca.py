@@ -59,17 +59,9 @@ def test_a_segment_is_read_up_to_what_is_wanted() -> None:
     assert coded.read(0, 90, changes=cut).tobytes() == coded.read(0, 90).tobytes()
 
 
-def test_long_clips_are_cut_by_size() -> None:
-    random = np.random.default_rng(3)
-    motion = clip_of(np.cumsum(random.normal(0, 50, (6000, 30)), axis=0), ["tx"] * 30)
-    coded = Direct("pca", motion, q=30, Q=1)
-    assert len(coded.segments) > 2
-    assert all(len(segment.streams[0]) < 2**16 for segment in coded.segments)
-    assert len(Direct("pca", motion, preset="khan2014", q=3).segments) == 1
-    np.testing.assert_allclose(coded.read(), motion.values, atol=2)
-
-
 def test_presets() -> None:
     assert Direct("pca", smooth(100), preset="khan2014").header == b"\x02"
     assert Direct("pca", smooth(100)).header == b"\xff"
     assert Direct("pca", smooth(100), Q=3).header == b"\x03"
+    rough = clip_of(np.random.default_rng(3).normal(0, 1000, (6000, 30)), ["tx"] * 30)
+    assert len(Direct("pca", rough, preset="khan2014", q=30).segments) == 1

@@ -76,41 +76,6 @@ def test_angles_come_back(
     assert off < 1e-8
 
 
-def test_what_stands_in_gimbal_lock_stays_there() -> None:
-    skeleton = single((0, 1, 2), "deg")
-    source = np.tile([30.0, 5.0, 90.0, -20.0], (50, 1))
-    orders = Orders([5], skeleton)
-    notes, decoded = orders.notes_and_values(source, orders.coded(source))
-    assert np.isfinite(decoded).all()
-    assert (decoded == decoded[0]).all()
-    assert len(notes) < 10
-
-
-def test_a_calm_clip_needs_no_notes() -> None:
-    skeleton = single((2, 1, 0), "deg")
-    steps = np.linspace(0, 2 * np.pi, 400)
-    source = np.stack([20 * np.cos(steps), steps, 100 * np.sin(steps), 30 * np.sin(2 * steps)], 1)
-    orders = Orders([3], skeleton)
-    notes, decoded = orders.notes_and_values(source, orders.coded(source))
-    assert notes == b"\0"  # although it passes gimbal lock
-    assert np.abs(decoded - source).max() < 1e-9
-
-
-@given(CODES, UNITS, st.integers(0, 1000))
-def test_lossy_angles_stay_near(code: int, unit: str, seed: int) -> None:
-    """Errors of a reader's angles are told no turns off."""
-    skeleton, orders = single((2, 1, 0), unit), Orders([code], single((2, 1, 0), unit))
-    source = unwrap(wandering(unit, 200, seed), skeleton)
-    columns = orders.places[0].columns
-    coded = orders.coded(source)
-    coded[:, columns] += np.random.default_rng(seed).normal(0, 1e-4, (200, 3)) * FULL_TURN[unit]
-    _, decoded = orders.notes_and_values(source, coded)
-    off = np.abs(decoded - source)[:, columns] / FULL_TURN[unit]
-    assert off.max() < 1.5
-    middle = source[:, columns[1]] / FULL_TURN[unit]
-    assert off[np.abs(middle * 2 - np.floor(middle * 2) - 0.5) > 0.1].max(initial=0) < 0.01
-
-
 def source_of(skeleton: Skeleton, values: Floats) -> MemorySource:
     """A motion as an encoder sees it."""
     return MemorySource(Motion(skeleton, (Signal(values),)), 0, CODEC, 2**26)

@@ -123,28 +123,21 @@ def check_bound(motion: Motion, limit: float, clip: Direct, *, closed: bool) -> 
             assert distance <= (max(rounding, math.sqrt(limit)) if single else limit**0.5) + slack
 
 
-@given(FRAMES, SIZES, SETTINGS, st.integers(0, 99), st.sampled_from([0.01, 1.0, 30.0]))
-def test_the_bound_holds(n_frames, sizes, settings, seed, roughness) -> None:
+PRESETS = st.sampled_from(["default", "khan2014"])  # which holds it before rounding
+
+
+@given(FRAMES, SIZES, SETTINGS, st.integers(0, 99), st.sampled_from([0.01, 1.0, 30.0]), PRESETS)
+def test_the_bound_holds(n_frames, sizes, settings, seed, roughness, preset) -> None:
     motion = jointed(n_frames, sizes, seed, roughness)
-    check_bound(motion, settings["d2_lmt"], coded(motion, **settings), closed=True)
-
-
-@given(
-    st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=60),
-    SETTINGS,
-    st.sampled_from(["default", "khan2014"]),
-)
-def test_the_bound_holds_for_any_values(values, settings, preset) -> None:
-    motion = of_any(values)
     clip = coded(motion, **settings, preset=preset)
     check_bound(motion, settings["d2_lmt"], clip, closed=preset == "default")
 
 
-@given(FRAMES, SIZES, SETTINGS, st.integers(0, 99))
-def test_the_bound_of_the_preset_holds_before_rounding(n_frames, sizes, settings, seed) -> None:
-    motion = jointed(n_frames, sizes, seed)
-    clip = coded(motion, **settings, preset="khan2014")
-    check_bound(motion, settings["d2_lmt"], clip, closed=False)
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=60), SETTINGS, PRESETS)
+def test_the_bound_holds_for_any_values(values, settings, preset) -> None:
+    motion = of_any(values)
+    clip = coded(motion, **settings, preset=preset)
+    check_bound(motion, settings["d2_lmt"], clip, closed=preset == "default")
 
 
 @given(FRAMES, SIZES, SETTINGS, st.integers(0, 99))
@@ -181,20 +174,6 @@ def test_a_parabola_is_one_curve() -> None:
 def test_the_step_follows_from_the_limit() -> None:
     for limit in (1e-6, 1.0, 50.0):
         assert step_of(coded(smooth(20), d2_lmt=limit)) == STEP_SHARE * limit**0.5
-
-
-# A part is the same as in the whole
-
-
-def test_a_long_clip_is_cut_into_segments_by_size() -> None:
-    """Noise fills 64 KiB soon: segments get shorter, the values stay those of one segment."""
-    random = np.random.default_rng(3)
-    motion = clip_of(random.normal(0, 1000, (6000, 20)))
-    many, one = coded(motion), coded(motion, segment_frames=6000)
-    assert len(many.segments) > 2 and len(one.segments) == 1
-    assert all(sum(map(len, segment.streams)) < 2**16 for segment in many.segments)
-    assert all(segment.lead == min(segment.first, 39) for segment in many.segments)
-    assert many.read().tobytes() == one.read().tobytes()
 
 
 def test_a_part_fetches_the_next_segment_only_where_it_must() -> None:

@@ -24,7 +24,6 @@ from conformance import run
 from conformance.child import Limits
 from conformance.server import Server
 from mcz.cli import conformance
-from mcz.codecs import by_name
 from mcz.errors import MczError
 from mcz.reading.lost_skeletons import LOST
 from tests.codecs import cases as contract
@@ -41,7 +40,6 @@ MOST_OUTPUT = 2**27
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
 
 CASES = [(c.name, dict(c.params)) for name, c in contract.CASES.items() if name != "overlap"]
-CODECS = tuple(dict.fromkeys(codec for codec, _ in CASES))
 POINTS = ("lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo", "online")
 
 
@@ -166,52 +164,6 @@ def test_salvage(codec: str, other: Server) -> None:
             np.testing.assert_array_equal(one[3], another[3], f"{codec} {seed}")
             found += 1
     assert found > 10
-
-
-CUTS: tuple[dict[str, Any], ...] = (
-    {"frames": (70, 90)},
-    {"frames": (0, 5)},
-    {"frames": (149, 150)},
-    {"frames": (40, 41)},
-    {"frames": (9, 9)},
-)
-CHANNEL_CUTS: tuple[dict[str, Any], ...] = (
-    {"joints": ["spine", "knee"]},
-    {"resolution": 1},
-    {"resolution": 2},
-    {"frames": (0, 5), "resolution": 1},
-)
-CHANNEL_CODECS = ("mrdwt", "qbc", "dwt", "awt")
-MORE_CUTS = dict.fromkeys(CHANNEL_CODECS, CHANNEL_CUTS) | {"posewave": CHANNEL_CUTS[1:]}
-
-
-@pytest.mark.parametrize("codec", CODECS)
-def test_cut_clips(codec: str, tmp_path: Path, other: Server) -> None:
-    source, target = tmp_path / "all.mcz", tmp_path / "cut.mcz"
-    mcz.write(smooth(150), source, codec=codec, segment_frames=20)
-    for cut in (*CUTS, *MORE_CUTS.get(codec, ())):
-        if codec == "qbc" and cut.get("resolution") == 2:
-            continue  # it has two
-        mcz.extract(source, target, **cut, force=True)
-        check(target.read_bytes(), other, cut)
-
-
-@pytest.mark.parametrize("codec", [name for name in CODECS if by_name(name).live])
-@pytest.mark.parametrize(
-    "params", [{"step": 1}, {"step": 0.01}, {"step": 0.3, "basis": "cosines"}], ids=str
-)
-def test_live_clips(codec: str, params: dict[str, Any], other: Server) -> None:
-    """Segments of a frame, of which only some start fresh."""
-    if "basis" in params and not by_name(codec).has("basis"):
-        params = {"preset": "visible", "segment_frames": 7}
-    motion = gapped()
-    signal = motion.signals[0]
-    out = io.BytesIO()
-    writer = mcz.LiveWriter(out, motion.skeleton, codec, params, frame_rate=Fraction(60), name="a")
-    for row in np.where(signal.mask, signal.values, np.nan):
-        writer.push(row)
-    writer.close()
-    check(out.getvalue(), other, params)
 
 
 @pytest.mark.parametrize("part", range(4))

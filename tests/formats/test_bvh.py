@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
+from mcz import Channel, Exceptions, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.container.limits import BASE, LARGE
 from mcz.formats import amc, asf, bvh, hierarchy, likely_formats, limits
 from mcz.numbers import Grid, GridKind
@@ -236,3 +236,24 @@ def test_a_byte_order_mark_before_acclaim_hides_nothing(samples: Path) -> None:
             amc.read(mark + hidden)
     motion = amc.read(mark + b"#!OML:ASF\n" + headless)
     assert amc.write(motion) == mark + b"#!OML:ASF\n" + headless
+
+
+@pytest.mark.parametrize(
+    ("rows", "channels"),
+    [([3], [0]), ([0], [4]), ([0], [-1]), ([1, 0], [0, 0]), ([1, 1], [0, 0])],
+)
+def test_exceptions_out_of_place_are_refused(rows: list[int], channels: list[int]) -> None:
+    exceptions = Exceptions(np.array(rows), np.array(channels), (b"1",) * len(rows))
+    with pytest.raises(MotionError):
+        Signal(np.zeros((3, 4)), exceptions=exceptions)
+
+
+def test_a_new_layout_in_every_row_stays_linear() -> None:
+    """3,000 layouts are refused after 1,024 of them; 40,000 rows that alternate are read."""
+    head = b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 2 Xrotation Yrotation\n}\nMOTION\n"
+    head += b"Frames: 1\nFrame Time: 1\n"
+    rows = b"".join(b"1 " + b"\t" * k + b"2\n" for k in range(3000))
+    with pytest.raises(mcz.MczError, match="too irregular"):
+        bvh.read(head + rows)
+    data = head + b"1 2\n1  2\n" * 20_000
+    assert bvh.write(bvh.read(data)) == data
