@@ -7,8 +7,10 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ import mcz
 from mcz import OptionError
 from mcz.cli.common import run
 from mcz.cli.info import command as info_command
-from mcz.cli.main import cli
+from mcz.cli.main import COMMANDS, cli
 from tests.commands import Call
 
 ROOT = Path(__file__).parents[2]
@@ -206,57 +208,34 @@ def test_two_outputs_of_one_name(folder: Path, call: Call) -> None:
 
 # Options given twice -------------------------------------------------------------
 
-TWICE = [
-    ("encode", "a.bvh", "--force", "--force"),
-    ("encode", "a.bvh", "-o", "x.mcz", "--output", "y.mcz"),
-    ("decode", "a.mcz", "--to", "csv", "--to", "bvh"),
-    ("decode", "a.mcz", "--joints", "a", "--joints=b"),
-    ("convert", "a.bvh", "a.trc", "--unit", "m", "--unit", "cm"),
-    ("info", "a.mcz", "--json", "--json"),
-    ("replace", "a.mcz", "b.mcz", "--joint", "a", "--joint", "b", "--values", "v.csv"),
-    ("bench", "--cache", "--no-cache"),
-    ("pack", "a", "b.mcz", "--rate", "1", "--rate", "2"),
-    ("append", "a.bvh", "b.mcz", "--unit", "m", "--unit", "cm"),
-    ("protect", "a.mcz", "--redundancy", "5%", "--redundancy", "6%"),
-    ("meta", "a.mcz", "--rate", "1", "--rate", "2"),
-    ("merge", "a.mcz", "-o", "b.mcz", "--output", "c.mcz"),
-    ("delete", "a.mcz", "x", "--where", "n_frames > 1", "--where", "n_frames > 2"),
-    ("rename", "a.mcz", "x", "y", "--json", "--json"),
-    ("reorder", "a.mcz", "--by", "name", "--by", "codec"),
-    ("split", "a.mcz", "x", "--by", "name", "--by", "codec"),
-    ("diff", "a.mcz", "b.mcz", "--frames", "0:1", "--frames", "0:2"),
-    ("render", "a.mcz", "--view", "top", "--view", "side"),
-    ("plot", "a.mcz", "--what", "bytes", "--what", "error"),
-    ("extract", "a.mcz", "b.mcz", "--resolution", "1", "--resolution", "2"),
-    ("view", "a.mcz", "--port", "1", "--port", "2"),
-    ("view", "a.mcz", "--rerun", "--rerun"),
-    ("stream", "encode", "--name", "a", "--name", "b"),
-    ("stream", "decode", "a.mcz", "--lost", "hold", "--lost", "linear"),
-    ("train", "a.bvh", "-o", "x", "-o", "y"),
-    ("verify", "a.mcz", "--source", "x", "--source", "y"),
-    ("bag", "a.mcz", "x", "--json", "--json"),
-    ("unpack", "a.mcz", "x", "--force", "--force"),
-    ("list", "a.mcz", "--json", "--json"),
-    ("export", "a.mcz", "x", "--to", "npz", "--to", "csv"),
-    ("repair", "a.mcz", "-o", "b.mcz", "--output", "c.mcz"),
-    ("codecs", "--json", "--json"),
-    ("sample", "x", "--force", "--force"),
-]
+
+def single_options(
+    command: click.Command, words: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], list[str]]]:
+    """Words of commands, and each option of theirs that takes no list, given twice."""
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            inner = command.get_command(context, name)
+            assert inner is not None
+            yield from single_options(inner, (*words, name))
+        return
+    for option in command.params:
+        if isinstance(option, click.Option) and not (option.multiple or option.is_eager):
+            values = [] if option.is_flag else ["1"] * option.nargs
+            for other in option.secondary_opts or option.opts:
+                yield words, [option.opts[0], *values, other, *values]
 
 
-@pytest.mark.parametrize("words", TWICE, ids=" ".join)
-def test_an_option_given_twice_is_an_error(words: tuple[str, ...], call: Call) -> None:
-    code, out, errors = call(*words)
-    assert (code, out) == (2, "")
-    name = " ".join(words[:2] if words[0] == "stream" else words[:1])
-    assert "is given 2 times, and takes one" in errors
-    assert f"see mcz {name} --help" in errors
-
-
-def test_every_command_is_tried_with_options_twice() -> None:
-    assert isinstance(cli, __import__("click").Group)
-    words = {words[0] for words in TWICE} | {"completion"}  # which has no options
-    assert words == set(cli.list_commands(None))  # type: ignore[arg-type]
+@pytest.mark.parametrize("name", COMMANDS)
+def test_an_option_given_twice_is_an_error(name: str, call: Call) -> None:
+    command = cli.get_command(click.Context(cli), name)
+    assert command is not None
+    for words, given in single_options(command, (name,)):
+        code, out, errors = call(*words, *given)
+        assert (code, out) == (2, ""), given
+        assert "is given 2 times, and takes one" in errors, given
+        assert f"see mcz {' '.join(words)} --help" in errors
 
 
 def test_help_and_lists_may_be_repeated(call: Call, capsys: pytest.CaptureFixture[str]) -> None:

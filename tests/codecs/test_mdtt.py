@@ -1,4 +1,4 @@
-"""Preset ``mdtt``, and what it shares with pca-rdo: bounds, ranks, odd clips, hostile bytes."""
+"""Presets ``mdtt`` and ``pca-rdo``: bounds, ranks, mean and courses, odd clips."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import basis_models
+from mcz.codecs.basis_models import Basis, parse_bases
+from mcz.codecs.space import COURSES
+from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.kinematics import point_names
 from mcz.motion import Signal
 from mcz.reading.sizes import clip_sizes
+from mcz.schema import parse
 from tests.codecs.lossy import (
     Direct,
     amc,
+    bytes_of,
     decoded,
     markers,
     saved,
@@ -85,17 +89,77 @@ def test_a_higher_rank_errs_less(codec) -> None:
         assert errors == sorted(errors, reverse=True) and errors[-1] < errors[0] / 4
 
 
-def test_ranks_are_those_of_the_motion() -> None:
+def bases_of(coded: Direct) -> tuple[Basis, ...]:
+    return parse_bases(coded.models[0][0].data)
+
+
+def moving(courses: np.ndarray, n_markers: int = 20, seed: int = 3) -> mcz.Motion:
+    """Markers that all move as ``courses`` (n_frames, n_courses) say, along random directions."""
+    directions = np.random.default_rng(seed).normal(size=(courses.shape[1], 3 * n_markers))
+    values = courses @ directions + 30 * np.arange(3.0 * n_markers)
+    return replace(markers(len(courses), n_markers), signals=(Signal(values),))
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_ranks_are_those_of_the_motion(codec: str) -> None:
     """Markers that move along few directions have as many vectors."""
     random = np.random.default_rng(3)
-    courses = np.cumsum(np.cumsum(random.normal(size=(600, 2)), axis=0), axis=0)
-    values = np.einsum("fk,kpd->fpd", courses, random.normal(size=(2, 20, 3)))
-    motion = markers(600, 20)
-    motion = replace(motion, signals=(Signal(values.reshape(600, 60)),))
-    coded = Direct("mdtt", motion, step=0.01)
-    bases = basis_models.parse_bases(coded.models[0][0].data)
-    assert [len(basis.entries) for basis in bases] == [2, 2, 2]
-    assert root_mean_square(coded.read() - values.reshape(600, 60)) < 0.02
+    motion = moving(np.cumsum(np.cumsum(random.normal(size=(600, 2)), axis=0), axis=0))
+    coded = Direct(codec, motion, step=0.01)
+    bases = bases_of(coded)
+    assert root_mean_square(coded.read() - motion.values) < 0.02
+    if codec == "mdtt":
+        assert [len(basis.entries) for basis in bases] == [3, 3, 3]  # and one of what rests
+        return
+    spatial, courses, mean = bases
+    assert spatial.entries.shape == (2, 60) and mean.entries.shape == (1, 60)
+    np.testing.assert_allclose(mean.vectors[0], motion.values.mean(axis=0), atol=0.01)
+    assert len(courses.entries) <= courses.entries.shape[1] <= 120
+
+
+# Mean and courses of pca-rdo
+
+
+def test_courses_are_as_many_as_shapes_in_time() -> None:
+    """Every window of 60 frames is a mixture of three waves, none of them a cosine."""
+    random = np.random.default_rng(4)
+    shapes = 20 * np.sign(np.sin(np.outer([0.21, 0.55, 0.9], np.arange(60)) + 0.3))
+    motion = moving((random.normal(size=(40, 2, 3)) @ shapes).swapaxes(1, 2).reshape(2400, 2))
+    coded = Direct("pca-rdo", motion, step=0.1, window=60)
+    _, courses, _ = bases_of(coded)
+    assert len(courses.entries) <= 5  # rounding may add one or two
+    assert root_mean_square(coded.read() - motion.values) < 0.15
+    plain = Direct("mdtt", motion, step=0.1, window=60)
+    assert coded.n_bytes < 0.7 * plain.n_bytes
+
+
+def test_a_short_window_has_cosines() -> None:
+    """It is as good as the others."""
+    motion = markers(240 + 37, 6)
+    error = np.abs(decoded("pca-rdo", motion, step=0.05, window=120) - motion.values)
+    assert error[240:].mean() < 1.5 * error[:240].mean()
+
+
+@pytest.mark.parametrize("window", [1024, 1025])
+def test_long_windows_have_all_courses_or_none(window) -> None:
+    motion = markers(window + 3, 1)
+    coded = Direct("pca-rdo", motion, step=0.01, window=window)
+    flags = parse(WindowsHeader, coded.header, "header").space.flags
+    assert bool(flags & COURSES) == (window <= 1024)
+    assert root_mean_square(coded.read() - motion.values) < 0.01
+
+
+def test_places_far_away() -> None:
+    """A mean that no integer has is left to coefficients."""
+    motion = markers(50, 3)
+    for away in (1e6, 1e9, 1e13):
+        values = motion.values + away
+        step = max(0.1, away * 1e-8)
+        found = decoded("pca-rdo", replace(motion, signals=(Signal(values),)), step=step)
+        assert np.abs(found - values).max() < 3 * step
+    values = motion.values + 1e6
+    found = decoded("pca-rdo", replace(motion, signals=(Signal(values),)), step=1e-6)
+    assert np.abs(found - values).max() < 1e-5
 
 
 # Clips
@@ -130,3 +194,16 @@ def test_bytes_of_real_clips(data: Path, name: str, most: int) -> None:
         reached = float(file.only_clip().quality["mean_position_error_cm"])
     assert 0.19 <= reached <= 0.2
     assert sizes.models > 1000 and sizes.payload + sizes.overhead + sizes.models < most
+
+
+@pytest.mark.real
+def test_positions_are_the_better_domain(data: Path) -> None:
+    """At the same mean position error they take less than channels do."""
+    sizes = {}
+    for domain in ("positions", "channels"):
+        held = saved("pca-rdo", amc(data, "49_02"), mean_error_cm=0.2, domain=domain)
+        with mcz.open(held) as file:
+            found = clip_sizes(file.container, file.only_clip())
+        sizes[domain] = found.payload + found.overhead + found.models
+        assert found.models > 1000 and bytes_of(held) < sizes[domain]
+    assert sizes["positions"] < 0.8 * sizes["channels"]

@@ -1,4 +1,4 @@
-"""Codec qbc, ``posewave``: joints that are coded exactly beside the others."""
+"""Codec posewave: joints that are coded exactly beside the others."""
 
 from __future__ import annotations
 

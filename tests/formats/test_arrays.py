@@ -122,23 +122,8 @@ def test_versions_of_heads() -> None:
 
 
 PARTS = [
-    *(
-        b"{",
-        b"}",
-        b",",
-        b":",
-        b"(",
-        b")",
-        b"'",
-        b'"',
-        b"\n",
-        b" ",
-        b"#",
-        b"\\x61",
-        b"u",
-        b"b",
-        b"L",
-    ),
+    *(bytes((byte,)) for byte in b"{},:()'\"\n #ubL"),
+    b"\\x61",
     *(b"'shape': (2, 3)", b"'descr': '>f8'", b"'fortran_order': True", b"'zz': 1", b"\v", b"\f"),
     *(b"(6,)", b"(1, 6,)", b"0", b"_", b"1", b"-", b"+0", b"()", b"True", b"\0", b"\r", b"[", b"]"),
 ]

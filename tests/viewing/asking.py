@@ -5,9 +5,13 @@ from __future__ import annotations
 import http.client
 import json
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
+from mcz.viewing.page import page
 from mcz.viewing.server import Server
+from mcz.viewing.shelf import Shelf, put
 
 
 class Answer(NamedTuple):
@@ -18,6 +22,16 @@ class Answer(NamedTuple):
     @property
     def json(self) -> Any:
         return json.loads(self.body)
+
+
+@contextmanager
+def serving(*paths: object, **facts: Any) -> Iterator[Server]:
+    """A server of the page and of files."""
+    shelf = Shelf(facts)
+    for path in paths:
+        put(shelf, str(path))
+    with Server(page(), shelf) as server:
+        yield server
 
 
 def ask(

@@ -23,7 +23,7 @@ from mcz.viewing.requests import Refused, range_of
 from mcz.viewing.server import Server
 from mcz.viewing.shelf import Shelf, put
 from tests.motions import smooth
-from tests.viewing.asking import Answer, ask, ask_anywhere, convert, form, post, raw
+from tests.viewing.asking import Answer, ask, ask_anywhere, convert, form, post, raw, serving
 
 
 @pytest.fixture(scope="module")
@@ -37,11 +37,8 @@ def folder(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def server(samples: Path, folder: Path) -> Iterator[Server]:
-    said: list[str] = []
-    shelf = Shelf({"unit": "cm"}, said.append)
-    for path in (folder / "walk.mcz", samples / "walk.amc", folder / "broken.bvh"):
-        put(shelf, str(path))
-    with Server(page(), shelf) as server:
+    paths = folder / "walk.mcz", samples / "walk.amc", folder / "broken.bvh"
+    with serving(*paths, unit="cm") as server:
         yield server
 
 
@@ -128,9 +125,7 @@ def test_what_cannot_be_converted_says_why(server: Server) -> None:
 def test_a_source_that_changed_is_converted_anew(samples: Path, tmp_path: Path) -> None:
     source = tmp_path / "walk.bvh"
     source.write_bytes(b"nothing yet")
-    shelf = Shelf()
-    put(shelf, str(source))
-    with Server(page(), shelf) as server:
+    with serving(source) as server:
         assert ask(server, "files/0").status == 422
         source.write_bytes((samples / "walk.bvh").read_bytes())
         before = ask(server, "files/0")
@@ -204,15 +199,12 @@ def test_a_url_is_read_by_ranges(folder: Path) -> None:
 
     data = (folder / "walk.mcz").read_bytes()
     far = web_server.Server(data)
-    with web_server.served(far):
-        shelf = Shelf()
-        put(shelf, far.address)
-        with Server(page(), shelf) as server:
-            assert ask(server, "files/0", Range="bytes=8-99").body == data[8:100]
-            assert ask(server, "files/0").body == data
-            assert ask(server, "api.json").json["files"][0]["name"] == "a.mcz"
-            asked = {"url": "files/0", "clip": "walk", "codec": "qbc"}
-            assert post(server, "encode", asked).status == 200
+    with web_server.served(far), serving(far.address) as server:
+        assert ask(server, "files/0", Range="bytes=8-99").body == data[8:100]
+        assert ask(server, "files/0").body == data
+        assert ask(server, "api.json").json["files"][0]["name"] == "a.mcz"
+        asked = {"url": "files/0", "clip": "walk", "codec": "qbc"}
+        assert post(server, "encode", asked).status == 200
 
 
 # Ranges --------------------------------------------------------------------------
@@ -273,9 +265,7 @@ def test_another_file_has_another_tag(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "a.mcz"
     data = (folder / "walk.mcz").read_bytes()
     path.write_bytes(data)
-    shelf = Shelf()
-    put(shelf, str(path))
-    with Server(page(), shelf) as server:
+    with serving(path) as server:
         tag = ask(server, "files/0").headers["ETag"]
         path.write_bytes(data)
         os.utime(path, ns=(1, 1))
@@ -299,9 +289,7 @@ def test_ranges_at_once(server: Server, folder: Path) -> None:
 
 def test_a_file_without_a_byte(tmp_path: Path) -> None:
     (tmp_path / "a.mcz").write_bytes(b"")
-    shelf = Shelf()
-    put(shelf, str(tmp_path / "a.mcz"))
-    with Server(page(), shelf) as server:
+    with serving(tmp_path / "a.mcz") as server:
         assert ask(server, "files/0").body == b""
         answer = ask(server, "files/0", Range="bytes=-100")
         assert (answer.status, answer.headers["Content-Range"]) == (416, "bytes */0")
@@ -460,9 +448,7 @@ def test_a_unit_can_be_said_later(tmp_path: Path) -> None:
     motion = smooth(12)
     motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=None))
     mcz.write(motion, tmp_path / "a.mcz")
-    shelf = Shelf()
-    put(shelf, str(tmp_path / "a.mcz"))
-    with Server(page(), shelf) as server:
+    with serving(tmp_path / "a.mcz") as server:
         asked = {"url": "files/0", "codec": "mrdwt", "params": {"mean_error_cm": 1}}
         refused = post(server, "encode", asked)
         assert (refused.status, refused.json["error"]["class"]) == (422, "OptionError")
@@ -474,9 +460,7 @@ def test_what_an_mcz_does_not_say_is_told(tmp_path: Path) -> None:
     motion = smooth(12)
     skeleton = replace(motion.skeleton, unit_cm=None, up_axis="")
     mcz.write(replace(motion, skeleton=skeleton, frame_rate=None), tmp_path / "a.mcz")
-    shelf = Shelf({"rate": 50, "unit": "mm", "up": "z", "skeleton": None})
-    put(shelf, str(tmp_path / "a.mcz"))
-    with Server(page(), shelf) as server:
+    with serving(tmp_path / "a.mcz", rate=50, unit="mm", up="z", skeleton=None) as server:
         made = post(server, "encode", {"url": "files/0", "codec": "mrdwt", "params": {"T_g": 4}})
         with mcz.open(ask(server, made.json["url"]).body) as file:
             clip = file.only_clip()
@@ -545,13 +529,11 @@ def test_a_form_is_no_json(server: Server) -> None:
 
 def test_results_are_few(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shelf_module, "MOST_RESULTS", 2)
-    shelf = Shelf()
-    put(shelf, str(folder / "walk.mcz"))
-    with Server(page(), shelf) as server:
+    with serving(folder / "walk.mcz") as server:
         asked = {"url": "files/0", "codec": "mrdwt", "params": {"T_g": 8}}
         urls = [post(server, "encode", asked).json["url"] for _ in range(4)]
         assert [ask(server, url).status for url in urls] == [404, 404, 200, 200]
-        assert len(list(shelf.folder().iterdir())) == 2
+        assert len(list(server.site.shelf.folder().iterdir())) == 2
 
 
 # Files that the page gives -------------------------------------------------------
