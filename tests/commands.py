@@ -1,13 +1,21 @@
-"""Run the command ``mcz`` in this process."""
+"""Run the command ``mcz`` in this process, or in one of its own."""
 
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
+import mcz
 from mcz.cli.common import run as run_command
 from mcz.cli.main import cli
+
+ROOT = Path(mcz.__file__).parent.parent
+ENV = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
 class Result(NamedTuple):
@@ -37,3 +45,44 @@ def fails(result: Result, code: int, *words: str) -> None:
     assert result.err.startswith("mcz: ") and result.err.count("\n") == 1
     for word in words:
         assert word in result.err
+
+
+class Started:
+    """A process of ``mcz`` with its pipes in hand."""
+
+    def __init__(self, *arguments: object) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "mcz.cli.main", *map(str, arguments)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            cwd=ROOT,
+            env=ENV,
+        )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        assert self.process.stderr is not None
+        self.stdin, self.stdout = self.process.stdin, self.process.stdout
+        self.stderr = self.process.stderr
+
+    def __enter__(self) -> Started:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for stream in (self.stdin, self.stdout, self.stderr):
+            stream.close()
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+
+    def say(self, data: bytes) -> None:
+        self.stdin.write(data)
+        self.stdin.flush()
+
+    def address(self) -> str:
+        """Where it listens."""
+        return self.stderr.readline().decode().split()[-1]
+
+    def end(self) -> int:
+        self.stdin.close()
+        return self.process.wait()

@@ -19,9 +19,8 @@ from mcz import OptionError
 from mcz.cli.common import run
 from mcz.cli.info import command as info_command
 from mcz.cli.main import COMMANDS, cli
-from tests.commands import Call
+from tests.commands import ENV, Call
 
-ROOT = Path(__file__).parents[2]
 SLOPPY = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: %d\n"
 SLOPPY += "Frame Time: 0.01\n1\n2\n3\n"
 
@@ -158,7 +157,7 @@ def test_standard_streams_are_files_too(folder: Path, words: str) -> None:
         f"{sys.executable} -m mcz.cli.main {words}",
         shell=True,
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        env=ENV,
         capture_output=True,
         check=False,
     )

@@ -23,7 +23,7 @@ from mcz.cli.common import Exit, code_of
 from mcz.codecs import by_name
 from mcz.container.writer import Writer
 from mcz.writing.clip_writer import write_clip
-from tests.commands import Call, run
+from tests.commands import ENV, Call, run
 from tests.motions import smooth
 
 BVH = (
@@ -49,7 +49,7 @@ def shell(folder: Path, arguments: str, streams: str) -> subprocess.CompletedPro
         capture_output=True,
         text=True,
         check=False,
-        env=os.environ | {"PYTHONPATH": str(Path(mcz.__file__).parents[1])},
+        env=ENV,
     )
 
 
@@ -120,7 +120,7 @@ def test_sigterm_leaves_nothing_behind(tmp_path: Path) -> None:
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": str(Path(mcz.__file__).parents[1])},
+        env=ENV,
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None

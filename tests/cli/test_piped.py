@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,9 +17,9 @@ from mcz.formats import FORMATS
 from mcz.live.strict_reader import StrictFrames
 from mcz.reading.source_options import SourceOptions
 from mcz.writing.options import EncodingOptions
+from tests.commands import ENV, ROOT, Started
 from tests.live_codec import encode_live
 
-ROOT = Path(mcz.__file__).parent.parent
 HEADER = (
     b"HIERARCHY\nROOT hips\n{\n  OFFSET 1 2 3\n  CHANNELS 3 Xposition Yposition Zposition\n"
     b"  JOINT arm\n  {\n    OFFSET 0 4 0\n    CHANNELS 1 Zrotation\n    End Site\n    {\n"
@@ -59,65 +58,36 @@ def run(*arguments: str | Path, data: bytes = b"", cwd: Path = ROOT) -> tuple[in
         input=data,
         capture_output=True,
         cwd=cwd,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        env=ENV,
     )
     return done.returncode, done.stdout, done.stderr.decode()
 
 
-class Piped:
-    """A process of ``mcz encode -`` with both ends of its pipes in hand."""
-
-    def __init__(self, *arguments: str | Path) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "mcz.cli.main", "encode", "-", *map(str, arguments)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            cwd=ROOT,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
-        )
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.stdin, self.stdout = self.process.stdin, self.process.stdout
-
-    def say(self, data: bytes) -> None:
-        self.stdin.write(data)
-        self.stdin.flush()
-
-    def end(self) -> int:
-        self.stdin.close()
-        return self.process.wait()
-
-
 def test_each_frame_is_out_before_the_next_line_is_read() -> None:
-    piped = Piped(*STEP, "--param", "domain=channels")
-    piped.say(HEADER)
-    found = live_frames(piped.stdout)
-    for number, (line, row) in enumerate(zip(LINES, VALUES, strict=True)):
-        piped.say(line[:3])
-        piped.say(line[3:])  # its line end completes a frame
-        frame, values, valid = next(found)  # waits for ever if it were held back
-        assert frame == number
-        np.testing.assert_allclose(values, row, atol=0.02)
-        assert valid.all()
-    piped.stdin.close()
-    assert list(found) == []
-    assert piped.process.wait() == 0
-    piped.stdout.close()
+    with Started("encode", "-", *STEP, "--param", "domain=channels") as piped:
+        piped.say(HEADER)
+        found = live_frames(piped.stdout)
+        for number, (line, row) in enumerate(zip(LINES, VALUES, strict=True)):
+            piped.say(line[:3])
+            piped.say(line[3:])  # its line end completes a frame
+            frame, values, valid = next(found)  # waits for ever if it were held back
+            assert frame == number
+            np.testing.assert_allclose(values, row, atol=0.02)
+            assert valid.all()
+        piped.stdin.close()
+        assert (list(found), piped.end()) == ([], 0)
 
 
 def test_bones_complete_a_frame_of_an_amc(asf: Path) -> None:
-    piped = Piped(*STEP, "--skeleton", asf, "--param", "domain=channels")
-    for line in AMC[:3]:
-        piped.say(line)
-    found = live_frames(piped.stdout)
-    np.testing.assert_allclose(next(found)[1], [1, 2, 3, 4, 5, 6, 15], atol=0.02)
-    for line in AMC[3:]:
-        piped.say(line)
-    np.testing.assert_allclose(next(found)[1], [1, 2, 3.5, 4, 5, -7, 20], atol=0.02)
-    piped.stdin.close()
-    assert list(found) == []
-    piped.stdout.close()
-    assert piped.process.wait() == 0
+    words = ("encode", "-", *STEP, "--skeleton", asf, "--param", "domain=channels")
+    with Started(*words) as piped:
+        piped.say(b"".join(AMC[:3]))
+        found = live_frames(piped.stdout)
+        np.testing.assert_allclose(next(found)[1], [1, 2, 3, 4, 5, 6, 15], atol=0.02)
+        piped.say(b"".join(AMC[3:]))
+        np.testing.assert_allclose(next(found)[1], [1, 2, 3.5, 4, 5, -7, 20], atol=0.02)
+        piped.stdin.close()
+        assert (list(found), piped.end()) == ([], 0)
 
 
 def test_positions_of_a_bvh_from_a_pipe(tmp_path: Path) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import io
-import os
 import signal
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -20,8 +18,8 @@ from mcz import live_frames
 from mcz.cli import common, tcp
 from mcz.cli.main import cli
 from mcz.cli.rows import Rows
+from tests.commands import Started
 
-ROOT = Path(mcz.__file__).parent.parent
 NAMES = b"a,b\n"
 ROWS = np.arange(60).reshape(10, 6) / 4
 CODERS = {
@@ -30,7 +28,6 @@ CODERS = {
     "lsdt-frame": ("--codec", "lsdt-frame", "--param", "step=0.01", "--param", "segment_frames=4"),
 }
 CODER = CODERS["lsdt-frame"]
-ENV = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
 def line(row: np.ndarray) -> bytes:
@@ -61,53 +58,12 @@ def encoded(*arguments: str | Path, data: bytes = CSV) -> bytes:
     return out
 
 
-class Started:
-    """A process of ``mcz stream`` with its pipes in hand."""
-
-    def __init__(self, *arguments: str | Path) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "mcz.cli.main", "stream", *map(str, arguments)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            cwd=ROOT,
-            env=ENV,
-        )
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        assert self.process.stderr is not None
-        self.stdin, self.stdout = self.process.stdin, self.process.stdout
-        self.stderr = self.process.stderr
-
-    def __enter__(self) -> Started:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for stream in (self.stdin, self.stdout, self.stderr):
-            stream.close()
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
-
-    def say(self, data: bytes) -> None:
-        self.stdin.write(data)
-        self.stdin.flush()
-
-    def address(self) -> str:
-        """Where it listens."""
-        return self.stderr.readline().decode().split()[-1]
-
-    def end(self) -> int:
-        self.stdin.close()
-        return self.process.wait()
-
-
 # Pipes -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("coder", CODERS)
 def test_each_frame_is_out_before_the_next_row_is_read(coder: str) -> None:
-    with Started("encode", *CODERS[coder]) as started:
+    with Started("stream", "encode", *CODERS[coder]) as started:
         started.say(NAMES)
         found = live_frames(started.stdout)
         for number, row in enumerate(ROWS):
@@ -123,7 +79,7 @@ def test_each_frame_is_out_before_the_next_row_is_read(coder: str) -> None:
 
 def test_each_row_is_printed_before_the_next_frame_is_read() -> None:
     parts = list(mcz.stream_encode(ROWS, ["a", "b"], codec="lsdt-frame", params={"step": 0.01}))
-    with Started("decode") as started:
+    with Started("stream", "decode") as started:
         started.say(parts[0])
         started.say(parts[1])
         assert started.stdout.readline() == b"frame,a.tx,a.ty,a.tz,b.tx,b.ty,b.tz\n"
@@ -285,7 +241,7 @@ def test_files_that_are_there_stay(tmp_path: Path) -> None:
 
 def test_an_interrupt_leaves_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "a.mcz"
-    with Started("encode", *CODER, "-o", path) as started:
+    with Started("stream", "encode", *CODER, "-o", path) as started:
         started.say(CSV)
         while not path.exists() or b"DATA" not in path.read_bytes():  # a frame is there
             time.sleep(0.01)
@@ -298,7 +254,7 @@ def test_an_interrupt_leaves_a_whole_file(tmp_path: Path) -> None:
 
 def test_what_a_crash_leaves(tmp_path: Path) -> None:
     path = tmp_path / "a.mcz"
-    with Started("encode", *CODER, "-o", path) as started:
+    with Started("stream", "encode", *CODER, "-o", path) as started:
         started.say(CSV)
         while not path.exists() or b"DATA" not in path.read_bytes():  # a frame is there
             time.sleep(0.01)
@@ -315,7 +271,7 @@ def test_what_a_crash_leaves(tmp_path: Path) -> None:
 
 
 def test_a_reader_that_has_seen_enough() -> None:
-    with Started("decode") as started:
+    with Started("stream", "decode") as started:
         started.stdout.close()
         started.stdin.write(encoded())
         started.end()
@@ -347,7 +303,7 @@ def test_filtered_rows_come_late() -> None:
     sent = list(
         mcz.stream_encode(rows, ["a", "b"], codec="lsdt-frame", params={"step": 0.01}, unit="cm")
     )
-    with Started("decode", "--post-filter", "--rate", "120") as started:
+    with Started("stream", "decode", "--post-filter", "--rate", "120") as started:
         started.say(b"".join(sent[:14]))  # 13 frames
         started.stdout.readline()
         assert started.stdout.readline().startswith(b"0,")
@@ -366,7 +322,9 @@ def frames_from(stream: object) -> Iterator[mcz.LiveFrame]:
 
 
 def test_clients_early_and_late() -> None:
-    with Started("encode", *CODER, "--listen", "127.0.0.1:0", "--clients", "1") as started:
+    with Started(
+        "stream", "encode", *CODER, "--listen", "127.0.0.1:0", "--clients", "1"
+    ) as started:
         started.stdin.write(NAMES)
         started.stdin.flush()
         host, port = tcp.address_of(started.address())
@@ -398,7 +356,7 @@ def test_clients_early_and_late() -> None:
 
 
 def test_an_interrupt_ends_a_connection_well() -> None:
-    with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as started:
+    with Started("stream", "encode", *CODER, "--listen", ":0", "--clients", "1") as started:
         started.say(NAMES)
         with (
             socket.create_connection(tcp.address_of(started.address())) as client,
@@ -473,11 +431,11 @@ def test_nobody_is_there() -> None:
 def test_a_source_that_dies_in_a_row_aborts_the_stream(binary: bool, last: bytes) -> None:
     rows = ROWS.astype("<f4").tobytes() if binary else b"".join(map(line, ROWS))
     with Started(
-        *("encode", *CODER, *(["--float32"] if binary else [])),
+        *("stream", "encode", *CODER, *(["--float32"] if binary else [])),
         *("--listen", ":0", "--clients", "1"),
     ) as sender:
         sender.say(NAMES)
-        with Started("decode", "--connect", sender.address()) as receiver:
+        with Started("stream", "decode", "--connect", sender.address()) as receiver:
             sender.say(rows + last)
             assert sender.end() == 1
             assert receiver.process.wait() == 4
@@ -488,9 +446,9 @@ def test_a_source_that_dies_in_a_row_aborts_the_stream(binary: bool, last: bytes
 
 @pytest.mark.parametrize("lost", ["refuse", "missing", "hold", "linear"])
 def test_a_sender_that_is_killed_is_an_aborted_end(lost: str) -> None:
-    with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as sender:
+    with Started("stream", "encode", *CODER, "--listen", ":0", "--clients", "1") as sender:
         sender.say(NAMES)
-        with Started("decode", "--connect", sender.address(), "--lost", lost) as receiver:
+        with Started("stream", "decode", "--connect", sender.address(), "--lost", lost) as receiver:
             sender.say(b"".join(map(line, ROWS)))
             for _ in range(11):
                 receiver.stdout.readline()
@@ -504,26 +462,26 @@ def test_a_silent_peer_is_not_waited_for_for_ever() -> None:
     for part in (data[: len(data) // 2], data[:40], b""):
         with socket.create_server(("127.0.0.1", 0)) as server:
             address = f"127.0.0.1:{server.getsockname()[1]}"
-            with Started("decode", "--connect", address, "--timeout", "3") as receiver:
+            with Started("stream", "decode", "--connect", address, "--timeout", "3") as receiver:
                 peer, _ = server.accept()
                 with peer:
                     peer.sendall(part)
                     assert receiver.process.wait() == (4 if part else 1)
                 assert "nothing came for 3 s" in receiver.stderr.read().decode()
-    with Started("decode", "--timeout", "3") as receiver:
+    with Started("stream", "decode", "--timeout", "3") as receiver:
         receiver.say(data[: len(data) // 2])
         assert receiver.process.wait() == 4
-    with Started("decode", "--timeout", "3") as receiver:
+    with Started("stream", "decode", "--timeout", "3") as receiver:
         receiver.say(data)  # all is there, though the pipe stays open
         assert receiver.process.wait() == 0
 
 
 def test_heartbeats_keep_listeners_while_the_source_is_silent() -> None:
-    sending = ("encode", *CODER, "--listen", ":0", "--clients", "2", "--heartbeat", "0.1")
+    sending = ("stream", "encode", *CODER, "--listen", ":0", "--clients", "2", "--heartbeat", "0.1")
     with Started(*sending) as sender:
         sender.say(NAMES)
         address = sender.address()
-        receiving = ("decode", "--connect", address, "--timeout", "2", "--states")
+        receiving = ("stream", "decode", "--connect", address, "--timeout", "2", "--states")
         with Started(*receiving) as first:
             time.sleep(3)  # the other client is waited for
             with Started(*receiving) as second:
@@ -541,7 +499,7 @@ def test_heartbeats_keep_listeners_while_the_source_is_silent() -> None:
 
 def test_a_heartbeat_is_no_place_to_join() -> None:
     """Who comes late gets heartbeats, and frames from the next place to join on."""
-    sending = ("encode", *CODER, "--listen", ":0", "--clients", "1", "--heartbeat", "0.1")
+    sending = ("stream", "encode", *CODER, "--listen", ":0", "--clients", "1", "--heartbeat", "0.1")
     with Started(*sending) as sender:
         address = tcp.address_of(sender.address())
         sender.say(NAMES)
