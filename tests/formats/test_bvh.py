@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tracemalloc
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -46,14 +45,6 @@ def test_latin_1_names_are_flagged() -> None:
     assert motion.skeleton.joints[0].name == "Hüfte"
     assert motion.metadata["name-encoding"] == "latin-1"
     assert bvh.write(motion) == data
-
-
-def test_a_frame_count_that_is_wrong_is_reported() -> None:
-    data = BVH.replace(b"Frames: 3", b"Frames: 4")
-    motion = bvh.read(data, "walk")
-    assert motion.metadata["source-note"] == "4 frames are declared, 3 are there"
-    assert bvh.write(motion) == data
-    assert b"Frames: 2\n" in bvh.write(motion.cut(0, 2))
 
 
 def test_a_joint_without_channels_anywhere_has_a_row_a_line() -> None:
@@ -165,16 +156,6 @@ def test_far_too_many_joints_are_refused_before_they_are_read(
     with pytest.raises(SourceError, match="more than 100 joints"):
         bvh.read(bvh_of % (b"JOINT j\n{\n}\n" * 100))
     assert not seen
-
-
-def test_a_million_joints_take_no_memory() -> None:
-    data = b"HIERARCHY\nROOT r\n{\n" + b"JOINT j\n{\n}\n" * 10**6
-    tracemalloc.start()
-    with pytest.raises(SourceError, match="more than 262,144 joints"):
-        bvh.read(data)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 4 * len(data)
 
 
 def test_what_a_profile_cannot_hold_is_refused_before_it_is_read(

@@ -13,7 +13,7 @@ from mcz import Motion, MotionError, SourceError
 from mcz.formats import FORMATS, likely_formats
 from mcz.formats.csv_files import is_motion, kind_of
 from mcz.sample import bvh_walk
-from tools.vectors.build.table_files import COLUMNS, DEVICES, EULER, MOTIVE, ODD_SECTIONS, VICON
+from tools.vectors.build.table_files import COLUMNS, DEVICES, EULER, MOTIVE, VICON
 
 
 def back(data: bytes) -> Motion:
@@ -83,20 +83,6 @@ def test_sections_of_vicon_are_signals() -> None:
     assert devices.masked()[1].tolist() == [1, -0.5, 613.25, -2.25e-05]
     assert np.isnan(devices.masked()[3, 3]) and np.isnan(motion.values[1, 3:]).all()
     assert mcz.positions(motion).shape == (3, 2, 3)
-
-
-@pytest.mark.parametrize("length", [1, 2, 80])
-def test_part_of_a_clip_has_that_part_of_every_section(length: int, tmp_path: Path) -> None:
-    target, part = tmp_path / "whole.mcz", tmp_path / "part.mcz"
-    mcz.write(back(ODD_SECTIONS), target, codec="lossless", segment_frames=length)
-    mcz.extract(target, part, frames=(1, 3))
-    with mcz.open(target) as file, mcz.open(part) as cut:
-        text = file.only_clip().source_bytes((1, 3))
-        assert cut.only_clip().source_bytes() == text
-        again = back(text)
-    assert text.count(b"\n+2,") == 1 and b"\n02,0" in text and b"\n1,1" not in text
-    assert text.endswith(b"3,1,616.5\n3,2,617.25\n# the end\n")
-    assert again.frame_numbers is not None and again.frame_numbers.tolist() == [2, 3]
 
 
 def test_devices_alone_have_a_motion_without_channels() -> None:

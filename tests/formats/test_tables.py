@@ -72,17 +72,6 @@ def test_a_storage_file_says_its_columns() -> None:
     ]
 
 
-def test_other_values_and_frames_print_in_the_same_style() -> None:
-    motion = back("trc", MARKERS)
-    values = np.where(np.isnan(motion.values), 0.0, motion.values + 1)
-    text = FORMATS["trc"].write(motion.with_values(values))
-    at = MARKERS.index(b"185")
-    assert text[:at] == MARKERS[:at]
-    assert b"185\t3.067000\t597.881230\t1045.682860\t119.560020\t605.533390" in text
-    numbers = replace(motion, frame_numbers=np.arange(200, 205))
-    assert b"\n200\t3.317000\t596.88" in FORMATS["trc"].write(numbers)
-
-
 REFUSED = {
     "trc": {
         b"": "no line that begins with Frame#",
