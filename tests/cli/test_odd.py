@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import os
 import signal
 import stat
@@ -291,17 +290,6 @@ def test_append_of_a_cut_file(folder: Path, call: Call) -> None:
     path.write_bytes(cut)
     code, out, err = call("append", folder / "c.bvh", path, "--force")
     assert (code, "1 dropped" in out, "b: dropped" in err) == (0, True, True)
-
-
-def test_unpack_in_part_onto_what_exists(folder: Path, call: Call) -> None:
-    out = io.BytesIO()
-    writer = Writer(out)
-    for name in ("a", "a/b"):
-        writer.attachment(name, b"x")
-    writer.finish()
-    (folder / "two.mcz").write_bytes(out.getvalue())
-    assert call("unpack", folder / "two.mcz", folder / "out")[0] == 1
-    assert call("unpack", folder / "a.mcz", folder)[0] == 2
 
 
 def test_only_opening_tells_what_can_be_read(

@@ -24,7 +24,7 @@ GRID = pytest.mark.parametrize("grid", GRIDS, ids=lambda g: f"{g.kind.name}-{g.d
 @given(data=st.data())
 def test_any_ordinals_come_back(coder: Coder, grid: Grid, data: st.DataObject) -> None:
     wanted = data.draw(columns(grid))
-    assert coder.outcome(coder.coded(wanted, grid), *wanted.shape, grid) == wanted.tolist()
+    assert coder.rows(coder.coded(wanted, grid), *wanted.shape, grid) == wanted.tolist()
 
 
 @EVERY
@@ -40,7 +40,7 @@ def test_a_grid_other_than_the_clips(coder: Coder, data: st.DataObject) -> None:
 def test_extreme_ordinals_of_any_form(coder: Coder, extreme: int) -> None:
     wanted = np.array([[extreme], [5], [extreme], [-9]], np.int64)
     for grid in GRIDS:
-        assert coder.outcome(coder.coded(wanted, grid), 4, 1, grid) == wanted.tolist()
+        assert coder.rows(coder.coded(wanted, grid), 4, 1, grid) == wanted.tolist()
 
 
 @pytest.mark.parametrize("codec", ["raw", "lossless", "fast", "best"])

@@ -28,8 +28,7 @@ ARGUED: dict[str, str] = {
     "test_an_archive_has_the_well_known_models_too",
     "ONLINE-25": "A rule for writers; shown by "
     "tests/codecs/test_contract_live.py::test_a_file_of_the_packets_has_what_came_live",
-    "ONLINE-26": f"{LOST} tests/codecs/test_contract_live.py::"
-    "test_after_a_loss_no_frame_is_wrong",
+    "ONLINE-26": f"{LOST} tests/codecs/test_contract_live.py::test_after_a_loss_no_frame_is_wrong",
     "ONLINE-27": f"{LOST} tests/codecs/test_online.py::"
     "test_a_predicted_ltr_is_not_decoded_from_the_wrong_one",
     "KIN-01": f"{DECODERS} tests/test_kinematics.py::test_positions_of_any_skeleton",
