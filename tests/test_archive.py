@@ -14,13 +14,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import conformance
 import mcz
 from mcz.container import payloads
 from mcz.container.writer import Writer
+from mcz.editing.stored_files import stored_files
 from mcz.editing.unpacking import safe_path
 from mcz.motion import joint_columns
 from tests.clocked_files import bvh
 from tests.web_server import Server, served
+
+VECTORS = Path(conformance.__file__).parent / "vectors" / "valid"
 
 
 @pytest.fixture
@@ -239,3 +243,20 @@ def test_a_rate_that_is_not_the_files_is_told(samples: Path, tmp_path: Path) -> 
     assert said["walk.amc"] == ""  # it says none
     report = mcz.pack(samples, tmp_path / "b.mcz", rate=120.0001)  # near enough
     assert not any("kept as" in " ".join(outcome.notes) for outcome in report.outcomes)
+
+
+@pytest.mark.parametrize("vectors", ["container", "cut", "roles", "sources"])
+def test_stored_files_are_those_of_the_clips(vectors: str) -> None:
+    """They are read by hand."""
+    for path in (VECTORS / vectors).rglob("*.mcz"):
+        with mcz.open(path) as file:
+            container, found, wanted = file.container, {}, {}
+            for name, row in container.directory.clips.items():
+                source, cend = container.clip_head(row).source, container.cend(row)
+                if source is not None and cend is not None and cend.source_sha256:
+                    wanted.setdefault(source.path, cend.source_sha256)
+                    found[cend.source_sha256] = name
+            wanted.pop("", None)
+            paths, contents = stored_files(container)
+            assert {name: paths[name] for name in wanted} == wanted
+            assert contents.keys() >= found.keys()

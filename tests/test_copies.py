@@ -18,9 +18,8 @@ from mcz import FormatError, MotionError
 from mcz.container.chunks import COPIED, Chunk, ChunkFlag, ChunkType, build_chunk
 from mcz.container.copies import MOST_BYTES, Copy, build_copies, parse_copies
 from mcz.container.limits import BASE
-from mcz.container.overlay import Overlay
 from mcz.container.scan import scan
-from mcz.container.source import open_source
+from mcz.container.source import Overlay, open_source
 from mcz.container.writer import Writer
 from mcz.formats import FORMATS
 from mcz.reading.report import info

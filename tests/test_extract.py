@@ -341,8 +341,8 @@ def test_an_open_clip_is_closed() -> None:
 class _Live(Writer):
     """Every clip in one open DATA, behind an ancillary chunk."""
 
-    def begin_clip(self, fields: Any, n_channels: Any) -> None:
-        super().begin_clip(fields, n_channels)
+    def begin_clip(self, fields: Any) -> None:
+        super().begin_clip(fields)
         self.ancillary(b"abCD", b"inside")
         self.open_data()
 

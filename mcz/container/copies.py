@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
-from mcz.container import copy_records, payloads
+from mcz.container import payloads
 from mcz.container.chunks import COPIED, FRAMING, SIGNATURE, Chunk, ChunkType, build_chunk
 from mcz.container.directory import Directory
 from mcz.container.feeding import chunks
@@ -68,16 +68,14 @@ def worth_it(copy: Copy, n_bytes: int) -> bool:
 def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
     """The payload of a COPY that will begin at ``offset``."""
     records = (
-        copy_records.CopiedChunk(
-            distance=offset - copy.offset, type=copy.type, payload=copy.payload
-        )
+        payloads.CopiedChunk(distance=offset - copy.offset, type=copy.type, payload=copy.payload)
         for copy in copies
     )
     content = b"".join(build(record, "COPY") for record in records)
     packed = deflate(content)
     flags = payloads.DEFLATED if len(packed) < len(content) else payloads.STORED
     data = packed if flags else content
-    return build(copy_records.Copy(flags=flags, size=len(content), data=data), "COPY")
+    return build(payloads.Copy(flags=flags, size=len(content), data=data), "COPY")
 
 
 def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
@@ -85,12 +83,12 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
 
     Raises FormatError where they are not in file order, or not before the COPY.
     """
-    fields = parse(copy_records.Copy, payload, chunk.label)
+    fields = parse(payloads.Copy, payload, chunk.label)
     check(f"chunk {chunk.label}: bytes of the copies", fields.size, limit)  # LIMIT-16
     content = decoded(fields.data, fields.flags, fields.size, chunk.label)
     copies: list[Copy] = []
     end = 0
-    for stored in parse_all(copy_records.CopiedChunk, content, f"chunk {chunk.label}"):
+    for stored in parse_all(payloads.CopiedChunk, content, f"chunk {chunk.label}"):
         if stored.type not in COPIED:  # COPY-01
             raise FormatError(
                 f"a copy of a chunk of type {stored.type!r}", where=f"chunk {chunk.label}"
@@ -127,7 +125,10 @@ def uncopied(
         Chunk(ChunkType.HEAD, 0, len(SIGNATURE), len(directory.head)),
         *directory.shared.values(),
     ]
-    for row in directory.clips.values():
+    for name in reversed(directory.clips):  # in file order
+        row = directory.clips[name]
+        if row.clip.offset < last:
+            break
         later += [chunk for chunk in (row.clip, row.cend) if chunk is not None]
     later = sorted((c for c in later if c.offset > last), key=lambda chunk: chunk.offset)
     return [Copy(chunk.offset, chunk.type, payload_of(chunk)) for chunk in later]

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, fields
 
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk, ChunkType
+from mcz.container.index_records import PreviousIndex
 from mcz.container.limits import PROFILES, Profile
 from mcz.container.segments import SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
@@ -48,13 +49,29 @@ class SegmentRow:
 
 @dataclass(frozen=True, slots=True)
 class SignalRow:
+    """A signal, with the fields of an IndexedSignal in their order."""
+
     n_channels: int
     samples_per_frame: int
+    skip: int  # stored frames before the first that the clip shows
+    spare: int  # stored frames after the last
     codec: int
     preset: int
     codec_version: int
-    skip: int = 0  # stored frames before the first that the clip shows
-    spare: int = 0  # stored frames after the last
+
+    @classmethod
+    def of(cls, signal: payloads.Signal, clip: payloads.Clip, where: str) -> SignalRow:
+        """The row of a signal of CLIP; raises FormatError."""
+        cut = signal.skip, signal.spare
+        if clip.flags & payloads.OPEN_CLIP and any(cut):  # CLIP-19
+            raise FormatError(
+                f"n_frames is open, but a signal has skip and spare {cut}", where=where
+            )
+        if sum(cut) + clip.n_frames > MAX_COUNT:  # CLIP-20
+            raise FormatError(f"skip and spare {cut} of {clip.n_frames} frames", where=where)
+        n_channels = sum(run.n_channels for run in signal.grids)
+        codec = signal.codec, signal.preset, signal.codec_version
+        return cls(n_channels, signal.samples_per_frame, *cut, *codec)
 
     def stored(self, n_frames: int) -> int:
         """The frames that the segments of the signal cover, where the clip has ``n_frames``."""
@@ -62,23 +79,13 @@ class SignalRow:
 
 
 def signal_rows(clip: payloads.Clip, where: str) -> tuple[SignalRow, ...]:
-    """What the index says of the signals, from the fields of CLIP; raises FormatError."""
-    return tuple(_signal_row(signal, clip, where) for signal in clip.signals)
-
-
-def _signal_row(signal: payloads.Signal, clip: payloads.Clip, where: str) -> SignalRow:
-    cut = signal.skip, signal.spare
-    if clip.flags & payloads.OPEN_CLIP and any(cut):  # CLIP-19
-        raise FormatError(f"n_frames is open, but a signal has skip and spare {cut}", where=where)
-    if sum(cut) + clip.n_frames > MAX_COUNT:  # CLIP-20
-        raise FormatError(f"skip and spare {cut} of {clip.n_frames} frames", where=where)
-    n_channels = sum(run.n_channels for run in signal.grids)
-    codec = signal.codec, signal.preset, signal.codec_version
-    return SignalRow(n_channels, signal.samples_per_frame, *codec, *cut)
+    """The rows of the signals of CLIP; raises FormatError."""
+    return tuple(SignalRow.of(signal, clip, where) for signal in clip.signals)
 
 
 # The segments of an indexed clip, each the fields of an IndexedSegment in their order.
 Packed = Sequence[tuple[int, ...]]
+Place = tuple[int, int, int, int]  # offset and bytes of CLIP, and those of CEND
 
 
 @dataclass(slots=True, eq=False)
@@ -96,6 +103,13 @@ class ClipRow:
     cend: Chunk | None = None
     ancillary: list[Chunk] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, fields: payloads.Clip, chunk: Chunk) -> ClipRow:
+        """The row of a clip of which nothing but its CLIP is known; raises FormatError."""
+        rate = fields.rate_numerator, fields.rate_denominator
+        signals = signal_rows(fields, chunk.label)
+        return cls(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
 
     @property
     def packed(self) -> Packed | None:
@@ -155,8 +169,8 @@ class PackedClipRow(ClipRow):
 class ClipRows(MutableMapping[str, ClipRow]):
     """Rows by name, in file order; those of an index are made when they are asked for.
 
-    ``make`` makes the row of a number, and ``having`` are the numbers of clips with a type of
-    ancillary chunks.
+    ``make`` makes the row of a number, ``having`` are the numbers of clips with a type of ancillary
+    chunks, and ``listed`` has the place of each, see ``places``.
     """
 
     def __init__(
@@ -164,9 +178,10 @@ class ClipRows(MutableMapping[str, ClipRow]):
         names: Iterable[str] = (),
         make: Callable[[int], ClipRow] | None = None,
         having: Callable[[bytes], Collection[int]] | None = None,
+        listed: Callable[[], Sequence[Place]] = tuple,
     ) -> None:
         self._rows: dict[str, ClipRow | int] = {name: n for n, name in enumerate(names)}
-        self._make, self._having = make, having
+        self._make, self._having, self._listed = make, having, listed
 
     def __getitem__(self, name: str) -> ClipRow:
         row = self._rows[name]
@@ -211,6 +226,16 @@ class ClipRows(MutableMapping[str, ClipRow]):
         names = [n for n, row in self._rows.items() if not isinstance(row, int) or row in few]
         return [chunk for name in names for chunk in self[name].ancillary if chunk.type == kind]
 
+    def places(self) -> Iterator[tuple[str, int, int, int, int]]:
+        """Name and place of each clip; no row is made for it."""
+        listed = self._listed()
+        for name, row in self._rows.items():
+            if isinstance(row, int):
+                yield name, *listed[row]
+            else:
+                cend = (row.cend.offset, row.cend.size) if row.cend else (0, 0)
+                yield name, row.clip.offset, row.clip.size, *cend
+
 
 @dataclass(slots=True)
 class AttachmentRow:
@@ -226,18 +251,12 @@ class IndexPlace:
     ``n_bytes`` of its content say how much it lists alone.
     """
 
-    offset: int
-    length: int  # bytes of the whole chunk
-    crc: int
+    chunk: PreviousIndex  # how one that continues it names it
     n_bytes: int
     n_shared: int
     n_attachments: int
     n_aliases: int
     n_clips: int
-
-    @property
-    def stop(self) -> int:
-        return self.offset + self.length
 
 
 @dataclass(slots=True)
@@ -258,7 +277,7 @@ class Directory:
     @property
     def index_bytes(self) -> int:
         """Bytes of the INDX chunks that it was read from."""
-        return sum(place.length for place in self.indexes)
+        return sum(place.chunk.length for place in self.indexes)
 
 
 def parse_head(payload: bytes) -> Profile:

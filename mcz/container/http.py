@@ -71,13 +71,13 @@ class HttpFile(io.RawIOBase):
 
     def _first(self) -> tuple[int, bytes]:
         """The size of the file, and the bytes at its end that came with it."""
-        answer = self._answer(f"-{TAIL}", TAIL)
-        if _is_empty(answer):
-            return 0, b""
-        if answer.status in NO_SUFFIX:
-            answer = self._answer("0-0", 1)
+        for asked, most in (f"-{TAIL}", TAIL), ("0-0", 1):
+            answer = self._answer(asked, most)
             if _is_empty(answer):
                 return 0, b""
+            if answer.status not in NO_SUFFIX:
+                break
+        if asked == "0-0":
             whole, tail = self._whole(answer, 0, 0), b""
         else:
             whole = self._whole(answer, None, None)
@@ -117,9 +117,7 @@ class HttpFile(io.RawIOBase):
         if found is None or found[1] is None:
             raise self._server.error("the server does not say which range it gives")
         start, stop, whole = (int(number) for number in found.groups())
-        if self._said not in (None, _identity(answer.headers)):
-            raise self._server.error(REPLACED)
-        if self._said is not None and whole != self._size:
+        if self._said and (self._said, self._size) != (_identity(answer.headers), whole):
             raise self._server.error(REPLACED)
         first = max(0, whole - TAIL) if first is None else first
         last = whole - 1 if last is None else last

@@ -5,11 +5,10 @@ SPEC.md, "INDX", is normative; ``index_reader.py`` has the way back.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields
-from itertools import islice
-
-import numpy as np
+from itertools import chain, islice
+from operator import attrgetter
 
 from mcz.container import index_records
 from mcz.container.chunks import FRAMING, Chunk, ChunkFlag, ChunkType, build_chunk
@@ -18,6 +17,7 @@ from mcz.container.directory import (
     Directory,
     IndexPlace,
     Packed,
+    SignalRow,
 )
 from mcz.container.index_records import (
     Index,
@@ -38,9 +38,7 @@ from mcz.schema import Table, build, deflate
 PACKETS = {SEGMENT: 64, FRAME: 32}
 INDEXES = 4  # of these a writer leaves no more, so that few requests open a file
 GROWTH = 27  # times the bytes of what is new: a smaller INDX is made part of it
-
-SIGNAL_ROW = tuple(f.name for f in fields(IndexedSignal))
-SEGMENT_ROW = tuple(f.name for f in fields(IndexedSegment))
+SIGNAL_ROW = attrgetter(*(f.name for f in fields(SignalRow)))
 
 
 def build_index(directory: Directory) -> bytes:
@@ -58,13 +56,8 @@ def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
     """The INDX chunk of this content."""
     record = index_records.Indx(size=len(content), data=deflate(content))
     if since is not None:
-        record.flags, record.previous = index_records.CONTINUES, previous_of(since)
+        record.flags, record.previous = index_records.CONTINUES, since.chunk
     return build_chunk(ChunkType.INDX, build(record, "INDX"), ChunkFlag.ANCILLARY)
-
-
-def previous_of(place: IndexPlace) -> index_records.PreviousIndex:
-    """How an INDX names the one that it continues."""
-    return index_records.PreviousIndex(offset=place.offset, length=place.length, crc=place.crc)
 
 
 def index_content(directory: Directory, since: IndexPlace | None = None) -> bytes:
@@ -87,8 +80,8 @@ def index_record(directory: Directory, since: IndexPlace | None = None) -> Index
     behind: list[Chunk] = []
     if since.n_clips:
         last = directory.clips[next(islice(directory.clips, since.n_clips - 1, None))]
-        behind = [chunk for chunk in last.ancillary if chunk.offset >= since.stop]
-    return Listing(new, since.stop, behind).record()
+        behind = [chunk for chunk in last.ancillary if chunk.offset >= since.chunk.stop]
+    return Listing(new, since.chunk.stop, behind).record()
 
 
 @dataclass(slots=True)
@@ -104,99 +97,53 @@ class Listing:
 
     def record(self) -> Index:
         """The content of INDX; raises FormatError for a clip without CEND."""
-        attachments, clips = list(self.new.attachments.values()), list(self.new.clips.values())
-        parts = [part for row in attachments for part in row.parts]
-        signals = [signal for clip in clips for signal in clip.signals]
+        new, start = self.new, self.start
+        clips = list(new.clips.values())
         segments = [segment_rows(clip) for clip in clips]
-        columns = np.array([row for rows in segments for row in rows], np.int64)
         skeletons = {id_: n for n, id_ in enumerate(dict.fromkeys(c.skeleton for c in clips))}
+        shared = zip(new.shared, _places(new.shared.values(), start), strict=True)
+        parts = [part for row in new.attachments.values() for part in row.parts]
+        ancillary = [*_places(self.behind, start)]
+        rows: list[tuple[str | int, ...]] = []
+        end = start
+        for clip, packed in zip(clips, segments, strict=True):
+            cend = clip.cend
+            if cend is None:
+                raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
+            rows.append(
+                (
+                    *(clip.name, skeletons[clip.skeleton], clip.n_frames),
+                    *(clip.rate_numerator, clip.rate_denominator, len(clip.signals)),
+                    *(clip.clip.offset - end, clip.clip.size - FRAMING, len(packed)),
+                    *(cend.offset - end_of(clip, packed), cend.size - FRAMING),
+                    len(clip.ancillary),
+                )
+            )
+            end = cend.stop
+            ancillary += _places(clip.ancillary, end)
         return Index(
-            head=self.new.head,
-            shared=Table.of(
-                IndexedChunk,
-                type=[kind for kind, _ in self.new.shared],
-                id=[id_ for _, id_ in self.new.shared],
-                **_places(self.new.shared.values(), self.start),
-            ),
+            head=new.head,
+            shared=Table.of(IndexedChunk, [(kind, id_, *at) for (_, id_), (kind, *at) in shared]),
             attachments=Table.of(
                 IndexedAttachment,
-                name=[row.name for row in attachments],
-                size=[row.size for row in attachments],
-                n_parts=[len(row.parts) for row in attachments],
+                [(row.name, row.size, len(row.parts)) for row in new.attachments.values()],
             ),
-            parts=Table.of(
-                IndexedPlace, type=[ChunkType.ATTA] * len(parts), **_places(parts, self.start)
-            ),
-            aliases=Table.of(
-                IndexedAlias,
-                name=list(self.new.aliases),
-                of=[of for of, _ in self.new.aliases.values()],
-                target=[target for _, target in self.new.aliases.values()],
-            ),
+            parts=Table.of(IndexedPlace, list(_places(parts, start))),
+            aliases=Table.of(IndexedAlias, [(name, *row) for name, row in new.aliases.items()]),
             skeletons=list(skeletons),
-            clips=self._clips(clips, segments, skeletons),
-            signals=Table.of(
-                IndexedSignal, **{name: [getattr(s, name) for s in signals] for name in SIGNAL_ROW}
-            ),
-            segments=Table.of(
-                IndexedSegment,
-                **dict(zip(SEGMENT_ROW, columns.reshape(-1, len(SEGMENT_ROW)).T, strict=True)),
-            ),
+            clips=Table.of(IndexedClip, rows),
+            signals=Table.of(IndexedSignal, [SIGNAL_ROW(s) for c in clips for s in c.signals]),
+            segments=Table.of(IndexedSegment, list(chain.from_iterable(segments))),
             n_behind=len(self.behind),
-            ancillary=self._ancillary(clips),
-        )
-
-    def _clips(
-        self, clips: Sequence[ClipRow], segments: Sequence[Packed], skeletons: Mapping[bytes, int]
-    ) -> Table[IndexedClip]:
-        ends = [self.start, *(_cend_of(clip).stop for clip in clips)]
-        return Table.of(
-            IndexedClip,
-            name=[clip.name for clip in clips],
-            skeleton=[skeletons[clip.skeleton] for clip in clips],
-            n_frames=[clip.n_frames for clip in clips],
-            rate_numerator=[clip.rate_numerator for clip in clips],
-            rate_denominator=[clip.rate_denominator for clip in clips],
-            n_signals=[len(clip.signals) for clip in clips],
-            gap=[clip.clip.offset - end for clip, end in zip(clips, ends, strict=False)],
-            length=[clip.clip.size - FRAMING for clip in clips],
-            n_segments=[len(rows) for rows in segments],
-            cend_gap=[
-                _cend_of(clip).offset - end_of(clip, rows)
-                for clip, rows in zip(clips, segments, strict=True)
-            ],
-            cend_length=[_cend_of(clip).size - FRAMING for clip in clips],
-            n_ancillary=[len(clip.ancillary) for clip in clips],
-        )
-
-    def _ancillary(self, clips: Sequence[ClipRow]) -> Table[IndexedPlace]:
-        groups = [
-            (self.behind, self.start),
-            *((clip.ancillary, _cend_of(clip).stop) for clip in clips),
-        ]
-        places = [_places(chunks, start) for chunks, start in groups]
-        return Table.of(
-            IndexedPlace,
-            type=[chunk.type for chunks, _ in groups for chunk in chunks],
-            gap=[gap for columns in places for gap in columns["gap"]],
-            length=[length for columns in places for length in columns["length"]],
+            ancillary=Table.of(IndexedPlace, ancillary),
         )
 
 
-def _cend_of(clip: ClipRow) -> Chunk:
-    if clip.cend is None or clip.cend.length is None:
-        raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
-    return clip.cend
-
-
-def _places(chunks: Iterable[Chunk], end: int) -> dict[str, list[int]]:
-    """The columns ``gap`` and ``length`` of chunks in file order, behind ``end``."""
-    gaps, lengths = [], []
+def _places(chunks: Iterable[Chunk], end: int) -> Iterator[tuple[bytes, int, int]]:
+    """Type, gap and length of chunks in file order, behind ``end``."""
     for chunk in chunks:
-        gaps.append(chunk.offset - end)
-        lengths.append(chunk.size - FRAMING)
+        yield chunk.type, chunk.offset - end, chunk.size - FRAMING
         end = chunk.stop
-    return {"gap": gaps, "length": lengths}
 
 
 def segment_rows(clip: ClipRow) -> Packed:

@@ -1,19 +1,28 @@
 """INDX as a Directory: tables are read in bulk, rows of clips made when they are asked for.
 
+``IndexCheck`` compares it with the chunks before it.
+
 SPEC.md, "INDX", is normative.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from mcz.container import index_records
-from mcz.container.chunks import CRC, FRAMING, Chunk, ChunkFlag, ChunkType, check_chunk
+from mcz.container.chunks import (
+    CRC,
+    FRAMING,
+    Chunk,
+    ChunkFlag,
+    ChunkType,
+    build_chunk,
+    check_chunk,
+)
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -22,22 +31,23 @@ from mcz.container.directory import (
     IndexPlace,
     Packed,
     PackedClipRow,
+    Place,
     SegmentRow,
     SignalRow,
 )
-from mcz.container.index import PACKETS, SEGMENT_ROW, SIGNAL_ROW
+from mcz.container.index import PACKETS, index_record
 from mcz.container.index_records import (
     Index,
     IndexedChunk,
     IndexedPlace,
-    IndexedSegment,
-    IndexedSignal,
+    Indx,
+    PreviousIndex,
 )
 from mcz.container.limits import check
 from mcz.container.packets import FRAME
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError
-from mcz.schema import MAX_COUNT, Table, inflate, parse
+from mcz.schema import MAX_COUNT, Table, build, inflate, parse
 from mcz.schema.columns import Numbers
 
 MOST_INDEXES = 8  # that continue each other
@@ -49,19 +59,17 @@ Fetch = Callable[[int, int], bytes]  # the bytes at an offset, so many
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """An INDX that was read: where it lies, what it continues, and its content."""
+    """An INDX that was read: what names it, what it continues, and its content."""
 
-    offset: int
-    length: int
-    crc: int
-    previous: index_records.PreviousIndex | None
+    chunk: PreviousIndex
+    previous: PreviousIndex | None
     n_bytes: int
     index: Index
 
     @property
     def start(self) -> int:
         """The offset from which on it lists what there is."""
-        return 0 if self.previous is None else self.previous.offset + self.previous.length
+        return 0 if self.previous is None else self.previous.stop
 
 
 def parse_index(data: bytes, offset: int, limit: int) -> Listed:
@@ -70,39 +78,40 @@ def parse_index(data: bytes, offset: int, limit: int) -> Listed:
     ``limit`` bounds its inflated size.
     """
     chunk = Chunk(ChunkType.INDX, ChunkFlag.ANCILLARY, offset, len(data) - FRAMING)
-    outer = parse(index_records.Indx, check_chunk(data, chunk), "INDX")
-    index = parse(Index, inflated(outer, limit), "INDX")
-    (crc,) = CRC.unpack(data[-CRC.size :])
-    if outer.previous is not None:
-        check_order(outer.previous, offset)
-    return Listed(offset, len(data), crc, outer.previous, outer.size, index)
+    outer, content = _inflated(check_chunk(data, chunk), offset, limit, "INDX")
+    index = parse(Index, content, "INDX")
+    return Listed(named(data, offset), outer.previous, outer.size, index)
 
 
-def inflated(outer: index_records.Indx, limit: int) -> bytes:
-    """The content of an INDX."""
-    check("INDX: inflated size", outer.size, limit)
-    return inflate(outer.data, outer.size, "INDX")
-
-
-def check_order(previous: index_records.PreviousIndex, offset: int) -> None:
-    """Refuse an INDX at ``offset`` that continues one which does not lie before it."""
-    if previous.length < FRAMING or previous.offset + previous.length > offset:  # INDX-06
+def _inflated(payload: bytes, offset: int, limit: int, where: str) -> tuple[Indx, bytes]:
+    """The fields of the INDX at ``offset``, and its content."""
+    outer = parse(Indx, payload, where)
+    previous = outer.previous
+    if previous and (previous.length < FRAMING or previous.stop > offset):  # INDX-06
         raise FormatError(
             f"INDX at {offset} continues one of {previous.length} bytes at {previous.offset}"
         )
+    check("INDX: inflated size", outer.size, limit)
+    return outer, inflate(outer.data, outer.size, "INDX")
+
+
+def named(data: bytes, offset: int) -> PreviousIndex:
+    """How an INDX is named whose bytes at ``offset`` are ``data``."""
+    (crc,) = CRC.unpack(data[-CRC.size :])
+    return PreviousIndex(offset=offset, length=len(data), crc=crc)
 
 
 def read_indexes(fetch: Fetch, offset: int, length: int, limit: int) -> Iterator[Listed]:
     """The INDX chunk there, then the one that it continues, and so on; raises FormatError."""
-    crc: int | None = None
+    due: PreviousIndex | None = None
     for _ in range(MOST_INDEXES):
         listed = parse_index(fetch(offset, length), offset, limit)
-        if crc not in (None, listed.crc):  # INDX-06
+        if due not in (None, listed.chunk):  # INDX-06
             raise FormatError(f"INDX at {offset} is not the one that another continues")
         yield listed
-        if listed.previous is None:
+        if (due := listed.previous) is None:
             return
-        offset, length, crc = listed.previous.offset, listed.previous.length, listed.previous.crc
+        offset, length = due.offset, due.length
     raise FormatError(f"more than {MOST_INDEXES} INDX continue each other")  # INDX-07
 
 
@@ -119,20 +128,17 @@ def directory_of(found: Iterable[Listed]) -> Directory:
         for row in listed.index.aliases:
             _add(directory.aliases, row.name, (row.of, row.target))
         clips.add(ClipTables(listed))
-        chunk = Chunk(ChunkType.INDX, ChunkFlag.ANCILLARY, listed.offset, listed.length - FRAMING)
-        directory.clips = ClipRows(clips.names, clips.row, clips.having)
-        directory.indexes += (place_of(chunk, listed.crc, listed.n_bytes, directory),)
+        directory.clips = ClipRows(clips.names, clips.row, clips.having, clips.places)
+        directory.indexes += (place_of(listed.chunk, listed.n_bytes, directory),)
     if len(directory.clips) < len(clips.names):
         raise FormatError("INDX: two clips have the same name")
     return directory
 
 
-def place_of(chunk: Chunk, crc: int, n_bytes: int, directory: Directory) -> IndexPlace:
+def place_of(chunk: PreviousIndex, n_bytes: int, directory: Directory) -> IndexPlace:
     """The place of an INDX, behind which ``directory`` is all there is so far."""
     return IndexPlace(
-        chunk.offset,
-        chunk.size,
-        crc,
+        chunk,
         n_bytes,
         len(directory.shared),
         len(directory.attachments),
@@ -201,7 +207,6 @@ class ClipTables:
         if len(clips) and int(clips.numbers("skeleton").max()) >= len(index.skeletons):  # INDX-08
             raise FormatError("INDX: a clip of a skeleton that it does not list")
         self.ends = self._ends()
-        self._signals: dict[tuple[int, ...], SignalRow] = {}  # those of an archive are few
 
     def _ends(self) -> Numbers:
         """Where the CEND of each clip ends."""  # INDX-01
@@ -228,11 +233,13 @@ class ClipTables:
 
     @cached_property
     def _segments(self) -> Packed:
-        return _rows(self.index.segments, SEGMENT_ROW)
+        return cast(Packed, self.index.segments.rows())
 
     @cached_property
-    def _signal_rows(self) -> list[tuple[int, ...]]:
-        return _rows(self.index.signals, SIGNAL_ROW)
+    def _signals(self) -> list[SignalRow]:
+        rows = cast(Packed, self.index.signals.rows())
+        known = {row: SignalRow(*row) for row in set(rows)}  # those of an archive are few
+        return [known[row] for row in rows]
 
     def row(self, number: int) -> ClipRow:
         """The row of a clip."""
@@ -244,7 +251,7 @@ class ClipTables:
             n_frames,
             numerator,
             denominator,
-            tuple(map(self._signal, self._signal_rows[first:stop])),
+            tuple(self._signals[first:stop]),
             Chunk(ChunkType.CLIP, 0, at, length),
             cend=Chunk(ChunkType.CEND, 0, end - cend_length - FRAMING, cend_length),
         )
@@ -252,12 +259,6 @@ class ClipTables:
         if more:
             row.ancillary = self.ancillary(number + 1, end)
         return row
-
-    def _signal(self, fields: tuple[int, ...]) -> SignalRow:
-        found = self._signals.get(fields)
-        if found is None:
-            found = self._signals[fields] = SignalRow(**dict(zip(SIGNAL_ROW, fields, strict=True)))
-        return found
 
     def ancillary(self, group: int, start: int) -> list[Chunk]:
         """The ancillary chunks behind clip ``group`` - 1, or of group 0 behind the clips before."""
@@ -267,6 +268,12 @@ class ClipTables:
             Chunk(kind, ChunkFlag.ANCILLARY, chunk.offset, chunk.length)
             for kind, chunk in zip(table.blobs("type"), _chunks(table, start), strict=True)
         ]
+
+    def places(self) -> Iterator[Place]:
+        """The places of all clips."""
+        size, cend_size = (self.clips.numbers(n) + FRAMING for n in ("length", "cend_length"))
+        columns = self.offsets, size, self.ends - cend_size, cend_size
+        return zip(*(column.tolist() for column in columns), strict=True)
 
     def having(self, kind: bytes) -> Iterator[int]:
         """The groups that have an ancillary chunk of a type."""
@@ -298,18 +305,15 @@ class _Clips:
         row.ancillary += self._behind.get(number, ())
         return row
 
+    def places(self) -> list[Place]:
+        """The places of all clips."""
+        return [place for _, tables in self._tables for place in tables.places()]
+
     def having(self, kind: bytes) -> set[int]:
         """The numbers of the clips with an ancillary chunk of a type."""
         return {
             first + group - 1 for first, tables in self._tables for group in tables.having(kind)
         }
-
-
-def _rows(
-    table: Table[IndexedSegment] | Table[IndexedSignal], names: Sequence[str]
-) -> list[tuple[int, ...]]:
-    """The rows of a table of numbers."""
-    return list(zip(*(table.numbers(name).tolist() for name in names), strict=True))
 
 
 def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
@@ -337,3 +341,54 @@ def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
         first[signal] += n_frames
         end += gap + size
     return segments
+
+
+class IndexCheck:
+    """Compares each INDX of a file with what lies before it."""
+
+    def __init__(self) -> None:
+        self._found: list[tuple[IndexPlace, int]] = []  # and how many continue each other there
+
+    def check(self, payload: bytes, chunk: Chunk, directory: Directory, limit: int) -> None:
+        """Compare the next INDX with what was found; raises FormatError.
+
+        ``limit`` bounds its inflated size.
+        """
+        where = f"chunk {chunk.label}"
+        outer, content = _inflated(payload, chunk.offset, limit, where)
+        since, depth = None, 1
+        if outer.previous is not None:
+            before = [(place, n) for place, n in self._found if place.chunk == outer.previous]
+            if not before:  # INDX-06
+                offset = outer.previous.offset
+                raise FormatError(f"no INDX at {offset} is the one that it continues", where=where)
+            since, depth = before[0][0], before[0][1] + 1
+        if depth > MOST_INDEXES:  # INDX-07
+            raise FormatError(f"it continues {depth - 1} others", where=where)
+        due = index_record(directory, since)
+        expected = build(due, where)
+        if content[: len(expected)] != expected:  # INDX-04, INDX-05, INDX-08
+            raise FormatError(_difference(parse(Index, content, where), due), where=where)
+        name = named(build_chunk(chunk.type, payload, chunk.flags), chunk.offset)
+        self._found.append((place_of(name, outer.size, directory), depth))
+
+
+def _difference(listed: Index, due: Index) -> str:
+    """The first field of an index that is not as it has to be, in words."""
+    for name, given in vars(listed).items():
+        wanted = getattr(due, name)
+        if name == "extension" or given == wanted:
+            continue
+        if name == "head":
+            return "its copy of HEAD differs from HEAD"
+        if not isinstance(given, Table):
+            return f"{name} is {given!r}, the file has {wanted!r}"
+        if len(given) != len(wanted):
+            return f"it lists {len(given)} {name}, there are {len(wanted)}"
+        for row, (one, other) in enumerate(zip(given, wanted, strict=True)):
+            for field, value in vars(one).items():
+                if value != getattr(other, field):
+                    return (
+                        f"{name}.{row}.{field} is {value!r}, the file has {getattr(other, field)!r}"
+                    )
+    return "it is not in file order"

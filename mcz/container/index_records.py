@@ -32,6 +32,11 @@ class PreviousIndex(Record):
     length: int = field(UVARINT, "bytes of the whole chunk")
     crc: int = field(Int32ul, "its crc")
 
+    @property
+    def stop(self) -> int:
+        """The offset after it."""
+        return self.offset + self.length
+
 
 class Indx(Record):
     """INDX, a cache of what a file holds and where."""

@@ -9,12 +9,24 @@ import hashlib
 from dataclasses import replace
 from functools import cache
 
+from construct import GreedyBytes, If, Int8ul, this
+
 from mcz.annexes import annex_bytes
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.limits import LARGE, Profile, check, check_decoded
 from mcz.errors import FormatError
-from mcz.schema import EXTENDED, build, deflate, inflate, parse, read_varint, varint
+from mcz.schema import (
+    EXTENDED,
+    TEXT,
+    UVARINT,
+    Record,
+    build,
+    deflate,
+    field,
+    inflate,
+    parse,
+)
 
 PACKED = 2  # bit 1 of the flags of SKEL
 
@@ -80,45 +92,38 @@ def chunk_id(kind: bytes, payload: bytes, profile: Profile = LARGE) -> bytes:
     return plain_id(kind, plain_payload(kind, payload, kind.decode(), profile))
 
 
+class PackedSkel(Record):
+    """SKEL up to its flags, and what follows them, perhaps packed."""
+
+    name: str = field(TEXT, "name of the skeleton")
+    flags: int = field(Int8ul, "bit 1: packed")
+    size: int | None = field(If(this.flags & PACKED, UVARINT), "bytes of the rest", default=None)
+    rest: bytes = field(GreedyBytes, "the other fields of SKEL")
+
+
 def pack_skeleton(payload: bytes) -> bytes:
     """The payload of a SKEL with its fields packed, where that is shorter."""
-    at = _flags_at(payload, "SKEL")
-    rest = payload[at + 1 :]
-    flags = bytes((payload[at] | PACKED,))
-    packed = payload[:at] + flags + varint(len(rest)) + deflate(rest, words=words())
-    return min(payload, packed, key=len)
+    plain = parse(PackedSkel, payload, "SKEL")
+    flags, data = plain.flags | PACKED, deflate(plain.rest, words=words())
+    packed = PackedSkel(name=plain.name, flags=flags, size=len(plain.rest), rest=data)
+    return min(payload, build(packed, "SKEL"), key=len)
 
 
 def is_packed(payload: bytes, where: str) -> bool:
     """Whether the fields of a SKEL are packed."""
-    at = _flags_at(payload, where)
-    return at < len(payload) and bool(payload[at] & PACKED)
+    return parse(PackedSkel, payload, where).size is not None
 
 
 def unpacked(payload: bytes, where: str, profile: Profile) -> bytes:
     """The payload of a SKEL without packing; one that was never packed as it is."""
-    if not is_packed(payload, where):
+    packed = parse(PackedSkel, payload, where)
+    if packed.size is None:
         return payload
-    at = _flags_at(payload, where)
-    try:
-        size, start = read_varint(payload, at + 1)
-    except FormatError as error:
-        error.add(where=where)
-        raise
-    check(f"{where}: bytes", size, profile.text_bytes)  # SKEL-09
-    rest = inflate(payload[start:], size, where, words=words())
-    return payload[:at] + bytes((payload[at] & ~PACKED,)) + rest
+    check(f"{where}: bytes", packed.size, profile.text_bytes)  # SKEL-09
+    rest = inflate(packed.rest, packed.size, where, words=words())
+    return build(PackedSkel(name=packed.name, flags=packed.flags & ~PACKED, rest=rest), where)
 
 
 def parse_skel(payload: bytes, where: str, profile: Profile) -> payloads.Skel:
     """The fields of SKEL, packed or not."""
     return parse(payloads.Skel, unpacked(payload, where, profile), where, profile.counts)
-
-
-def _flags_at(payload: bytes, where: str) -> int:
-    """Where the flags are, behind the name; what is beyond the end ``parse`` will refuse."""
-    try:
-        length, at = read_varint(payload, 0)
-    except FormatError as error:
-        raise FormatError(f"name: {error}", where=where) from None
-    return at + length

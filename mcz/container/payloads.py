@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 
-from construct import Construct, GreedyBytes, If, Int8ul, this
+from construct import GreedyBytes, If, Int8ul, this
 
 from mcz.container.versions import FORMAT, NEEDS_MINOR
 from mcz.numbers import GRID, Grid
@@ -126,11 +126,8 @@ class SkeletonSource(Record):
     sha256: bytes = field(SHA256, "hash of the source file")
 
 
-INTRINSIC = 1  # packed.py has cleared bit 1
-
-
 class Skel(Record):
-    """SKEL, a skeleton."""
+    """SKEL, a skeleton; ``packed.py`` has cleared bit 1 of its flags."""
 
     name: str = field(TEXT, "name of the skeleton")
     flags: int = field(
@@ -159,13 +156,7 @@ class Skel(Record):
 
 STORED, DEFLATED, AFTER_WORDS = 0, 1, 2
 ENCODING = 3  # mask of the bits of flags
-
-
-def encoding_flags() -> Construct:
-    """The field ``flags`` of a chunk whose data are encoded."""
-    return one_of(Int8ul, (0, 1, 2, EXTENDED, EXTENDED + 1, EXTENDED + 2))  # CONV-14, CONV-15
-
-
+ENCODING_FLAGS = one_of(Int8ul, (0, 1, 2, EXTENDED, EXTENDED + 1, EXTENDED + 2))  # CONV-14, CONV-15
 ENCODED = "bits 0-1: 0 stored, 1 raw deflate, 2 deflate after words; 7: has extension"
 
 
@@ -173,7 +164,7 @@ class Srce(Record):
     """SRCE, the template of a source."""
 
     format: int = field(Int8ul, "source format id")
-    flags: int = field(encoding_flags(), ENCODED, default=0)
+    flags: int = field(ENCODING_FLAGS, ENCODED, default=0)
     size: int = field(UVARINT, "bytes of the template")
     extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
     data: bytes = field(GreedyBytes, "the template, encoded")
@@ -196,7 +187,7 @@ class Atta(Record):
     n_parts: int = field(POSITIVE, "parts of the file, at least 1, all in one run")
     size: int = field(UVARINT, "bytes of the whole file")
     sha256: bytes = field(SHA256, "hash of the whole file")
-    flags: int = field(encoding_flags(), ENCODED, default=0)
+    flags: int = field(ENCODING_FLAGS, ENCODED, default=0)
     part_size: int = field(UVARINT, "bytes of this part, decoded")
     extension: bytes | None = field(SIZED_EXTENSION, "ignored, kept; flag bit 7", default=None)
     data: bytes = field(GreedyBytes, "this part, encoded")
@@ -382,7 +373,7 @@ class Cend(Record):
 class Meta(Record):
     """META, metadata of clips that lie before it."""
 
-    flags: int = field(encoding_flags(), ENCODED, default=0)
+    flags: int = field(ENCODING_FLAGS, ENCODED, default=0)
     size: int = field(UVARINT, "bytes of the records, decoded")
     extension: bytes | None = field(SIZED_EXTENSION, "ignored; flag bit 7", default=None)
     data: bytes = field(GreedyBytes, "the records, encoded")
@@ -394,6 +385,23 @@ class MetaRecord(Record):
     clip: str = field(TEXT, "name of the clip; empty: the whole file")
     removed: list[str] = field(counted(TEXT), "keys that are not there any more")
     entries: list[Metadata] = field(counted(Metadata), "pairs of key and value")
+
+
+class Copy(Record):
+    """COPY, copies of small chunks."""
+
+    flags: int = field(ENCODING_FLAGS, ENCODED, default=0)
+    size: int = field(UVARINT, "bytes of the copies, decoded")
+    extension: bytes | None = field(SIZED_EXTENSION, "ignored; flag bit 7", default=None)
+    data: bytes = field(GreedyBytes, "the copies, encoded")
+
+
+class CopiedChunk(Record):
+    """A copy in the decoded data of COPY."""
+
+    distance: int = field(UVARINT, "bytes from where the chunk begins to where this COPY begins")
+    type: bytes = field(Exactly(4), "its type")
+    payload: bytes = field(SIZED, "its payload")
 
 
 class Qual(Record):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from operator import attrgetter
 from weakref import finalize
 
 from mcz.container import payloads
@@ -34,12 +35,10 @@ from mcz.container.directory import (
     SegmentRow,
     parse_clip,
     parse_head,
-    signal_rows,
 )
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.metadata import Placed, Record, Remembered, applied, records_in
-from mcz.container.overlay import Overlay
 from mcz.container.packed import chunk_id, plain_id, plain_payload
 from mcz.container.packets import CHECK_SIZE, FRAME, MOST_HEAD, Packet, implied_by, is_packet
 from mcz.container.restoring import is_like, scan_for_salvage
@@ -55,12 +54,15 @@ from mcz.container.segments import (
     parse_table,
 )
 from mcz.container.skeletons import parse_skeleton
-from mcz.container.source import ByteSource
+from mcz.container.source import ByteSource, Overlay
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.motion import Skeleton
 from mcz.schema import parse, parse_until
 from mcz.types import Settings
 
+_said = attrgetter(
+    "name", "skeleton", "n_frames", "rate_numerator", "rate_denominator", "signals"
+)  # that CLIP and the index say of a clip
 KEPT_SKELETONS = 8  # parsed ones, of a file
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
 
@@ -250,20 +252,18 @@ class Container:
     def clip(self, row: ClipRow) -> payloads.Clip:
         """The fields of CLIP, compared with what the index says of them."""
         fields = parse_clip(self.payload(row.clip), self.directory.head, row.clip.label)
-        signals = signal_rows(fields, row.clip.label)
-        rate = fields.rate_numerator, fields.rate_denominator
-        n_frames = fields.n_frames  # CLIP-17
+        found = ClipRow.of(fields, row.clip)
         if fields.flags & payloads.OPEN_CLIP:
-            if n_frames:  # CLIP-16
-                raise FormatError(f"clip {row.name!r} is open, but has {n_frames} frames")
-            n_frames = row.n_frames
-        found = (fields.name, fields.skeleton, n_frames, *rate, signals)
-        listed = (row.name, row.skeleton, row.n_frames, row.rate_numerator, row.rate_denominator)
-        differs = found != (*listed, row.signals)
+            if fields.n_frames:  # CLIP-16
+                raise FormatError(f"clip {row.name!r} is open, but has {fields.n_frames} frames")
+            found.n_frames = row.n_frames
+        differs = _said(found) != _said(row)  # CLIP-17
         if differs and row.damage and not self.salvage:
             raise FormatError(row.damage[0], clip=row.name)
         if differs and not row.damage:
-            raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
+            raise FormatError(
+                f"clip {row.name!r} is {_said(found)}, but the index says {_said(row)}"
+            )
         return fields
 
     def clip_head(self, row: ClipRow) -> payloads.Clip:
@@ -298,15 +298,11 @@ class Container:
             return frame_table(row.header, counts, row.size, len(self._mask(row)))
         size = min(row.size, TABLE_PEEK + counts.total(row.header.flags) * 7 // 4)
         while True:
+            data = self.source.read(row.offset, size)
             try:
-                table = parse_table(self.source.read(row.offset, size), counts)
-                break
-            except TruncatedError as error:
-                if size == row.size:
-                    raise FormatError(f"DATA payload at {row.offset}: {error}") from None
+                return _table_in(data, row, counts)
+            except TruncatedError:
                 size = min(row.size, 4 * size)
-        _check_table(table, row)
-        return table
 
     def streams(
         self,
@@ -347,11 +343,7 @@ class Container:
             mask = self._mask(row)
             streams = [mask, payload] if row.header.flags & MASKS else [payload]
             return frame_table(row.header, counts, row.size, len(mask)), dict(enumerate(streams))
-        try:
-            table = parse_table(payload, counts)
-        except TruncatedError as error:
-            raise FormatError(f"DATA payload at {row.offset}: {error}") from None
-        _check_table(table, row)
+        table = _table_in(payload, row, counts)
         return table, {
             index: payload[offset : offset + length]
             for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True))
@@ -398,7 +390,14 @@ def _reopened(source: ByteSource, options: Settings) -> Container:
     return container
 
 
-def _check_table(table: StreamTable, row: SegmentRow) -> None:
+def _table_in(data: bytes, row: SegmentRow, counts: StreamCounts) -> StreamTable:
+    """The table of a segment, of which ``data`` may have too little: that is a TruncatedError."""
+    try:
+        table = parse_table(data, counts)
+    except TruncatedError as error:
+        if len(data) < row.size:
+            raise
+        raise FormatError(f"DATA payload at {row.offset}: {error}") from None
     if table.header != row.header:
         raise FormatError(
             f"segment at {row.offset} is {table.header}, but the index says {row.header}"
@@ -407,3 +406,4 @@ def _check_table(table: StreamTable, row: SegmentRow) -> None:
         raise FormatError(
             f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes"
         )
+    return table

@@ -26,10 +26,9 @@ from mcz.container.directory import Directory, Found, parse_head
 from mcz.container.feeding import packets
 from mcz.container.index_reader import Listed, directory_of, read_indexes
 from mcz.container.limits import BASE, index_limit
-from mcz.container.overlay import Overlay
 from mcz.container.packets import END
 from mcz.container.scan import scan
-from mcz.container.source import ByteSource
+from mcz.container.source import ByteSource, Overlay
 from mcz.container.writer import build_head
 from mcz.errors import FormatError, MczError
 from mcz.schema import build

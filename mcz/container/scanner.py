@@ -17,11 +17,10 @@ from mcz.container.directory import (
     SegmentRow,
     parse_clip,
     parse_head,
-    signal_rows,
 )
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.grammar import NAMED, OTHER
-from mcz.container.index_check import IndexCheck
+from mcz.container.index_reader import IndexCheck
 from mcz.container.limits import check, index_limit
 from mcz.container.packed import plain_id, plain_payload
 from mcz.container.packets import SEGMENT
@@ -184,10 +183,8 @@ class Scanner:
             fields, chunk.label, self.found.directory, self._templates
         ):  # ALIA-02
             self._sourced.add((payloads.OF_CLIP, fields.name.encode()))
-        signals = signal_rows(fields, chunk.label)
-        rate = fields.rate_numerator, fields.rate_denominator
-        self.clip = ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
-        self.first = [0] * len(signals)
+        self.clip = ClipRow.of(fields, chunk)
+        self.first = [0] * len(fields.signals)
 
     def _data(self, chunk: Chunk, payload: bytes) -> None:
         assert chunk.length is not None

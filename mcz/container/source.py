@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterable
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from threading import Lock
 from typing import Any, BinaryIO
@@ -161,6 +162,48 @@ class ByteSource:
         self._stream.close()
 
 
+class Overlay(ByteSource):
+    """``source`` with other bytes at some offsets; all else it leaves to ``source``.
+
+    ``parts`` do not overlap. One that lies behind the end can be read, whole or in part, though
+    ``size`` stays. What is pickled opens ``source`` anew, without them.
+    """
+
+    def __init__(self, source: ByteSource, parts: Mapping[int, bytes]) -> None:
+        self._source = source
+        self.parts = dict(sorted(parts.items()))
+        self._starts = list(self.parts)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or "_source" not in self.__dict__:
+            raise AttributeError(name)
+        return getattr(self._source, name)
+
+    def read(self, offset: int, size: int) -> bytes:
+        """The ``size`` bytes at ``offset``; raises TruncatedError where the file ends before."""
+        stop = offset + size
+        first = max(0, bisect_right(self._starts, offset) - 1)
+        near = self._starts[first : bisect_left(self._starts, stop)]
+        met = [start for start in near if start + len(self.parts[start]) > offset]
+        if not met:
+            return self._source.read(offset, size)
+        if met[0] <= offset and stop <= met[0] + len(self.parts[met[0]]):
+            return self.parts[met[0]][offset - met[0] : stop - met[0]]
+        data = bytearray(self._source.read(offset, size))
+        for start in met:
+            part = self.parts[start]
+            begin, end = max(start, offset), min(start + len(part), stop)
+            data[begin - offset : end - offset] = part[begin - start : end - start]
+        return bytes(data)
+
+    def with_more(self, parts: Mapping[int, bytes]) -> Overlay:
+        """The same source with ``parts`` beside those that it has."""
+        return Overlay(self._source, self.parts | dict(parts))
+
+    def close(self) -> None:
+        self._source.close()
+
+
 class Forward:
     """Reads on from offset ``at`` of a source, a block at a time, where small parts are wanted."""
 
@@ -171,13 +214,16 @@ class Forward:
 
     def __call__(self, size: int) -> bytes:
         """The next ``size`` bytes; raises TruncatedError where the file ends before."""
-        first, stop = self.at - self._start, self.at - self._start + size
-        if stop > len(self._block):
-            block = max(size, min(self._source.block, self._source.size - self.at))
-            self._start, self._block = self.at, self._source.read(self.at, block)
-            first, stop = 0, size
         self.at += size
-        return self._block[first:stop]
+        return self.at_offset(self.at - size, size)
+
+    def at_offset(self, offset: int, size: int) -> bytes:
+        """The ``size`` bytes at an offset that is not before those read last."""
+        first = offset - self._start
+        if first + size > len(self._block):
+            block = max(size, min(self._source.block, self._source.size - offset))
+            self._start, self._block, first = offset, self._source.read(offset, block), 0
+        return self._block[first : first + size]
 
 
 def path_of(target: Target) -> str | os.PathLike[str] | None:
@@ -207,14 +253,11 @@ def open_source(target: Target) -> ByteSource:
             return ByteSource(io.BytesIO(target.read()), name=name)
         return ByteSource(target, remote=_is_remote(target), name=name)
     if "://" in str(target):
-        return _remote_source(str(target))
+        address = str(target)
+        remote = _remote_stream(address)
+        return ByteSource(remote, remote=_is_remote(remote), name=address, target=address)
     path = str(Path(target).absolute())  # holds wherever the process goes
     return ByteSource(open(target, "rb"), name=os.fspath(target), target=path)
-
-
-def _remote_source(target: str) -> ByteSource:
-    stream = _remote_stream(target)
-    return ByteSource(stream, remote=_is_remote(stream), name=target, target=target)
 
 
 def _remote_stream(target: str) -> Any:

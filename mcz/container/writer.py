@@ -28,7 +28,6 @@ from mcz.container.directory import (
     ClipRow,
     Directory,
     SegmentRow,
-    SignalRow,
 )
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
@@ -139,27 +138,24 @@ class Writer:
 
     def attachment(self, name: str, data: bytes) -> None:
         """Write a whole file, opaque, in parts of 1 MiB."""
-        self._between_clips("ATTA")
-        self._new_name(name, self.directory.attachments)
         most = min(ATTACHMENT_PART, self.profile.coded_bytes)
-        n_parts = max(1, -(-len(data) // most))
+        pieces = [data[at : at + most] for at in range(0, len(data), most)] or [b""]
         digest = hashlib.sha256(data).digest()
-        row = AttachmentRow(name, len(data), [])
-        for part in range(n_parts):
-            piece = data[part * most :][:most]
+        parts = []
+        for part, piece in enumerate(pieces):
             flags, packed = smallest(piece, short=self.short, plain=self.profile.is_plain)
             record = payloads.Atta(
                 name=name,
                 part=part,
-                n_parts=n_parts,
+                n_parts=len(pieces),
                 size=len(data),
                 sha256=digest,
                 flags=flags,
                 part_size=len(piece),
                 data=packed,
             )
-            row.parts.append(self.chunk(ChunkType.ATTA, build(record, "ATTA")))
-        self.directory.attachments[name] = row
+            parts.append(build(record, "ATTA"))
+        self.attachment_parts(name, len(data), parts)
 
     def attachment_parts(self, name: str, size: int, parts: Sequence[bytes]) -> None:
         """Write an attachment from the payloads of its ATTA chunks."""
@@ -183,20 +179,15 @@ class Writer:
         if self._clip is None and last is not None:
             last.ancillary.append(chunk)
 
-    def begin_clip(self, record: payloads.Clip, n_channels: Sequence[int]) -> None:
-        """Write CLIP; ``n_channels`` of each signal is for the index."""
+    def begin_clip(self, record: payloads.Clip) -> None:
+        """Write CLIP."""
         self._between_clips("CLIP")
         name = record.name
         if not name:
             raise MotionError("a clip needs a name")
         self._new_name(name, self.directory.clips)
         chunk = self.chunk(ChunkType.CLIP, build(record, f"clip {name!r}"))
-        signals = tuple(
-            SignalRow(n, s.samples_per_frame, s.codec, s.preset, s.codec_version, s.skip, s.spare)
-            for n, s in zip(n_channels, record.signals, strict=True)
-        )
-        rate = record.rate_numerator, record.rate_denominator
-        self._clip = ClipRow(name, record.skeleton, 0, *rate, signals, chunk)
+        self._clip = ClipRow.of(record, chunk)
 
     def segment(
         self, header: SegmentHeader, streams: Sequence[bytes], extension: bytes = b""

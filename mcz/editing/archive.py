@@ -227,7 +227,7 @@ def append(
     if still_protect(target, redundancy):
         report.left_out = [text for text in report.left_out if not text.endswith(UNPROTECTED)]
     report.size = Path(target).stat().st_size
-    report.note(notes_on(draft.paths))
+    report.note(notes_on(draft.paths, {outcome.path for outcome in report.outcomes}))
     report.outcomes += others
     tail = growth.tail
     text = "it lay whole behind the last FOOT of a file whose writing was cut short"

@@ -214,11 +214,7 @@ class Copier(Carrier):
         new = whole if cut.is_whole else clip_record(cut, skeleton, record)
         source, hashes = self.finish_record(cut, new)
         new.name = self.name_of(cut)
-        n_channels = [
-            sum(len(part.info.layout.groups[group]) for group in part.groups)
-            for part in cut.signals
-        ]
-        self.writer.begin_clip(new, n_channels)
+        self.writer.begin_clip(new)
         self.inside(row)
         rows = [(own, part) for part in cut.signals for own in part.rows]
         for own, part in sorted(rows, key=lambda pair: pair[0].offset):

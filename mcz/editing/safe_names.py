@@ -6,7 +6,7 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path, PurePosixPath
 
 from mcz.errors import AccessError, ExistsError, reason_of
@@ -40,24 +40,33 @@ def fault_of(part: str) -> str:
 
 def folded(name: str) -> str:
     """What names have in common that one disk or another takes for the same."""
+    if name.isascii():
+        return name.lower()
     return unicodedata.normalize("NFC", unicodedata.normalize("NFKC", name).casefold())
 
 
-def notes_on(names: Iterable[str]) -> dict[str, str]:
-    """Of each path that not every system can hold, or not beside another, why."""
+def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[str, str]:
+    """Of each path that not every system can hold, or not beside another, why.
+
+    ``of``: those that are asked about, None: all.
+    """
     notes: dict[str, str] = {}
     seen: dict[str, str] = {}
     for name in names:
-        for part in PurePosixPath(name).parts:
+        is_asked = of is None or name in of
+        for part in PurePosixPath(name).parts if is_asked else ():
             if fault := fault_of(part):
                 who = "unpack does not write" if HIDDEN.search(part) else "Windows cannot hold"
                 notes.setdefault(name, f"{who} the name {part!r}: {fault}")
-        for path in (name, *map(str, PurePosixPath(name).parents)):
+        path = name
+        while path:
             other = seen.setdefault(folded(path), path)
             if other != path:
-                text = f"many disks take {path!r} for the same name as {other!r}"
-                notes.setdefault(name, text)
+                if is_asked:
+                    text = f"many disks take {path!r} for the same name as {other!r}"
+                    notes.setdefault(name, text)
                 break
+            path = path.rpartition("/")[0]
     return notes
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 
 from mcz.container import payloads
-from mcz.container.directory import ClipRow
+from mcz.container.chunks import CRC, HEADER
 from mcz.container.reader import Container
+from mcz.container.source import Forward
 from mcz.errors import FormatError
 from mcz.reading.file import File
-from mcz.schema import parse, parse_until
+from mcz.schema import parse, parse_until, read_varint
 from mcz.writing.draft import Digest
 
 Content = dict[bytes, tuple[int, bytes]]  # SHA-256 of a file -> what ALIA says of it
@@ -25,33 +27,71 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
     """
     paths: dict[str, Digest] = {}
     contents: Content = {}
-    for name, row in container.directory.clips.items():
-        with suppress(FormatError):
-            path, digest = _of_clip(container, row)
-            if digest:
-                contents.setdefault(digest, (payloads.OF_CLIP, name.encode()))
-            if digest and path:
-                paths.setdefault(path, digest)
+    for name, path, digest in _of_clips(container):
+        contents.setdefault(digest, (payloads.OF_CLIP, name.encode()))
+        if path:
+            paths.setdefault(path, digest)
     for name, held in container.directory.attachments.items():
         with suppress(FormatError):
             part = held.parts[0]
             digest = bytes(parse(payloads.Atta, container.payload(part), part.label).sha256)
             contents.setdefault(digest, (payloads.OF_ATTACHMENT, name.encode()))
             paths.setdefault(name, digest)
-    by_target = {target: digest for digest, target in contents.items()}
+    aliases = container.directory.aliases
+    by_target = {target: digest for digest, target in contents.items()} if aliases else {}
     file = File(container)
-    for name, alias in container.directory.aliases.items():
+    for name, alias in aliases.items():
         found = by_target.get((alias[0], bytes(alias[1])))
         paths.setdefault(name, found or partial(_digest_of, _restoring(file, *alias)))
     return paths, contents
 
 
-def _of_clip(container: Container, row: ClipRow) -> tuple[str, bytes]:
-    source = container.clip_head(row).source
-    if source is None or row.cend is None:
-        return "", b""
-    cend = parse_until(payloads.Cend, container.payload(row.cend), row.cend.label, "value_sha256")
-    return source.path, cend.source_sha256 or b""
+def _of_clips(container: Container) -> Iterator[tuple[str, str, bytes]]:
+    """Name, path and digest of each clip with a source; no row of the directory is made for it."""
+    read = Forward(container.source, 0)
+    for name, at, size, cend_at, cend_size in container.directory.clips.places():
+        if not cend_size:
+            continue
+        clip, cend = read.at_offset(at, size), read.at_offset(cend_at, cend_size)
+        with suppress(FormatError, IndexError, UnicodeDecodeError):
+            path, digest = _path_in(_checked(clip)), _digest_in(_checked(cend))
+            if path is not None and digest:
+                yield name, path, digest
+
+
+def _checked(chunk: bytes) -> bytes:
+    """The payload of a whole chunk; raises FormatError where its crc is wrong."""
+    if CRC.pack(zlib.crc32(memoryview(chunk)[: -CRC.size])) != chunk[-CRC.size :]:
+        raise FormatError("a damaged chunk")
+    return chunk[HEADER.size : -CRC.size]
+
+
+def _path_in(clip: bytes) -> str | None:
+    """The path of the source in the payload of a CLIP, None without one."""
+    size, at = read_varint(clip, 2)
+    flags, at = clip[at + size], at + size + 17
+    if flags & payloads.HAS_TIME_BASE:
+        source = parse_until(payloads.Clip, clip, "CLIP", "signals").source
+        return None if source is None else source.path
+    for _ in range(3):
+        _, at = read_varint(clip, at)
+    count, at = read_varint(clip, at)
+    for _ in range(2 * count):
+        size, at = read_varint(clip, at)
+        at += size
+    if not clip[at]:
+        return None
+    size, at = read_varint(clip, at + 19)
+    size, at = read_varint(clip, at + size)
+    return clip[at : at + size].decode()
+
+
+def _digest_in(cend: bytes) -> bytes:
+    """The hash of the source file in the payload of a CEND, empty without one."""
+    _, at = read_varint(cend, 0)
+    if cend[at]:  # runs of missing frames
+        return parse_until(payloads.Cend, cend, "CEND", "value_sha256").source_sha256 or b""
+    return cend[at + 2 : at + 34] if cend[at + 1] else b""
 
 
 def _restoring(file: File, of: int, target: bytes) -> Callable[[], bytes]:

@@ -19,7 +19,7 @@ from mcz.codecs.contract import LiveDecoder
 from mcz.codecs.known_answers import check_known_answer
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, Chunk, ChunkType, build_foot
-from mcz.container.directory import ClipRow, signal_rows
+from mcz.container.directory import ClipRow
 from mcz.container.masks import parse_mask
 from mcz.container.packets import FRAME
 from mcz.container.reader import Container
@@ -61,9 +61,7 @@ def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
     if not fields.name or not fields.signals:
         raise FormatError("a clip without a name or a signal", where=f"chunk {chunk.label}")
     check_roles(fields.signals, f"chunk {chunk.label}")
-    rate = fields.rate_numerator, fields.rate_denominator
-    rows = signal_rows(fields, chunk.label)
-    return ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, rows, chunk)
+    return ClipRow.of(fields, chunk)
 
 
 def begin(head: bytes, shared: Shared, row: ClipRow, fields: payloads.Clip) -> ClipState | None:

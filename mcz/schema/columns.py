@@ -22,8 +22,8 @@ from mcz.schema.varints import MAX_COUNT, varint
 R = TypeVar("R", bound=Record)
 Numbers: TypeAlias = NDArray[np.int64]
 Column: TypeAlias = Numbers | list[bytes] | list[str]
-
-Values: TypeAlias = Sequence[int] | Sequence[bytes] | Sequence[str] | Numbers
+Item: TypeAlias = int | bytes | str
+Row: TypeAlias = tuple[Item, ...]
 
 MOST_BYTES = 8  # of a varint
 
@@ -35,10 +35,12 @@ class Table(Sequence[R], Generic[R]):
         self.record, self.columns, self.n_rows = record, columns, count
 
     @classmethod
-    def of(cls, record: type[R], **columns: Values) -> Table[R]:
-        """The table of these columns, numbers as whatever NumPy makes an array of."""
-        made = {name: _as_column(values) for name, values in columns.items()}
-        return cls(record, made, len(next(iter(made.values()))))
+    def of(cls, record: type[R], rows: Sequence[Row]) -> Table[R]:
+        """The table of rows, each of which has the values of the fields in their order."""
+        names = [name for name, _ in cast(RecordType, as_construct(record)).rows]
+        columns = zip(*rows, strict=True) if rows else [()] * len(names)
+        made = {name: _as_column(values) for name, values in zip(names, columns, strict=True)}
+        return cls(record, made, len(rows))
 
     def numbers(self, name: str) -> Numbers:
         """The column of a field of numbers."""
@@ -67,9 +69,12 @@ class Table(Sequence[R], Generic[R]):
             raise IndexError(index)
         return self.record(**{name: _item(values[index]) for name, values in self.columns.items()})
 
+    def rows(self) -> list[Row]:
+        """The values of the fields of each record."""
+        return list(zip(*map(_list, self.columns.values()), strict=True))
+
     def __iter__(self) -> Iterator[R]:
-        lists = [v.tolist() if isinstance(v, np.ndarray) else v for v in self.columns.values()]
-        for values in zip(*lists, strict=True):
+        for values in self.rows():
             yield self.record(**dict(zip(self.columns, values, strict=True)))
 
     def __eq__(self, other: object) -> bool:
@@ -78,13 +83,13 @@ class Table(Sequence[R], Generic[R]):
     __hash__ = None  # type: ignore[assignment]
 
 
-def _as_column(values: Values) -> Column:
-    if isinstance(values, list) and values and not isinstance(values[0], int):
-        return cast(Column, values)
+def _as_column(values: Sequence[Item]) -> Column:
+    if values and isinstance(values[0], bytes | str):
+        return cast(Column, list(values))
     return np.asarray(values, np.int64)
 
 
-def _item(value: np.int64 | bytes | str) -> int | bytes | str:
+def _item(value: np.int64 | bytes | str) -> Item:
     return int(value) if isinstance(value, np.integer) else value
 
 
@@ -237,6 +242,4 @@ def build_column(kind: construct.Construct, values: Column) -> bytes:
     return build_varints(cast(Numbers, values))
 
 
-def columns(record: type[Record]) -> Columns:
-    """A varint count of records, then a column for each of their fields."""
-    return Columns(record)
+columns = Columns  # as the fields of records have it

@@ -196,16 +196,6 @@ class Optional(construct.Adapter):
         return f"({self.subcon._compileparse(code)} or [None])[0]"
 
 
-def counted(item: Kind, most: int = MAX_COUNT, kind: str = "") -> Counted:
-    """A varint count of at most ``most``, then that many items, each of a type or a record."""
-    return Counted(item, most, kind)
-
-
-def optional(item: Kind) -> Optional:
-    """A count of 0 or 1, then that many items: None, or the value."""
-    return Optional(item)
-
-
 def only_if(condition: object, item: Kind) -> Construct:
     """An item that is there only where the condition holds: None, or the value."""
     return construct.If(condition, as_construct(item))
@@ -252,6 +242,7 @@ def _write(stream: BinaryIO, data: bytes, path: str) -> None:
     stream_write(stream, data, len(data), path)
 
 
+counted, optional = Counted, Optional  # as the fields of records have them
 UVARINT = Varint()
 SVARINT = Adapted(UVARINT, lambda n: n >> 1 ^ -(n & 1), lambda n: 2 * n if n >= 0 else -2 * n - 1)
 SIZED = Sized()

@@ -110,12 +110,12 @@ def write_plan(
     has the last word on it. ``copy`` decodes the clip before it ends.
     """
     motion, codec = plan.motion, plan.codec
-    record, n_channels = _referred(writer, plan), [s.n_channels for s in motion.signals]
+    record = _referred(writer, plan)
     copy = copy or ClipCopy(writer.profile)
     for model in plan.models:
         copy.writer.shared(ChunkType.MODL, model)
     for each in (writer, copy.writer):
-        each.begin_clip(record, n_channels)
+        each.begin_clip(record)
     for index, signal in enumerate(plan.signals):
         _write_signal((writer, copy), motion, index, signal, progress)
     decoded = copy.decoded(motion, plan.signals)
@@ -139,7 +139,7 @@ def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> No
     record = _referred(writer, plan)
     record.flags |= payloads.OPEN_CLIP
     put_time_base(record, time_base_of(np.array([first_number], np.int64), None))
-    writer.begin_clip(record, [plan.motion.signals[0].n_channels])
+    writer.begin_clip(record)
 
 
 def _referred(writer: Writer, plan: ClipPlan) -> payloads.Clip:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from mcz.container import copy_records
+from mcz.container import payloads
 from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
 from mcz.container.copies import Copy
 from mcz.schema import deflate, varint
@@ -39,4 +39,4 @@ def payload_of(content: bytes, *, size: int | None = None, stored: bool = False)
     data = content if stored else deflate(content)
     stated = len(content) if size is None else size
     fields = {"flags": int(not stored), "size": stated, "data": data}
-    return built(copy_records.Copy, fields, "COPY")
+    return built(payloads.Copy, fields, "COPY")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from mcz.container import copy_records, payloads
+from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.metadata import Record
 from mcz.motion import Motion
@@ -48,7 +48,7 @@ def extended(*motions: Motion) -> bytes:
     records = metadata.meta_of([Record(motions[0].name, {"place": "here"})])
     crafter.ancillary(ChunkType.META, more(payloads.Meta, "")(records))
     content = copies.content_of(copies.copies_of(crafter), crafter.offset)
-    copied = more(copy_records.Copy, "")(copies.payload_of(content))
+    copied = more(payloads.Copy, "")(copies.payload_of(content))
     crafter.ancillary(ChunkType.COPY, copied, safe_to_copy=False)
     return finished(crafter)
 

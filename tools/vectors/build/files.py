@@ -18,7 +18,6 @@ from mcz.codecs import bitstream, by_name, raw
 from mcz.codecs.contract import Codec, Request, Span, model_finder
 from mcz.container import index_records, payloads
 from mcz.container.chunks import (
-    FRAMING,
     HEADER,
     REPEATED,
     SIGNATURE,
@@ -30,8 +29,8 @@ from mcz.container.chunks import (
     parse_header,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
-from mcz.container.index import index_record, previous_of
-from mcz.container.index_reader import place_of
+from mcz.container.index import index_record
+from mcz.container.index_reader import named, place_of
 from mcz.container.limits import BASE, Profile
 from mcz.container.packets import (
     CHECK_SIZE,
@@ -308,9 +307,7 @@ class Crafter(Writer):
             chunk = self.edited("INDX_frame", self._index_chunk())
             start, length = self.offset, len(chunk)
             if self.continued:
-                place = Chunk(b"INDX", ChunkFlag.ANCILLARY, start, length - FRAMING)
-                crc = int.from_bytes(chunk[-4:], "little")
-                self.directory.indexes += (place_of(place, crc, 0, self.directory),)
+                self.directory.indexes += (place_of(named(chunk, start), 0, self.directory),)
             self._write(chunk)
         self._write(self.edited("FOOT", build_foot(start, length)))
 
@@ -321,7 +318,7 @@ class Crafter(Writer):
         content = built(index_records.Index, fields, "INDX")
         packed = {"size": len(content), "data": deflate(content)}
         if since is not None:
-            packed |= {"flags": index_records.CONTINUES, "previous": previous_of(since)}
+            packed |= {"flags": index_records.CONTINUES, "previous": since.chunk}
         payload = self.edited("INDX", built(index_records.Indx, packed, "INDX"))
         return build_chunk(b"INDX", payload, ChunkFlag.ANCILLARY)
 

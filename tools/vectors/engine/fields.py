@@ -13,7 +13,7 @@ from mcz.codecs.posewave.header import PosewaveHeader
 from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.codecs.wavelet.shared import WaveletHeader
-from mcz.container import copy_records, index_records, note_records, payloads
+from mcz.container import index_records, note_records, payloads
 from mcz.container.index_records import Index
 from mcz.container.packed import decoded, words
 from mcz.formats import notes
@@ -43,7 +43,7 @@ SCHEMAS: dict[str, Any] = {
     "ALIA": payloads.Alia,
     "CLIP": payloads.Clip,
     "CEND": payloads.Cend,
-    "COPY": copy_records.Copy,
+    "COPY": payloads.Copy,
     "META": payloads.Meta,
     "QUAL": payloads.Qual,
     "INDX": index_records.Indx,
@@ -91,12 +91,12 @@ def _with_copied(payload: bytes, content: bytes) -> bytes:
 class CopiedChunks(Record):
     """The content of a COPY as a list."""
 
-    copies: list[copy_records.CopiedChunk] = field(counted(copy_records.CopiedChunk), "the copies")
+    copies: list[payloads.CopiedChunk] = field(counted(payloads.CopiedChunk), "the copies")
 
 
 def _copy_list(payload: bytes) -> bytes:
     content = _copied(payload)
-    return varint(len(parse_all(copy_records.CopiedChunk, content, "COPY"))) + content
+    return varint(len(parse_all(payloads.CopiedChunk, content, "COPY"))) + content
 
 
 def _with_copy_list(payload: bytes, content: bytes) -> bytes:
