@@ -80,12 +80,12 @@ if TYPE_CHECKING:
         velocities,
     )
     from mcz.reading.clip import Clip
+    from mcz.reading.faults import Problem, verify
     from mcz.reading.file import Attachment, File, open
     from mcz.reading.post_filtering import post_filter
     from mcz.reading.read import read
-    from mcz.reading.recording import Event, ForcePlatform, Recording, recording
-    from mcz.reading.report import Problem, verify
     from mcz.reading.source_files import read_skeleton
+    from mcz.reading.source_info import Event, ForcePlatform, Recording, recording
     from mcz.retargeting.joint_maps import joint_map
     from mcz.retargeting.mirroring import mirror
     from mcz.retargeting.offsets import with_offsets
@@ -94,8 +94,7 @@ if TYPE_CHECKING:
     from mcz.retargeting.selection import select
     from mcz.tables import to_pandas, to_xarray
     from mcz.viewing.showing import View, view
-    from mcz.writing.file import encode, write
-    from mcz.writing.npz import to_npz
+    from mcz.writing.file import encode, to_npz, write
 
 __version__ = _version.VERSION
 
@@ -109,7 +108,6 @@ _HOMES = {
     "mcz.editing.describing": ("set_metadata", "set_rate"),
     "mcz.editing.exporting": ("export",),
     "mcz.tables": ("to_pandas", "to_xarray"),
-    "mcz.writing.npz": ("to_npz",),
     "mcz.datasets": ("Dataset", "Window", "dataset"),
     "mcz.editing.archive": ("append", "pack"),
     "mcz.editing.unpacking": ("unpack",),
@@ -148,8 +146,8 @@ _HOMES = {
     "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.reading.file": ("Attachment", "File", "open"),
     "mcz.reading.read": ("read",),
-    "mcz.reading.recording": ("Event", "ForcePlatform", "Recording", "recording"),
-    "mcz.writing.file": ("encode", "write"),
+    "mcz.reading.source_info": ("Event", "ForcePlatform", "Recording", "recording"),
+    "mcz.writing.file": ("encode", "to_npz", "write"),
     "mcz.reading.post_filtering": ("post_filter",),
     "mcz.kinematics.marker_motion": ("in_positions",),
     "mcz.live.strict_reader": ("live_frames",),
@@ -168,7 +166,7 @@ _HOMES = {
     "mcz.pictures.plotting": ("Plotted", "plot"),
     "mcz.pictures.rendering": ("Rendered", "render"),
     "mcz.kinematics.contacts": ("Contact", "Contacts", "contacts"),
-    "mcz.reading.report": ("Problem", "verify"),
+    "mcz.reading.faults": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.reading.source_files": ("read_skeleton",),

@@ -24,7 +24,7 @@ from mcz.container.source import open_source
 from mcz.container.value_hash import canonical
 from mcz.container.writer import Writer
 from mcz.motion import Signal
-from mcz.reading.report import validate
+from mcz.reading.faults import validate
 from mcz.schema import EXTENDED, parse
 from mcz.writing.clip_writer import write_clip
 from tests import overlap_codec

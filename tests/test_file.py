@@ -18,8 +18,9 @@ from mcz.annexes import annex_bytes
 from mcz.container.scan import scan
 from mcz.container.value_hash import canonical
 from mcz.numbers import Grid, GridKind
-from mcz.reading.report import info, validate
-from mcz.writing.names import METADATA_KEYS
+from mcz.reading.faults import validate
+from mcz.reading.report import info
+from mcz.writing.draft import METADATA_KEYS
 from tests.motions import motions, skeleton, smooth, written
 
 

@@ -15,8 +15,9 @@ from mcz import File, FormatError, OptionError
 from mcz.codecs import CODECS, by_name
 from mcz.container.writer import Writer
 from mcz.queries import Query
+from mcz.reading.faults import part_problems
 from mcz.reading.fields import FIELDS
-from mcz.reading.report import info, part_problems
+from mcz.reading.report import info
 from mcz.schema import parse_until
 from mcz.writing.clip_writer import write_clip
 from tests import live_codec

@@ -22,7 +22,7 @@ from mcz import jobs
 from mcz.editing import coded_parts
 from mcz.jobs.pool import Pool
 from mcz.reading import sharing
-from mcz.reading.report import validate
+from mcz.reading.faults import validate
 from mcz.sample import write_samples
 from tests.commands import run
 from tests.worker_functions import dies, dies_once, fails, joined

@@ -36,8 +36,9 @@ from mcz.container.writer import Writer
 from mcz.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.live.strict_reader import live_frames
 from mcz.live.writer import LiveWriter
-from mcz.reading.report import info, layout
-from mcz.reading.sizes import packet_framing
+from mcz.reading.fields import packet_framing
+from mcz.reading.report import info
+from mcz.reading.sizes import layout
 from mcz.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth

@@ -26,8 +26,8 @@ from mcz.pictures.chart_pages import STYLE, ChartPage, Sheet
 from mcz.pictures.charts import MOST_POINTS, number, thinned
 from mcz.pictures.error_charts import errors_between
 from mcz.pictures.plotting import KINDS
-from mcz.reading.report import info, layout
-from mcz.reading.shares import byte_shares
+from mcz.reading.report import info
+from mcz.reading.sizes import byte_shares, layout
 from tests.commands import run
 from tests.motions import motions, smooth
 from tests.test_render import HOSTILE

@@ -1,4 +1,4 @@
-"""The post filter: as SPEC.md writes it, at once, row by row, of motions, and its vectors."""
+"""The post filter: as SPEC.md writes it, at once, row by row, of motions."""
 
 from __future__ import annotations
 
@@ -209,6 +209,3 @@ def test_resolutions_are_filtered_before_they_are_thinned() -> None:
         made = filtered_motion(clip, (4, 40), 2, decimate=True)
         assert same(made.values, meant.values[4:40:4])
         assert made.frame_rate == 30
-
-
-# Vectors

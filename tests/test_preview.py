@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
+from mcz.cli.parts import preview_motion
 from mcz.errors import OptionError
 from mcz.motion import Motion, Signal
-from mcz.reading.preview_motion import preview_motion
 from mcz.reading.signal_info import SignalInfo
 from tests import overlap_codec
 from tests.commands import run

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Motion, Skeleton, sample
 from mcz.kinematics import point_names
-from mcz.reading.quality_joints import with_indices, with_names
+from mcz.reading.stored_clip import with_indices, with_names
 from tests.commands import run
 from tests.motions import smooth
 

@@ -15,7 +15,7 @@ from mcz.codecs import by_name
 from mcz.container.writer import Writer
 from mcz.editing.recoding import recorded_options
 from mcz.errors import OptionError
-from mcz.writing.prepare import prepare
+from mcz.writing.planning import prepare
 from mcz.writing.tuning import write_motion
 from tests.commands import run
 from tests.motions import smooth

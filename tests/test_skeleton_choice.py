@@ -13,8 +13,8 @@ import pytest
 
 import mcz
 from mcz import SkeletonWarning, SourceError
-from mcz.reading.source_options import SourceOptions
-from mcz.writing.options import EncodingOptions
+from mcz.reading.source_files import SourceOptions
+from mcz.writing.entry import EncodingOptions
 from tests.commands import Call
 from tests.live_codec import encode_live
 

@@ -15,7 +15,7 @@ from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Si
 from mcz.kinematics import origins_of, shell_points_of
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.scaling import Scaling
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth, stored
 from tests.skeletons import skeletons, values_for

@@ -11,8 +11,9 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.reading.report import info, layout, validate
-from mcz.reading.source_report import source_info
+from mcz.reading.faults import validate
+from mcz.reading.report import info, source_info
+from mcz.reading.sizes import layout
 from tests.motions import smooth
 
 

@@ -63,7 +63,7 @@ def test_worked_example_is_the_smallest_clip() -> None:
     with mcz.open(data) as file:
         clip = file.clips["a"]
         assert clip.read().tolist() == [[1.5], [-2.0]]
-        from mcz.reading.report import validate
+        from mcz.reading.faults import validate
 
         assert validate(file) == []
 

@@ -41,7 +41,8 @@ from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.container.source import open_source
 from mcz.live.concealment import LiveFrame
 from mcz.live.reader_with_losses import MOST_MADE_UP
-from mcz.reading.report import info, layout
+from mcz.reading.report import info
+from mcz.reading.sizes import layout
 from mcz.schema import build, parse
 from tests import live_codec
 from tests.clocked_files import bvh

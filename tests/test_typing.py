@@ -29,7 +29,7 @@ SEEN = """
 6: Revealed type is "numpy.ndarray[tuple[Any, ...], numpy.dtype[numpy.float64 | numpy.int64]]"
 7: Revealed type is "numpy.ndarray[tuple[Any, ...], numpy.dtype[numpy.floating[Any]]]"
 8: Revealed type is "mcz.motion.Motion"
-9: "Clip" has no attribute "positons"
+9: "Clip" has no attribute "positons"; maybe "positions"?
 10: Module has no attribute "positons"; maybe "positions"?
 12: Revealed type is "dict[str, numpy.ndarray[tuple[Any, ...], numpy.dtype[numpy.floating[Any]]]]"
 13: Incompatible types in assignment

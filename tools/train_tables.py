@@ -39,7 +39,7 @@ from mcz.codecs.wavelet import mrdwt
 from mcz.codecs.wavelet import streams as wavelet_streams
 from mcz.coding import residuals
 from mcz.motion import Motion
-from mcz.writing.prepare import prepare
+from mcz.writing.planning import prepare
 from mcz.writing.signal_source import MemorySource
 from tools.start_tables import Kept, table, untrained
 

@@ -15,7 +15,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.extras import import_extra
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
-from mcz.reading.recording import ANALOG, recording
+from mcz.reading.source_info import ANALOG, recording
 
 if TYPE_CHECKING:
     from ezc3d import c3d

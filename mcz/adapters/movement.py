@@ -14,7 +14,7 @@ from mcz.extras import import_extra
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.numbers import Grid, GridKind
 from mcz.poses import point_names, positions
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.skeleton import AXES
 from mcz.types import JsonObject, Reals, Values
 from mcz.units import UNIT_CM

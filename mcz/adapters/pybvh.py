@@ -24,7 +24,7 @@ from mcz.motion import (
     Skeleton,
     check_poses,
 )
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 
 if TYPE_CHECKING:
     from pybvh import Bvh

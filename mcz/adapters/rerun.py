@@ -20,7 +20,7 @@ from mcz.pictures.bodies import LEFT, MIDDLE, RIGHT, body_of
 from mcz.poses import point_names
 from mcz.poses.moving import Moving, scale_to, values_of
 from mcz.reading.clip import Clip
-from mcz.reading.recording import recording as recording_of
+from mcz.reading.source_info import recording as recording_of
 from mcz.tables.files import channel_names, channel_units
 
 if TYPE_CHECKING:

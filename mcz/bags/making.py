@@ -27,7 +27,7 @@ from mcz.errors import (
     OptionError,
     reason_of,
 )
-from mcz.reading.quick_check import quick_check
+from mcz.reading.faults import quick_check
 
 SUFFIX = ".mcz"
 OXUM = "Payload-Oxum"  # bytes and files of the payload, which we count ourselves

@@ -17,12 +17,11 @@ from mcz.formats import format_of
 from mcz.kinematics import SHELL_CM
 from mcz.metrics.comparison import NO_CONTACTS
 from mcz.motion import Motion
-from mcz.reading.ratios import clip_ratios
-from mcz.reading.sizes import clip_sizes
+from mcz.reading.sizes import clip_ratios, clip_sizes
 from mcz.reading.source_files import read_source
 from mcz.types import JsonObject, Params
 from mcz.writing.clip_writer import file_in_memory
-from mcz.writing.prepare import prepare
+from mcz.writing.planning import prepare
 from mcz.writing.signal_source import MemorySource
 
 Record = JsonObject

@@ -49,7 +49,7 @@ def deliver(
 
     What stands in the way of one of them is found before the first is written.
     """
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     file = given[0]
     inputs = [sys.stdin if path == "-" else path for path in given]

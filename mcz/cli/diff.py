@@ -153,7 +153,7 @@ class _Wanted:
 
     def told(self, motion: Motion) -> Motion:
         """``motion`` with what it does not say itself."""
-        from mcz.reading.source_options import SourceOptions
+        from mcz.reading.source_files import SourceOptions
 
         said = SourceOptions(rate=self.rate, unit=self.unit, up=self.up)
         return said.completing(motion)
@@ -194,7 +194,7 @@ class _Side:
     def load(self, name: str | None) -> _Loaded:
         """The motion called ``name``, or the only one, cut to the frames that are wanted."""
         import mcz
-        from mcz.reading.ratios import clip_ratios
+        from mcz.reading.sizes import clip_ratios
 
         frames = self._wanted.frames
         with about(self.path):

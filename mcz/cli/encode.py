@@ -39,7 +39,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
-    from mcz.writing.written import Written
+    from mcz.writing.file import Written
 
 
 @click.command(short_help="A .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv or .npz file to .mcz.")
@@ -108,7 +108,7 @@ def _encode_piped(
 ) -> Exit:
     from mcz.cli.piped import encode_lines, stored
     from mcz.live.text_writer import codes_live
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     if options["codec"] is not None and codes_live(options["codec"], options["params"] or {}):
@@ -133,7 +133,7 @@ def _encode_file(
     **options: Any,
 ) -> Exit:
     import mcz
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     if output == "-":
         refuse_inputs(sys.stdout, (source, skeleton))

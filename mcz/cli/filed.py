@@ -22,7 +22,7 @@ class Filed:
     """A report at ``path``, which must be new unless ``force``; raises Failure at once."""
 
     def __init__(self, path: str, date: str | None, force: bool, inputs: Sequence[str]) -> None:
-        from mcz.writing.inputs import refuse_inputs
+        from mcz.writing.atomic import refuse_inputs
 
         self.path, self.force = Path(path), force
         if self.path.suffix.lower() not in SUFFIXES:

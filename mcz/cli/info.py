@@ -46,8 +46,8 @@ from mcz.errors import FormatError, MczError
 from mcz.types import JsonObject
 
 if TYPE_CHECKING:
+    from mcz.reading.faults import Problem
     from mcz.reading.file import File
-    from mcz.reading.quick_check import Problem
 
 FEW = 4  # clips that are shown in full; more are shown as a table
 WIDEST = 200  # characters that are shown of a value of metadata
@@ -97,8 +97,9 @@ def command(
     Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .npy, .npz) it shows the
     skeleton and the clip.
     """
-    from mcz.reading import report
     from mcz.reading.file import is_source
+    from mcz.reading.report import info
+    from mcz.reading.sizes import layout
 
     if is_source(file) and not (show_layout or check):
         if where is not None:
@@ -113,9 +114,9 @@ def command(
         return _validate(file, max_decoded, as_json)
     with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if show_layout:
-            parts = report.layout(held)
+            parts = layout(held)
         else:
-            document = report.info(held, clips or None, where)
+            document = info(held, clips or None, where)
             _add_previews(held, document, as_json, preview)
         damage = list(held.damage)
     if show_layout:
@@ -147,7 +148,7 @@ def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) ->
     import mcz
     from mcz.cli.previews import motion_of
     from mcz.cli.source_text import source_lines
-    from mcz.reading.source_report import source_info
+    from mcz.reading.report import source_info
 
     existing(file)
     with about(file):
@@ -163,17 +164,17 @@ def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) ->
 
 
 def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
-    from mcz.reading import report
+    from mcz.reading.faults import Problem, validate
 
     size = 0
     try:
         with opened(file, max_decoded=max_decoded) as held:
-            size, problems = held.size, report.validate(held)
+            size, problems = held.size, validate(held)
     except FormatError as error:
         if not is_unsound(error):
             raise
         text = error.describe(OPTION_HINTS, with_path=False)
-        problems = [report.Problem(error.offset or 0, "Strict reading", text)]
+        problems = [Problem(error.offset or 0, "Strict reading", text)]
     return _say_problems(file, size, problems, as_json)
 
 

@@ -127,7 +127,7 @@ def command(
     said = dict.fromkeys(removed) | pairs
     changes, unknown = _changes(file, clips, where, of_file, said, rows)
     if unknown:
-        from mcz.reading.names import listed
+        from mcz.reading.clips import listed
 
         say(f"{table}: no clip for {plural(len(unknown), 'row')}: {listed(unknown)}")
     return _set(file, changes, rate, (clips, where, force), purge, as_json)

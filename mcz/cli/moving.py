@@ -62,7 +62,7 @@ def moving_of(
     """
     import mcz
     from mcz.reading.file import is_mcz
-    from mcz.reading.source_options import SourceOptions
+    from mcz.reading.source_files import SourceOptions
 
     if path == "-" or is_mcz(path):
         with opened(path, max_decoded=max_decoded) as file, about(path):

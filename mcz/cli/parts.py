@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mcz.clock import Timeline
     from mcz.motion import Motion
     from mcz.reading.clip import Clip
-    from mcz.reading.recording import Event
+    from mcz.reading.source_info import Event
     from mcz.tables.files import Table
 
 Masked = tuple[Values, NDArray[np.bool_] | None]
@@ -148,8 +148,6 @@ class Preview(Part):
     """The frames of a clip that can be read without decoding the rest."""
 
     def motion(self) -> Motion:
-        from mcz.reading.preview_motion import preview_motion
-
         return preview_motion(self.clip)
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
@@ -166,6 +164,44 @@ class Preview(Part):
             rate / found.step if rate is not None and found.is_regular else None,
             times=None if timeline is None else timeline.times[found.frames],
         )
+
+
+def preview_motion(clip: Clip) -> Motion:
+    """The preview as a motion at a lower frame rate, without the further signals and the source.
+
+    A last frame that is nearer to the one before is left out.
+    """
+    from mcz.clock import Timeline
+    from mcz.motion import Motion, Signal
+
+    found = clip.previewed()
+    gaps = np.diff(found.frames)
+    n_frames = len(found.frames) - int(len(gaps) > 0 and gaps[-1] != found.step)
+    info, rate = clip.signals[0], clip.frame_rate
+    n_rows = n_frames * info.layout.samples_per_frame
+    signal = Signal(
+        values=found.values[:n_rows],
+        grids=info.grids,
+        name=info.name,
+        samples_per_frame=info.layout.samples_per_frame,
+        mask=None if found.mask is None else found.mask[:n_rows],
+        channels=info.channels,
+        role=info.role if info.of is None else "",
+    )
+    frames, timeline = found.frames[:n_frames], clip.timeline
+    motion = Motion(
+        skeleton=clip.skeleton,
+        signals=(signal,),
+        frame_rate=None if rate is None else rate / found.step,
+        frame_rate_exact=clip.frame_rate_exact,
+        name=clip.name,
+        metadata=clip.metadata,
+        frame_numbers=clip.frame_numbers[frames],
+        number_step=found.step,
+    )
+    if timeline is not None:
+        timeline = Timeline(timeline.times[frames], motion.frame_rate, timeline.rounding)
+    return motion.at_times(timeline)
 
 
 def _floats(values: Values) -> NDArray[np.float64]:

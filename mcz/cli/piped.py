@@ -103,8 +103,8 @@ def encode_lines(
 ) -> None:
     """Encode standard input frame by frame to ``target``, - or None being standard output."""
     from mcz.live.text_writer import begin_live
-    from mcz.reading.source_options import SourceOptions
-    from mcz.writing.options import encoding_options
+    from mcz.reading.source_files import SourceOptions
+    from mcz.writing.entry import encoding_options
 
     options["profile"] = options["profile"] != "base"
     for name in ("verbatim", "profile", "copies", "effort"):

@@ -86,7 +86,7 @@ def command(
     rate-distortion at a few settings of lossy codecs. It needs pip install 'mcz[plot]'.
     """
     import mcz
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     if "-" in (file, other) and output is None:
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)

@@ -24,7 +24,7 @@ MOST_BARS = 8
 
 def preview_of(clip: Clip) -> JsonObject:
     """The keys of a clip's preview; ``motion`` is None where there is none."""
-    from mcz.reading.shares import byte_shares
+    from mcz.reading.sizes import byte_shares
 
     shares = [
         {"signal": s.signal, "joints": s.name, "resolution": s.resolution, "bytes": s.n_bytes}
@@ -91,7 +91,7 @@ def bar(share: float, blocks: bool | None = None) -> str:
 def bars_of(payload: Sequence[JsonObject]) -> tuple[list[Bar], list[Bar]]:
     """What the bars are of, and the rest: the joints that take most, or of one group its
     resolutions."""
-    from mcz.reading.shares import Share, by_group
+    from mcz.reading.sizes import Share, by_group
 
     groups = by_group(
         Share(of["signal"], None, of["joints"], of["resolution"], of["bytes"]) for of in payload

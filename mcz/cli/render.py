@@ -91,7 +91,7 @@ def command(
     length, left and right have colors of their own. It needs pip install 'mcz[render]'.
     """
     import mcz
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     if file == "-" and output is None:
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)

@@ -78,7 +78,7 @@ def command(
     else. IN.mcz itself is changed by --in-place alone.
     """
     import mcz
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     if in_place == (output is not None):
         raise Failure("name OUT.mcz, or say --in-place to change IN.mcz itself", Exit.USAGE)

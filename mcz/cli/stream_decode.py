@@ -98,7 +98,7 @@ def command(
     if rate is not None and not post_filter:
         raise Failure("--rate needs --post-filter", Exit.USAGE)
     from mcz.live.generators import stream_decode
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     if connect is None:
         refuse_inputs(sys.stdout, (sys.stdin if file == "-" else file,))

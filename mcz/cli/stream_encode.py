@@ -105,7 +105,7 @@ def command(
     A bad row or one that is cut off aborts the stream: all frames before it are sent, and no end.
     Standard error says at the end what the stream took, framing included.
     """
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     if listen is not None and output is not None:
         raise Failure("-o and --listen exclude each other", Exit.USAGE)

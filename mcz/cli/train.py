@@ -102,7 +102,7 @@ def command(
     integers, as SPEC.md, "Bases", has them.
     """
     from mcz.training import Recipe, train
-    from mcz.writing.inputs import refuse_inputs
+    from mcz.writing.atomic import refuse_inputs
 
     refuse_inputs(output, clips)
     check_new(output, force)

@@ -185,7 +185,7 @@ def _fully(
 
 def _quickly(file: str, filed: Filed | None) -> tuple[list[JsonObject], str]:
     """One row, that of the checksums; and what was seen."""
-    from mcz.reading.quick_check import quick_check
+    from mcz.reading.faults import quick_check
 
     target = given(file)
     with about(file), Progress() as progress:
@@ -214,13 +214,13 @@ def is_unsound(error: MczError) -> bool:
 
 
 def _parts(held: File, where: str | None, progress: Progress) -> Iterator[JsonObject]:
-    from mcz.reading import report
+    from mcz.reading.faults import part_problems, structure_problems
 
     clips = None if where is None else held.chosen(where=where)
     total = 1 + len(held.clips if clips is None else clips) + len(held.attachments)
-    problems = report.structure_problems(held)
+    problems = structure_problems(held)
     yield _row("structure", "", [in_options(problem.message) for problem in problems])
-    for done, (kind, name, found) in enumerate(report.part_problems(held, clips)):
+    for done, (kind, name, found) in enumerate(part_problems(held, clips)):
         progress(min(done, total), total, name)
         yield _row(kind, name, [in_options(problem.message) for problem in found])
 

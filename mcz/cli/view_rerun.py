@@ -150,6 +150,6 @@ def _told(clip: Clip, options: Settings) -> Clip | Motion:
     said = [options[fact] for fact in FACTS]
     if not any(there and fact is not None for there, fact in zip(unknown, said, strict=True)):
         return clip
-    from mcz.reading.source_options import SourceOptions
+    from mcz.reading.source_files import SourceOptions
 
     return SourceOptions(**{fact: options[fact] for fact in FACTS}).completing(clip.motion())

@@ -18,7 +18,7 @@ from mcz.formats import FORMATS
 from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.motion import Motion
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 
 __all__ = [
     "TARGETS",

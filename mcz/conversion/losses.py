@@ -14,7 +14,7 @@ from mcz.formats.table_signals import text_columns
 from mcz.kinematics import point_set
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion
-from mcz.reading.recording import Recording, recording
+from mcz.reading.source_info import Recording, recording
 
 MOST_NAMES = 8
 POINTS = ("c3d", "trc")  # what becomes of joints are points

@@ -17,12 +17,11 @@ from mcz.editing.folders import NO_MOTION, motion_files
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.jobs import Answer
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
 from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry
-from mcz.writing.options import WritingOptions, encoding_options
+from mcz.writing.entry import Entry, WritingOptions, encoding_options
 
 
 def pack(

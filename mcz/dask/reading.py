@@ -8,11 +8,11 @@ from typing import TypeVar
 from mcz.dask.cluster import Cluster, connected
 from mcz.errors import OptionError
 from mcz.jobs import using
-from mcz.reading import report
+from mcz.reading import faults
 from mcz.reading.clip import Clip
+from mcz.reading.faults import Problem
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
-from mcz.reading.report import Problem
 from mcz.reading.sharing import can_be_shared, shared_out
 from mcz.types import Target
 
@@ -32,7 +32,7 @@ def verify(
     ``mcz.verify``, and WorkerError where machines are lost.
     """
     with connected(client) as used, using(Cluster(used)):
-        return report.verify(target, max_decoded=max_decoded, where=where)
+        return faults.verify(target, max_decoded=max_decoded, where=where)
 
 
 def map_clips(

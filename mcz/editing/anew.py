@@ -16,7 +16,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
-from mcz.reading.source_rates import stating_rate
+from mcz.reading.source_info import stating_rate
 from mcz.types import Settings
 
 OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may not be there

@@ -33,14 +33,11 @@ from mcz.errors import MczError, OptionError, SourceError, remark_of
 from mcz.formats import wants_skeleton
 from mcz.hints import split_hint
 from mcz.reading.file import File
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.types import Params, Progress, Target
-from mcz.writing.atomic import replacing
-from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry
-from mcz.writing.inputs import refuse_inputs
-from mcz.writing.names import check_name
-from mcz.writing.options import WritingOptions, encoding_options
+from mcz.writing.atomic import refuse_inputs, replacing
+from mcz.writing.draft import Draft, check_name
+from mcz.writing.entry import Entry, WritingOptions, encoding_options
 
 
 def pack(

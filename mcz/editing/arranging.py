@@ -39,11 +39,11 @@ from mcz.errors import ExistsError, OptionError
 from mcz.hints import Hint
 from mcz.queries import Value
 from mcz.reading.clip import Clip
+from mcz.reading.clips import clips_meant, listed
 from mcz.reading.fields import Where, getter_of
 from mcz.reading.file import File, open
-from mcz.reading.names import clips_meant, listed
 from mcz.types import Progress, Target
-from mcz.writing.names import check_name
+from mcz.writing.draft import check_name
 
 FOLDER = "folder"  # split by the first part of the names
 

@@ -26,11 +26,9 @@ from mcz.jobs import ONE, Answer, useful
 from mcz.jobs.pool import answers
 from mcz.reading.file import open
 from mcz.reading.sharing import only_own
-from mcz.reading.source_options import SourceOptions
-from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry
-from mcz.writing.names import check_name, clip_name
-from mcz.writing.options import EncodingOptions
+from mcz.reading.source_files import SourceOptions
+from mcz.writing.draft import Draft, check_name, clip_name
+from mcz.writing.entry import EncodingOptions, Entry
 
 
 @dataclass(frozen=True, slots=True)

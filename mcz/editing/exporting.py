@@ -19,7 +19,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.sharing import shared_out
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.tables.files import EXPORTS, table_of
 from mcz.types import JsonObject, Target
 

@@ -47,14 +47,13 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.signal_reader import SignalReader
-from mcz.reading.source_rates import stating_rate
+from mcz.reading.source_info import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing_file
-from mcz.writing.clip_check import check_values
-from mcz.writing.clip_writer import Amend
-from mcz.writing.prepare import prepare
+from mcz.writing.clip_writer import Amend, check_values
+from mcz.writing.planning import prepare
 from mcz.writing.quality import CHUNK
 from mcz.writing.tuning import write_motion
 

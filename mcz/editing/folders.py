@@ -11,7 +11,7 @@ from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, OptionError, reason_of, remark_of
 from mcz.formats import FORMATS
 from mcz.hints import Hint, Remark
-from mcz.reading.names import FEW, listed
+from mcz.reading.clips import FEW, listed
 from mcz.types import Target
 
 SNIFFED = 2**16  # bytes that tell what a file is

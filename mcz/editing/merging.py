@@ -35,8 +35,8 @@ from mcz.editing.rewriting import (
     writer_like,
 )
 from mcz.errors import OptionError
+from mcz.reading.clips import listed
 from mcz.reading.file import File, open
-from mcz.reading.names import listed
 from mcz.schema import parse
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file

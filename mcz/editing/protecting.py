@@ -22,7 +22,7 @@ from mcz.container.reader import Container
 from mcz.container.source import ByteSource
 from mcz.editing.appending import IN_MEMORY, growing
 from mcz.errors import FormatError, OptionError
-from mcz.reading.recovery_check import recovery_chunks
+from mcz.reading.faults import recovery_chunks
 from mcz.recovery.making import Step, made
 from mcz.recovery.packets import Key, read_packet
 from mcz.recovery.shape import Shape, shape_for

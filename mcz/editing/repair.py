@@ -21,8 +21,8 @@ from mcz.editing.recovering import recover
 from mcz.editing.salvage_copier import Repair as Repair
 from mcz.editing.salvaging import write_whole
 from mcz.errors import FormatError, MczError, OptionError
+from mcz.reading.faults import validate
 from mcz.reading.file import File, file_of, reached
-from mcz.reading.report import validate
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing, rereadable
 

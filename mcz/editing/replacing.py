@@ -27,11 +27,11 @@ from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, re
 from mcz.editing.rewriting import disk_path, hold
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
-from mcz.reading.quality_joints import with_indices
+from mcz.reading.stored_clip import with_indices
 from mcz.schema import parse
 from mcz.types import Progress, Target, Values
 from mcz.writing.atomic import replacing_file
-from mcz.writing.clip_check import check_values
+from mcz.writing.clip_writer import check_values
 from mcz.writing.quality import figures, texts_of
 
 RECODED = "edit-recoded"

@@ -21,7 +21,7 @@ from mcz.editing.extraction import Copier, Copying
 from mcz.editing.recovering import Recovery
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
-from mcz.reading.quick_check import Problem
+from mcz.reading.faults import Problem
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build
 

@@ -33,8 +33,8 @@ from mcz.editing.salvage_copier import (
 )
 from mcz.errors import FormatError, MczError, remark_of
 from mcz.reading.clip import Clip
+from mcz.reading.faults import Problem, clip_problems, validate
 from mcz.reading.file import File
-from mcz.reading.report import Problem, clip_problems, validate
 from mcz.reading.signal_reader import SignalReader
 from mcz.types import Progress
 

@@ -17,10 +17,10 @@ from mcz.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visi
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.jobs import limited
 from mcz.reading.clip import Clip
+from mcz.reading.clips import listed
 from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
-from mcz.reading.names import listed
 from mcz.reading.rate_notes import text_notes
 from mcz.reading.sharing import shared_out
 from mcz.types import Progress, Settings, Target

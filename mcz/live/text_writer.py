@@ -12,14 +12,12 @@ from mcz.formats import FORMATS, likely_formats
 from mcz.formats.line_by_line import Arriving
 from mcz.live.writer import LiveWriter
 from mcz.motion import Skeleton
-from mcz.reading.skeletons import NONE, how_given
-from mcz.reading.skeletons import NOTE as SKELETON_NOTE
-from mcz.reading.source_files import read_skeleton
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.read import NONE, how_given
+from mcz.reading.read import NOTE as SKELETON_NOTE
+from mcz.reading.source_files import SourceOptions, read_skeleton
 from mcz.types import Params
 from mcz.units import facing, in_unit
-from mcz.writing.entry import rate_notes
-from mcz.writing.options import EncodingOptions
+from mcz.writing.entry import EncodingOptions, rate_notes
 
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 

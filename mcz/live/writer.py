@@ -28,12 +28,19 @@ from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.kinematics.single import FramePositions
 from mcz.live.figures import Figures
 from mcz.motion import Motion, Signal, Skeleton
-from mcz.reading.quality_joints import with_indices
+from mcz.reading.stored_clip import with_indices
 from mcz.types import Params
 from mcz.writing.clip_writer import begin_open_clip
-from mcz.writing.names import check_metadata
-from mcz.writing.planning import asked, plan_open_clip
-from mcz.writing.prepare import Prepared, StoredSkeleton, read_with, wants_positions
+from mcz.writing.draft import check_metadata
+from mcz.writing.planning import (
+    Prepared,
+    StoredSkeleton,
+    asked,
+    plan_open_clip,
+    read_with,
+    under_its_path,
+    wants_positions,
+)
 from mcz.writing.quality import CHUNK, quality_payload, texts_of
 from mcz.writing.signal_source import MemorySource
 
@@ -124,12 +131,12 @@ class LiveWriter:
         check_metadata(metadata, name)
         self.skeleton, self._n_channels = skeleton, skeleton.n_channels
         self._positions = wants_positions(self.codec, self.options, skeleton)
-        bases, derives = read_with(skeleton, base)
+        skeletons = read_with(skeleton, None if base is None else under_its_path(base))
         coded = skeleton
         if self._positions:
-            bases, derives = (*bases, StoredSkeleton(skeleton, derives)), True
             self._placed = FramePositions(skeleton, virtual_markers=self._virtual)
             coded = marker_skeleton(skeleton, virtual_markers=self._virtual)
+            skeletons = (*skeletons, StoredSkeleton(coded, derives=True))
         signal = Signal(np.zeros((0, coded.n_channels)))
         if self._positions:
             note = metadata.get("source-note", "")
@@ -138,7 +145,7 @@ class LiveWriter:
         self._encoder, self._decoder = _coders(self.codec, motion, self.options, self._writer)
         live = self._encoder
         encoded = Encoded(live.header, iter(()), 1, live.models, (), live.version, live.preset)
-        prepared = Prepared(motion, bases, derives)
+        prepared = Prepared(motion, skeletons)
         plan = plan_open_clip(prepared, self.codec, self.options, encoded, self._writer.profile)
         begin_open_clip(self._writer, plan, first_number)
         self._is_open = True

@@ -23,10 +23,9 @@ from mcz.pictures.libraries import library
 from mcz.pictures.themes import Theme, rgb
 from mcz.reading.clip import Clip
 from mcz.reading.file import open
-from mcz.reading.shares import by_group, byte_shares
-from mcz.reading.sizes import clip_sizes
+from mcz.reading.sizes import by_group, byte_shares, clip_sizes
 from mcz.writing.clip_writer import file_in_memory
-from mcz.writing.prepare import prepare
+from mcz.writing.planning import prepare
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from mcz.pictures.error_charts import error_chart
 from mcz.pictures.rendering import Progress, checked_size
 from mcz.poses.moving import Frames, Moving, frame_range
 from mcz.reading.clip import Clip
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 
 KINDS = ("channels", "spectrum", "error", "bytes", "rate-distortion")
 CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, unless others are asked for

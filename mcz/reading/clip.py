@@ -6,10 +6,12 @@ import hashlib
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
+from mcz import poses
 from mcz.brief import shown
 from mcz.clock import (
     TIMES,
@@ -26,25 +28,31 @@ from mcz.clock import (
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
+from mcz.displays import html_of
 from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.formats import FORMATS
 from mcz.hints import Hint
+from mcz.kinematics.contacts import RULE, ContactRule, Contacts, contacts
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.reading.decimation import decimated, decimated_rows
-from mcz.reading.posing import Posed
-from mcz.reading.preview import Preview, preview
 from mcz.reading.signal_info import SignalInfo, groups_of
 from mcz.reading.signal_reader import SignalReader
-from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton
-from mcz.reading.source_rates import stating_rate
+from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton, stating_rate
 from mcz.reading.stored_clip import StoredClip
-from mcz.reading.views import ClipValues, FrameValues, Masked
+from mcz.reading.views import ClipValues, FrameValues, Masked, Preview, preview
 from mcz.skeleton import Joints, joint_list
 from mcz.types import Values
 
 
-class Clip(StoredClip, Posed):
+class Clip(StoredClip):
     """One clip; nothing is decoded before it is asked for."""
+
+    _repr_html_ = html_of
+    positions = poses.positions  # as of ``mcz``: only what they need is decoded
+    rotations = poses.rotations
+    root = poses.root
+    velocities = poses.velocities
+    accelerations = poses.accelerations
 
     def __reduce__(self) -> tuple[object, ...]:
         return _reopened, (self.container, self.name)
@@ -55,7 +63,7 @@ class Clip(StoredClip, Posed):
     @property
     def values(self) -> ClipValues:
         """The motion signal as something to slice: ``clip.values[100:200]`` decodes 100 frames."""
-        return ClipValues(self)
+        return ClipValues(self.read, self.shape)
 
     def read(
         self,
@@ -123,7 +131,6 @@ class Clip(StoredClip, Posed):
     def _check_times(
         self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None
     ) -> None:
-        """Raise FormatError where values of a signal of times are none."""
         fault = times_fault(np.where(True if mask is None else mask, values, np.nan)[:, 0])
         if fault and not self.container.salvage:  # ROLE-04
             raise FormatError(f"no times: {fault}", clip=self.name, where=f"signal {info.index}")
@@ -154,8 +161,8 @@ class Clip(StoredClip, Posed):
     def check_values(self, signal: int) -> None:
         """Decode a whole signal, a few segments in memory at a time, and compare its hash."""
         info = self._info(signal)
-        groups, digest = tuple(range(info.counts.n_groups)), ValueDigest()
-        reader = SignalReader(self.container, info, groups, 0, self.name)
+        digest = ValueDigest()
+        reader = SignalReader(self.container, info, None, 0, self.name)
         for block in reader.blocks(info.skip, info.skip + self.n_frames):
             digest.update(block.values, block.mask)
         self._compare(info, digest.digest())
@@ -227,8 +234,7 @@ class Clip(StoredClip, Posed):
     def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
         whole = (start, stop) == (0, self.n_frames)
         resolution = info.coarser(resolution)
-        groups = tuple(range(len(info.layout.groups)))
-        reader = SignalReader(self.container, info, groups, resolution, self.name)
+        reader = SignalReader(self.container, info, None, resolution, self.name)
         signal = reader.signal(start + info.skip, stop + info.skip)
         if whole and resolution == 0:
             self._check_whole(info, signal.values, signal.mask)
@@ -301,6 +307,42 @@ class Clip(StoredClip, Posed):
             self.container, info, groups, info.counts.n_resolutions - 1, self.name
         )
         return preview(reader, self.n_frames, columns)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The names of the joints, ``name#n`` where one repeats."""
+        return tuple(self.skeleton.addresses())
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The names of the points of ``positions``, in their order."""
+        return poses.point_names(self)
+
+    def to_xarray(
+        self, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
+    ) -> Any:
+        """The whole clip as an ``xarray.Dataset``: see ``mcz.to_xarray``."""
+        from mcz.tables.labelled import to_xarray
+
+        return to_xarray(self.motion(), form=form, unit=unit, dtype=dtype)
+
+    def to_pandas(
+        self,
+        what: str = "positions",
+        *,
+        joints: Joints = None,
+        unit: str | None = None,
+        flat: bool = False,
+    ) -> Any:
+        """A table of the whole clip as a ``pandas.DataFrame``: see ``mcz.to_pandas``."""
+        from mcz.tables.frames import to_pandas
+
+        return to_pandas(self.motion(), what, joints=joints, unit=unit, flat=flat)
+
+    def contacts(self, joints: Joints = None, rule: ContactRule | None = None) -> Contacts:
+        """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
+        feet = None if joints is None else joint_list(joints)
+        return contacts(self.motion(), feet, rule or RULE)
 
     def source_bytes(
         self,

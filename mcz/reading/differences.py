@@ -15,7 +15,7 @@ from mcz.formats.c3d_events import Event
 from mcz.formats.c3d_parameters import TEXT, Parameter, Parameters
 from mcz.formats.c3d_recording import parameters_of
 from mcz.motion import Motion
-from mcz.reading.recording import ForcePlatform, recording
+from mcz.reading.source_info import recording
 from mcz.types import JsonObject, Params
 
 # Parameters that say where data lie and which frames there are, which is compared by itself.
@@ -93,7 +93,6 @@ def _compared(what: str, a: Params, b: Params) -> Difference | None:
 
 
 def _facts(motion: Motion) -> dict[str, str | int | float | None]:
-    """Single things that a motion says."""
     numbers, rate, bones = motion.frame_numbers, motion.frame_rate, motion.skeleton
     return {
         "first frame": 1 if numbers is None or not len(numbers) else int(numbers[0]),
@@ -109,6 +108,7 @@ def _things(motion: Motion) -> dict[str, dict[Any, Any]]:
     """Things of which a motion may have several, by name or by what they say."""
     parameters, told = _parameters(motion), recording(motion)
     arrays = arrays_of(motion.source, [signal.name for signal in motion.signals]) or ()
+    platforms = () if told is None else told.platforms
     bones = motion.skeleton
     names = bones.addresses()
     return {
@@ -120,16 +120,12 @@ def _things(motion: Motion) -> dict[str, dict[Any, Any]]:
             s.name: (s.n_channels, s.samples_per_frame, s.channels) for s in motion.signals
         },
         "events": {} if told is None else dict(_events(told.events)),
-        "force platforms": {} if told is None else dict(_platforms(told.platforms)),
+        "force platforms": {f"platform {n}": one for n, one in enumerate(platforms, 1)},
         "groups of parameters": {group: None for group, _ in parameters},
         "parameters": parameters,
         "arrays": {str(array["name"]): array["type"] for array in arrays},
         "metadata": {k: v for k, v in motion.metadata.items() if k not in OF_READERS},
     }
-
-
-def _platforms(platforms: Iterable[ForcePlatform]) -> Iterator[tuple[str, ForcePlatform]]:
-    return ((f"platform {number}", platform) for number, platform in enumerate(platforms, 1))
 
 
 def _events(events: Iterable[Event]) -> Iterator[tuple[str, Event]]:
@@ -156,7 +152,6 @@ def _parameters(motion: Motion) -> dict[tuple[str, str], Any]:
 
 
 def _value(held: Parameters, parameter: Parameter) -> Any:
-    """Type, dimensions and values, whatever the byte order."""
     if parameter.type == TEXT:
         return parameter.type, parameter.dims, parameter.data
     return parameter.type, parameter.dims, held.numbers_of(parameter)

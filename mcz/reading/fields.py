@@ -6,20 +6,20 @@ read the CLIP or the skeleton of the clip.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 
 from mcz.brief import among
 from mcz.codecs import by_id
-from mcz.container.chunks import FRAMING, ChunkType
-from mcz.container.directory import ClipRow
+from mcz.container.chunks import FRAMING, HEADER, ChunkType
+from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.metadata import Record
 from mcz.container.metadata_keys import SAID, SPELLINGS
+from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.errors import OptionError, UnsupportedError
 from mcz.formats import format_by_id
 from mcz.queries import Query, Value
 from mcz.reading.clip import Clip
-from mcz.reading.sizes import packet_framing
 
 Where = str | Query | Callable[[Clip], bool]
 Getter = Callable[[Clip], Value]
@@ -116,7 +116,6 @@ def _frame_rate(clip: Clip) -> Value:
 
 
 def _duration(clip: Clip) -> Value:
-    """Seconds: frames over frames a second."""
     rate = clip.frame_rate
     return None if rate is None else float(clip.n_frames / rate)
 
@@ -137,6 +136,25 @@ def _bytes(clip: Clip) -> Value:
     closed = FRAMING * sum(not segment.packet for segment in row.segments)
     coded = sum(segment.size for segment in row.segments) + packet_framing(row.segments)
     return sum(chunk.size for chunk in chunks) + closed + coded
+
+
+def packet_framing(rows: Sequence[SegmentRow]) -> int:
+    """The bytes of open DATA beside the bodies of their packets; ``rows`` in file order."""
+    total = n_packets = end = 0
+    for row in rows:
+        if row.packet:
+            head = head_size(n_packets, row.size)
+            if not n_packets or row.offset - end != CHECK_SIZE + head:  # another DATA
+                total += _end_size(n_packets) + HEADER.size
+                n_packets, head = 0, head_size(0, row.size)
+            total += head + CHECK_SIZE
+            n_packets += 1
+        end = row.stop
+    return total + _end_size(n_packets)
+
+
+def _end_size(n_packets: int) -> int:
+    return head_size(n_packets, 0) + CHECK_SIZE if n_packets else 0
 
 
 def _row(clip: Clip) -> ClipRow:

@@ -32,10 +32,9 @@ from mcz.errors import (
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
-from mcz.reading.clips import Clips
+from mcz.reading.clips import Clips, listed
 from mcz.reading.fields import Where, taken
 from mcz.reading.lost_skeletons import restore_skeletons
-from mcz.reading.names import listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 from mcz.threads import checked

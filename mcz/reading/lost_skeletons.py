@@ -40,20 +40,23 @@ NAMELESS = "skeleton"  # what a skeleton is called where neither its file nor a 
 def restore_skeletons(container: Container) -> None:
     """Give a salvaged file the skeletons that clips name, that it lost, and whose ASF it has."""
     lost = _lost(container)
-    for template in list(container.directory.shared) if lost else ():
-        if template[0] == ChunkType.SRCE:
+    if not lost:
+        return
+    for (kind, id_), chunk in list(container.directory.shared.items()):
+        if kind == ChunkType.SRCE:
             with suppress(MczError):  # of another format, damaged as well, or no ASF
-                origin = f"its ASF, {container.directory.shared[template].label}"
-                _restore(container, lost, _of_asf(container, template[1], lost), origin)
-    for base in list(container.directory.shared) if lost else ():
-        if base[0] == ChunkType.SKEL:
+                made = _of_asf(container, id_, lost)
+                _restore(container, lost, made, f"its ASF, {chunk.label}")
+    for kind, id_ in list(container.directory.shared):
+        if kind == ChunkType.SKEL and lost:
             with suppress(MczError):
-                _restore(container, lost, _of_base(container, base[1]), f"SKEL {base[1].hex()}")
-    for row in list(container.directory.clips.values()) if lost else ():
+                _restore(container, lost, _of_base(container, id_), f"SKEL {id_.hex()}")
+    rows = [row for row in container.directory.clips.values() if row.skeleton in lost]
+    for row in rows:
         if row.skeleton in lost:
             with suppress(MczError):
                 _restore(container, lost, _of_clip(container, row), f"the source of {row.name!r}")
-    for row in list(container.directory.clips.values()) if lost else ():
+    for row in rows:
         if row.skeleton in lost:
             with suppress(MczError):
                 _without_joints(container, row)
@@ -95,8 +98,7 @@ def _has_its_hashes(clip: Clip, container: Container) -> bool:
             stops = [0, *(row.header.stop for row in info.rows)]
             if stops != [*(row.header.first for row in info.rows), info.layout.n_frames]:
                 return False
-            groups = tuple(range(info.counts.n_groups))
-            reader = SignalReader(container, info, groups, 0, clip.name)
+            reader = SignalReader(container, info, None, 0, clip.name)
             clip.check_hash(info, *reader.read(info.skip, info.skip + clip.n_frames))
     except MczError:
         return False
@@ -106,7 +108,6 @@ def _has_its_hashes(clip: Clip, container: Container) -> bool:
 def _restore(
     container: Container, lost: set[bytes], candidates: Iterable[bytes], origin: str
 ) -> None:
-    """Let the file have those of the candidates that are what it lost."""
     for payload in candidates:
         id_ = chunk_id(ChunkType.SKEL, payload)
         if id_ in lost:  # SALV-09
@@ -185,7 +186,6 @@ def _of_zeros(fields: payloads.Clip, row: ClipRow, source: Source | None) -> Mot
 
 
 def _bases(container: Container) -> Iterator[Skeleton | None]:
-    """None, and every skeleton of the file."""
     yield None
     for kind, id_ in list(container.directory.shared):
         if kind == ChunkType.SKEL:

@@ -22,8 +22,8 @@ from mcz.kinematics.marker_motion import SEPARATOR
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.decimation import decimated_rows
-from mcz.reading.source_options import SourceOptions
-from mcz.reading.source_rates import stating_rate
+from mcz.reading.source_files import SourceOptions
+from mcz.reading.source_info import stating_rate
 from mcz.transforms.post_filter import PostFilter, filter_rows
 from mcz.types import Values
 

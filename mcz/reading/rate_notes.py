@@ -11,7 +11,7 @@ from mcz.formats import FORMATS, format_by_id
 from mcz.formats.times import rate_of_times
 from mcz.reading.clip import Clip
 from mcz.reading.fidelity import RESTORED, fidelity_of
-from mcz.reading.source_rates import contradiction, is_one_of
+from mcz.reading.source_info import contradiction, is_one_of
 
 UNTIMED = ("bvh", "npy", "npz")  # with neither times, unless in an array, nor frame numbers
 

@@ -1,48 +1,37 @@
-"""What a file says of itself: the ``info`` document, its layout byte by byte, its faults.
-
-Everything that ``mcz info`` and ``mcz verify`` print is computed here.
-"""
+"""What a file, or a source file, says of itself: the document of ``mcz info``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import hashlib
+import math
+import os
+import warnings
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
 from mcz.clock import time_facts
 from mcz.codecs.basis_models import name_of
 from mcz.container import note_records
 from mcz.container.chunks import ChunkType
-from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
-from mcz.container.scan import scan
 from mcz.container.segments import GROUP_NOTES
-from mcz.errors import (
-    ChecksumError,
-    FormatError,
-    MczError,
-    OptionError,
-    UnsupportedError,
-    remark_of,
-)
-from mcz.formats import FORMATS, arrays_of
-from mcz.jobs import limited
+from mcz.errors import FormatError, SkeletonWarning, UnsupportedError
+from mcz.formats import FORMATS, Format, arrays_of
 from mcz.kinematics.rest import figure_height
-from mcz.motion import Skeleton
+from mcz.motion import Motion, Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
-from mcz.reading.file import File, open
-from mcz.reading.layout import layout as layout
-from mcz.reading.quick_check import Problem as Problem
-from mcz.reading.quick_check import heading, quick_check
-from mcz.reading.ratios import file_ratio, ratios_of
-from mcz.reading.recording_report import document_of
-from mcz.reading.recovery_check import recovery_problems
-from mcz.reading.sharing import shared_out
-from mcz.reading.signal_info import SignalInfo, read_segments
-from mcz.reading.sizes import Sizes, clip_sizes, file_parts, models_used
+from mcz.reading.file import File
+from mcz.reading.read import take
+from mcz.reading.signal_info import SignalInfo
+from mcz.reading.sizes import Sizes, clip_sizes, file_parts, file_ratio, models_used, ratios_of
+from mcz.reading.source_files import load, read_skeleton
+from mcz.reading.source_info import Recording, recording, source_facts
 from mcz.schema import parse
-from mcz.types import JsonObject, Target
-
-Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a file
+from mcz.types import JsonObject
 
 
 def info(file: File, names: Sequence[str] | None = None, where: Where | None = None) -> JsonObject:
@@ -119,8 +108,8 @@ def _model_info(container: Container, id_: bytes) -> JsonObject:
 
 
 def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
-    rate = clip.frame_rate
-    unread: list[str] = []
+    rate, source = clip.frame_rate, clip.source
+    beside, unread = _facts_beside_values(clip)
     document = {
         "name": clip.name,
         "codec": clip.codec,
@@ -148,7 +137,7 @@ def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
         "n_joints": clip.skeleton.n_joints,
         "frame_rate": float(rate) if rate is not None else None,
         "frame_rate_exact": clip.frame_rate_exact,
-        "times": _times(clip, unread),
+        "times": beside["times"],
         "metadata": dict(clip.metadata),
         "payload_bytes": sizes.payload,
         "overhead_bytes": sizes.overhead,
@@ -164,9 +153,11 @@ def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
             for signal in clip.signals
             for id_ in models_used(signal)
         ],
-        **_source_info(clip),
-        "recording": _recording(clip, unread),
-        "arrays": _arrays(clip, unread),
+        "source_mode": "parsed" if source else "none",
+        "source_format": source.format if source else None,
+        **source_facts(source),
+        "recording": beside["recording"],
+        "arrays": beside["arrays"],
         **exceptions_info(file.container, clip),
         "quality": clip.quality,
         "damage": [*clip.damage, *unread],
@@ -185,55 +176,33 @@ def _exact_joints(clip: Clip, signal: SignalInfo) -> list[str]:
     return [name for joint, name in pairs if not columns.isdisjoint(skeleton.columns(joint))]
 
 
-def _recording(clip: Clip, unread: list[str]) -> JsonObject | None:
-    """The recording; where the template is at fault, ``unread`` says so and the rest is shown."""
-    try:
-        return document_of(clip.recording)
-    except FormatError as error:
-        unread.append(f"recording: {error}")
-        return None
+def _facts_beside_values(clip: Clip) -> tuple[JsonObject, list[str]]:
+    """Facts in source and signals, each None where its bytes are at fault; and these faults."""
+    found: JsonObject = {"times": None, "recording": None, "arrays": None}
+    unread = []
+    for key, read in (("times", _times), ("recording", _recording), ("arrays", _arrays)):
+        try:
+            found[key] = read(clip)
+        except FormatError as error:
+            unread.append(f"{key}: {error}")
+    return found, unread
 
 
-def _times(clip: Clip, unread: list[str]) -> JsonObject | None:
-    """The times of its frames; ``unread`` as above."""
-    try:
+def _times(clip: Clip) -> JsonObject | None:
+    with suppress(UnsupportedError):
         return time_facts(clip.timeline)
-    except UnsupportedError:
-        return None
-    except FormatError as error:
-        unread.append(f"times: {error}")
-        return None
+    return None
 
 
-def _arrays(clip: Clip, unread: list[str]) -> list[JsonObject] | None:
-    """What became of the arrays of the source, None where it has none; ``unread`` as above."""
+def _recording(clip: Clip) -> JsonObject | None:
+    return document_of(clip.recording)
+
+
+def _arrays(clip: Clip) -> list[JsonObject] | None:
+    """What became of the arrays of the source, None where it has none."""
     if clip.source is None or FORMATS[clip.source.format].arrays is None:
         return None
-    try:
-        source = clip.motion((0, 0)).source
-        return arrays_of(source, [signal.name for signal in clip.signals])
-    except FormatError as error:
-        unread.append(f"arrays: {error}")
-        return None
-
-
-def _source_info(clip: Clip) -> JsonObject:
-    source = clip.source
-    if source is None:
-        return {
-            "source_mode": "none",
-            "source_format": None,
-            "source_path": None,
-            "source_bytes": None,
-            "source_sha256": None,
-        }
-    return {
-        "source_mode": "parsed",
-        "source_format": source.format,
-        "source_path": source.path,
-        "source_bytes": source.size,
-        "source_sha256": source.sha256.hex(),
-    }
+    return arrays_of(clip.motion((0, 0)).source, [signal.name for signal in clip.signals])
 
 
 def exceptions_info(container: Container, clip: Clip) -> JsonObject:
@@ -263,157 +232,82 @@ def _count(notes: bytes) -> int:
     return len(parse(note_records.GroupNotes, notes, "group notes").exceptions)
 
 
-def validate(file: File, clips: Sequence[Clip] | None = None) -> list[Problem]:
-    """Every fault of the file, once: structure, checksums, values, sources, index.
+def source_info(
+    path: str | os.PathLike[str], skeleton: str | os.PathLike[str] | None = None
+) -> JsonObject:
+    """The document that ``mcz info --json`` prints of a source file.
 
-    ``clips``: values and sources of these alone.
+    Its keys are those of ``report.info`` that have a meaning without MCZ; ``format`` is that of the
+    file. ``skeleton`` is the ASF of an AMC. Raises SourceError or OptionError.
     """
-    problems = structure_problems(file)
-    for _, _, found in part_problems(file, clips):
-        problems += found
-    first: dict[str, Problem] = {}
-    for problem in problems:  # a chunk that is damaged hurts all that need it
-        first.setdefault(problem.message, problem)
-    return list(first.values())
+    path = Path(path)
+    source_format, data = load(path)
+    document: JsonObject = {"format": source_format.name, "file_bytes": len(data)}
+    if source_format.is_skeleton:
+        return document | {"skeletons": [_skeleton_facts(read_skeleton(path))], "clips": []}
+    taken = take(path, skeleton, data=data)
+    if taken.remark:
+        warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
+    motion = taken.motion
+    if motion.source is not None and source_format.is_table:  # of .csv there are several
+        source_format = FORMATS[motion.source.format]
+        document["format"] = source_format.name
+    clip = _clip_facts(motion, source_format, path.name, data)
+    clip["skeleton_file"] = _file_of(taken.skeleton)
+    return document | {"skeletons": [_skeleton_facts(motion.skeleton)], "clips": [clip]}
 
 
-def structure_problems(file: File) -> list[Problem]:
-    """The faults of chunks, their order, their checksums and the index."""
-    try:
-        scan(file.container.source, whole=True)
-    except FormatError as error:
-        offset = error.offset or 0
-        return [Problem(offset, heading(file.container.source, offset), remark_of(error))]
-    return []
+def _file_of(skeleton: Skeleton | None) -> str | None:
+    return skeleton.source.path if skeleton is not None and skeleton.source else None
 
 
-def verify(
-    target: Target,
-    max_decoded: int | None = None,
-    threads: int | None = None,
-    where: Where | None = None,
-    quick: bool = False,
-    jobs: int | None = None,
-) -> list[Problem]:
-    """Check every checksum of a file, decode everything, restore every source.
-
-    Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
-    ``max_decoded`` and ``threads`` are those of ``mcz.open``. ``where``: check every checksum, but
-    decode and restore only the clips that it takes, see ``File.find``; OptionError for none.
-    ``quick``: check the checksums and the index alone, at the speed of the disk; all faults of a
-    file that cannot be opened are told, too.
-    ``jobs`` processes may work at once, by default one.
-    """
-    if quick:
-        if where is not None:
-            raise OptionError("a quick check is of the whole file; it takes no where")
-        return quick_check(target)[1]
-    with limited(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
-        return validate(file, None if where is None else file.chosen(where=where))
+def _skeleton_facts(skeleton: Skeleton) -> JsonObject:
+    return {"name": skeleton.name, **joint_facts(skeleton)}
 
 
-def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Row]:
-    """Kind, name and faults of every skeleton, clip and attachment, one after the other.
-
-    ``clips``: of these alone, and of their skeletons.
-    """
-    items = [("skeletons", "")]
-    items += [("clip", clip.name) for clip in (file if clips is None else clips)]
-    items += [("attachment", name) for name in (file.attachments if clips is None else ())]
-    items += [("recovery data", "")] if clips is None else []
-    names = None if clips is None else [clip.name for clip in clips]
-    with shared_out(_problems_of, file, items, names) as answers:
-        for answer in answers:
-            yield from answer()
-
-
-def _problems_of(shared: tuple[File, Sequence[str] | None], item: tuple[str, str]) -> list[Row]:
-    """The rows of ``part_problems`` for all skeletons, a clip or an attachment."""
-    (file, names), (kind, name) = shared, item
-    if kind == "clip":
-        return [(kind, name, clip_problems(file, file.clips[name]))]
-    if kind == "recovery data":
-        return [(kind, *row) for row in recovery_problems(file.container)]
-    if kind == "attachment":
-        return [(kind, name, _attachment_problems(file, name))]
-    return _skeleton_rows(file, None if names is None else [file.clips[name] for name in names])
-
-
-def _skeleton_rows(file: File, clips: Sequence[Clip] | None) -> list[Row]:
-    problems: list[Problem] = []
-    rows: list[Row] = []
-    for id_, skeleton in _guarded(problems, file, clips):
-        found: list[Problem] = []
-        _check(found, file, id_)
-        rows.append(("skeleton", skeleton.name or id_.hex(), found))
-    return [*rows, ("skeletons", "", problems)] if problems else rows
+def _clip_facts(motion: Motion, source_format: Format, name: str, data: bytes) -> JsonObject:
+    rate, signal = motion.frame_rate, motion.signals[0]
+    n_invalid = 0 if signal.mask is None else int(signal.mask.size - signal.mask.sum())
+    n_exceptions = sum(len(s.exceptions) for s in motion.signals)
+    n_tokens = sum(s.values.size for s in motion.signals)
+    return {
+        "name": motion.name,
+        "n_frames": motion.n_frames,
+        "n_channels": signal.n_channels,
+        "n_joints": motion.skeleton.n_joints,
+        "frame_rate": None if rate is None else float(rate),
+        "frame_rate_exact": motion.frame_rate_exact,
+        "times": time_facts(motion.timeline),
+        "metadata": dict(motion.metadata),
+        "signals": [
+            {"name": s.name, "n_channels": s.n_channels, "samples_per_frame": s.samples_per_frame}
+            for s in motion.signals
+        ],
+        "n_invalid": n_invalid,
+        "recording": document_of(recording(motion)),
+        "arrays": arrays_of(motion.source, [s.name for s in motion.signals]),
+        "source_format": source_format.name,
+        "source_path": name,
+        "source_bytes": len(data),
+        "source_sha256": hashlib.sha256(data).hexdigest(),
+        "n_exceptions": n_exceptions,
+        "exceptions_share": n_exceptions / n_tokens if n_tokens else 0.0,
+    }
 
 
-def _attachment_problems(file: File, name: str) -> list[Problem]:
-    try:
-        file.attachments[name].read()
-    except MczError as error:
-        offset = file.container.directory.attachments[name].parts[0].offset
-        return [Problem(offset, "ATTA", remark_of(error))]
-    return []
+def document_of(recording: Recording | None) -> JsonObject | None:
+    """The recording as JSON has it: what is unknown or no number is None; texts may be empty."""
+    if recording is None:
+        return None
+    found: JsonObject = _plain(asdict(recording))
+    return found | {"up_axis": recording.up_axis}
 
 
-def _guarded(
-    problems: list[Problem], file: File, clips: Sequence[Clip] | None
-) -> list[tuple[bytes, Skeleton]]:
-    try:
-        ids = None if clips is None else file.skeleton_ids(clips)
-        return [(id_, found) for id_, found in file.skeletons if ids is None or id_ in ids]
-    except MczError as error:
-        problems.append(Problem(0, "SKEL", remark_of(error)))
-        return []
-
-
-def _check(problems: list[Problem], file: File, id_: bytes) -> None:
-    try:
-        if file.skeleton(id_, with_source=True).source is not None:
-            file.skeleton_bytes(id_)
-    except MczError as error:
-        offset = file.container.directory.shared[ChunkType.SKEL, id_].offset
-        problems.append(Problem(offset, "SKEL", remark_of(error)))
-
-
-def clip_problems(file: File, clip: Clip) -> list[Problem]:
-    """The faults of one clip: its values and its restored source."""
-    row: ClipRow = file.container.directory.clips[clip.name]
-    found = [
-        Problem(row.clip.offset, _clip_heading(error), remark_of(error), error.clip)
-        for error in _clip_errors(clip)
-    ]
-    return list(dict.fromkeys(found))
-
-
-def _clip_errors(clip: Clip) -> Iterator[MczError]:
-    """What is wrong with each signal; one that is unsupported does not hide more."""
-    found = _error(lambda: clip.signals)
-    yield from found
-    sound = not found
-    for signal in clip.signals if sound else ():
-        try:
-            clip.check_values(signal.index)
-        except MczError as error:
-            sound = False
-            yield error
-            if isinstance(error, UnsupportedError):
-                yield from _error(read_segments, clip.container, signal)
-    if sound and clip.source is not None:
-        yield from _error(clip.source_bytes)
-
-
-def _error(work: Callable[..., object], *arguments: object) -> list[MczError]:
-    try:
-        work(*arguments)
-    except MczError as error:
-        return [error]
-    return []
-
-
-def _clip_heading(error: MczError) -> str:
-    if isinstance(error, UnsupportedError):
-        return "Codecs"
-    return "CEND" if isinstance(error, ChecksumError) else "CLIP"
+def _plain(thing: object) -> Any:
+    if isinstance(thing, dict):
+        return {key: _plain(value) for key, value in thing.items()}
+    if isinstance(thing, (list, tuple)):
+        return [_plain(value) for value in thing]
+    if isinstance(thing, float) and not math.isfinite(thing):
+        return None
+    return thing

@@ -61,7 +61,6 @@ def _rescue_start(
 
 
 def _without(spans: Sequence[Span], todo: list[Run], bad: int, complain: Complain) -> list[Run]:
-    """``todo`` without the segments that need the bad one."""
     last = max((run[1] for run in todo), default=0)
     after = bad + 1
     while after < last and not spans[after].fresh:

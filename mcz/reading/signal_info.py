@@ -47,6 +47,7 @@ class SignalInfo:
     spare: int = 0
     role: str = ""
     of: int | None = None
+    own_codec: Codec | None = None  # of a signal that is being written: it need not be in the table
 
     @property
     def has_poses(self) -> bool:
@@ -60,7 +61,7 @@ class SignalInfo:
     @property
     def codec(self) -> Codec:
         """Raises UnsupportedError where this reader lacks the codec."""
-        return by_id(self.codec_id, self.codec_version, self.preset)
+        return self.own_codec or by_id(self.codec_id, self.codec_version, self.preset)
 
     @property
     def exact(self) -> tuple[int, ...]:
@@ -162,7 +163,6 @@ def check_roles(signals: Sequence[payloads.Signal], where: str) -> None:
 
 
 def _check_times(info: SignalInfo, where: str) -> None:
-    """Raise FormatError for a signal that cannot be one of times."""
     fault = times_form_fault(info)
     codec = CODECS.find(info.codec_id, info.preset)
     if not fault and codec is not None and not CODECS[codec].lossless:  # ROLE-03

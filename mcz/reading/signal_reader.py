@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
@@ -47,19 +48,20 @@ class SignalReader:
         self,
         container: Container,
         info: SignalInfo,
-        groups: tuple[int, ...],
+        groups: tuple[int, ...] | None,
         resolution: int,
         name: str,
     ) -> None:
+        """``groups``: None for all."""
         self.container = container
         self.info = info
-        self.groups, self.resolution = groups, resolution
-        self.name = name
+        self.groups = tuple(range(info.counts.n_groups)) if groups is None else groups
+        self.resolution, self.name = resolution, name
         self._cache: dict[int, tuple[StreamTable, dict[int, bytes]]] = {}
         self._read_ones: set[int] = set()  # segments
         self._lock = Lock()  # of both
         self._threads = container.threads or in_force()
-        self._n_columns = sum(len(info.layout.groups[group]) for group in groups)
+        self._n_columns = sum(len(info.layout.groups[group]) for group in self.groups)
 
     def read(self, start: int, stop: int) -> tuple[Values, NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
@@ -143,7 +145,7 @@ class SignalReader:
     def _run(self, frame: int) -> tuple[int, int] | None:
         """The shown frames that hang together with one; None where they are too many to keep."""
         info, rows = self.info, self.info.rows
-        per_frame = self._shape(0, 1)[0] * self._shape(0, 1)[1] * 8
+        per_frame = math.prod(self._shape(0, 1)) * 8
         most = min(MOST_OF_ONE, self.container.max_decoded) // max(per_frame, 1)
         first = last = info.covering(frame, frame + 1)[0]
         while (
@@ -172,13 +174,8 @@ class SignalReader:
                 yield from self.blocks(start, stop)
                 return
             masks = [block.mask for block in blocks]
-            held = Run(
-                run[0],
-                blocks[0].values
-                if len(blocks) == 1
-                else np.concatenate([b.values for b in blocks]),
-                None if all(mask is None for mask in masks) else _joined(blocks),
-            )
+            mask = None if all(mask is None for mask in masks) else _joined(blocks)
+            held = Run(run[0], np.concatenate([block.values for block in blocks]), mask)
             self.container.runs.put(key, held)
         per_frame = self.info.layout.samples_per_frame
         wanted = slice((start - run[0]) * per_frame, (stop - run[0]) * per_frame)
@@ -245,7 +242,6 @@ class SignalReader:
         return info.spans
 
     def _check_size(self, start: int, stop: int) -> None:
-        """Raise LimitError for more than may be decoded."""
         n_rows, n_columns = self._shape(start, stop)
         size = 8 * n_rows * max(1, n_columns)
         check_decoded(f"clip {self.name!r}: values", size, self.container.max_decoded)
@@ -253,7 +249,6 @@ class SignalReader:
     def _salvage(
         self, spans: Sequence[Span], start: int, stop: int
     ) -> tuple[Values, NDArray[np.bool_]]:
-        """What can be decoded; the rest is invalid."""
         per_frame, shape = self.info.layout.samples_per_frame, self._shape(start, stop)
         values = np.zeros(shape, np.int64) if self.info.is_integer else np.full(shape, np.nan)
         mask = np.zeros(shape, np.bool_)
@@ -372,7 +367,6 @@ class SignalReader:
         return noted.exceptions(), noted.grid_changes()
 
     def _group_notes(self, index: int, group: int) -> GroupNotes:
-        """The notes of one group in the segment ``index``."""
         table, streams = self._streams(index)
         at = table.group_notes(group)
         layout = self.info.layout

@@ -1,17 +1,31 @@
-"""A clip's source file: what is known of it, and its stored parts put together."""
+"""A clip's source file: its facts, its parts put together, and what it says of the numbers."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import PurePosixPath
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.clock import SAME_RATE, usual_step
 from mcz.container import payloads
 from mcz.container.reader import Container
-from mcz.errors import UnsupportedError
-from mcz.formats import FORMATS, Format, format_by_id
-from mcz.motion import FrameNotes, Skeleton, Source
+from mcz.errors import FormatError, UnsupportedError
+from mcz.formats import FORMATS, Format, format_by_id, recording_of
+from mcz.formats.c3d_events import Event as Event
+from mcz.formats.c3d_recording import ForcePlatform as ForcePlatform
+from mcz.formats.c3d_recording import Recording as Recording
+from mcz.motion import FrameNotes, Motion, Skeleton, Source
+from mcz.numbers.scaling import Scaling
 from mcz.reading.decimation import picked_notes
 from mcz.reading.signal_info import SignalInfo
+from mcz.types import JsonObject
+
+ANALOG = "analog"  # the role of signals whose stored numbers a source may have a meaning for
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +42,15 @@ class SourceInfo:
         """The suffixes, in lower case, of its format, and that of its name."""
         own = PurePosixPath(self.path).suffix.lower()
         return (*FORMATS[self.format].suffixes, *([own] if own else []))
+
+
+def source_facts(source: SourceInfo | Source | None) -> JsonObject:
+    """Path, size and hash as the documents have them, None where there is no source."""
+    return {
+        "source_path": source.path if source else None,
+        "source_bytes": source.size if source else None,
+        "source_sha256": source.sha256.hex() if source else None,
+    }
 
 
 def source_info(fields: payloads.Clip, cend: payloads.Cend | None) -> SourceInfo | None:
@@ -114,3 +137,84 @@ def _skeleton_source(container: Container, id_: bytes) -> Source | None:
         size=source.size,
         sha256=bytes(source.sha256),
     )
+
+
+def stating_rate(motion: Motion, numbers: NDArray[np.int64] | None = None) -> Motion:
+    """``motion`` with a source that states its rate; as it is where it cannot, or states none.
+
+    ``numbers``: all frame numbers of a clip that it is a part of. Raises FormatError on bad bytes.
+    """
+    source, rate = motion.source, motion.frame_rate
+    if source is None or rate is None:
+        return motion
+    step = usual_step(motion.frame_numbers if numbers is None else numbers)
+    found = contradiction(source.format, source.template, rate, step)
+    if found is None:
+        return motion
+    return replace(motion, source=replace(source, template=found.template))
+
+
+def is_one_of(ratio: Fraction, step: int) -> bool:
+    """Return whether two rates of this ratio agree, where frame numbers rise by ``step``."""
+    return any(abs(ratio - n) <= SAME_RATE * n for n in (1, step))
+
+
+def contradiction(format_name: str, template: bytes, rate: Fraction, step: int) -> Any:
+    """The result of ``Format.restate`` where the template states another rate; else None."""
+    restate = FORMATS[format_name].restate
+    found = restate(template, rate) if restate is not None else None
+    return None if found is None or is_one_of(found.rate / rate, step) else found
+
+
+def recording(motion: Motion) -> Recording | None:
+    """What the source of ``motion`` says beside all numbers; None where it says nothing.
+
+    Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is that of a clip.
+    Raises FormatError on bad bytes.
+    """
+    source = motion.source
+    return None if source is None else _on_clock(source, motion.frame_rate)
+
+
+def _on_clock(source: Source, rate: Fraction | None) -> Recording | None:
+    """The recording of a source, its times corrected where the clip's ``rate`` corrects its own."""
+    found: Recording | None = recording_of(source)
+    if found is None or rate is None:
+        return found
+    stated = contradiction(source.format, source.template, rate, 1)
+    if stated is None or not stated.rate:
+        return found
+    factor = float(stated.rate / rate)
+    events = tuple(replace(event, time=event.time * factor) for event in found.events)
+    samples = found.analog_rate and found.analog_rate / factor
+    return replace(found, events=events, analog_rate=samples)
+
+
+def read_recording(
+    container: Container, fields: payloads.Clip, rate: Fraction | None = None
+) -> Recording | None:
+    """The recording that the source of a clip, whose CLIP is ``fields``, tells of."""
+    form = known_format(fields)
+    source = fields.source
+    if form is None or form.recording is None or source is None:
+        return None
+    template = container.template(source.template, source.format)
+    return _on_clock(Source(form.name, template, bytes(source.detail)), rate)
+
+
+def scaling_of(
+    signals: Sequence[SignalInfo], index: int, recording: Callable[[], Recording | None]
+) -> Scaling | None:
+    """What the stored numbers of a signal mean; None where they are the values themselves."""
+    analog = next((info for info in signals if info.role == ANALOG), None)
+    if analog is None or analog.index != index:
+        return None
+    told = recording()
+    scaling = None if told is None else told.scaling
+    n_channels = analog.layout.n_channels
+    if scaling is not None and len(scaling.scales) != n_channels:
+        raise FormatError(
+            f"source template: {len(scaling.scales)} analog channels, but signal {ANALOG!r} has "
+            f"{n_channels}"
+        )
+    return scaling

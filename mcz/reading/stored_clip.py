@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 
@@ -19,13 +20,28 @@ from mcz.container.reader import Container
 from mcz.container.time_base import numbers_of, whole_time_base
 from mcz.errors import FormatError, OptionError, UnsupportedError
 from mcz.formats.c3d_recording import Recording
+from mcz.kinematics import point_names
 from mcz.motion import Skeleton
 from mcz.numbers.scaling import Scaling
-from mcz.reading.quality_joints import with_names
-from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, check_roles, read_signal
-from mcz.reading.source_info import SourceInfo, source_info, sourced_skeleton
+from mcz.reading.source_info import (
+    SourceInfo,
+    read_recording,
+    scaling_of,
+    source_info,
+    sourced_skeleton,
+)
 from mcz.schema import parse
+
+LISTS = ("cut-joints", "edit-joints")
+JOINTS = ("shell_max_joint", "slide_max_joint")
+POINT = "max_position_error_point"
+WORDS = ("param.contacts", "param.lossless", "param.quality")  # joints, or groups of them
+REACHED = "quality_reached."  # the key of what such a joint or group has reached
+_BEFORE = re.compile(r"(?:uncut_|unedited_|edit_)*")
+_WORD = re.compile(r"(.*?)((?::[0-9]+\+[0-9]+|=[^=,]*)?)")  # a joint, and its frames or limit
+_INDEX = re.compile(r"0|[1-9][0-9]{0,15}")
+Lookup = Callable[[str], str | None]  # None: there is no such joint
 
 
 class StoredClip:
@@ -189,7 +205,14 @@ class StoredClip:
 
     def find_signal(self, signal: int | str) -> int:
         """The index of a signal given by index or name, the first of its name; OptionError."""
-        return signal if isinstance(signal, int) else index_of(self.signals, signal, self.name)
+        if isinstance(signal, int):
+            return signal
+        names = [info.name for info in self.signals]
+        if signal not in names:
+            raise OptionError(
+                f"clip {self.name!r} has no signal {signal!r}, but {', '.join(names)}"
+            )
+        return names.index(signal)
 
     @cached_property
     def recording(self) -> Recording | None:
@@ -246,3 +269,50 @@ class StoredClip:
                 f"{len(hashes)} hashes of {len(self.signals)} signals", clip=self.name
             )
         return hashes
+
+
+def with_names(entries: Mapping[str, str], skeleton: Skeleton) -> dict[str, str]:
+    """The entries of a stored record with names of joints; an index beyond all stays."""
+    return _translated(entries, _name_of(skeleton.addresses()), _name_of(point_names(skeleton)))
+
+
+def with_indices(entries: Mapping[str, str], skeleton: Skeleton) -> dict[str, str]:
+    """The entries as a file has them; joints that ``skeleton`` has not are left out."""
+    return _translated(entries, _index_of(skeleton.addresses()), _index_of(point_names(skeleton)))
+
+
+def _name_of(names: Sequence[str]) -> Lookup:
+    def look_up(text: str) -> str:
+        known = _INDEX.fullmatch(text) and int(text) < len(names)
+        return names[int(text)] if known else text
+
+    return look_up
+
+
+def _index_of(names: Sequence[str]) -> Lookup:
+    places = {name: str(index) for index, name in reversed(list(enumerate(names)))}
+
+    def look_up(text: str) -> str | None:
+        return places.get(text, None if _INDEX.fullmatch(text) else text)
+
+    return look_up
+
+
+def _translated(entries: Mapping[str, str], joint: Lookup, point: Lookup) -> dict[str, str]:
+    found = {}
+    for key, value in entries.items():
+        before = _BEFORE.match(key)
+        assert before is not None
+        start, name, text = before[0], key[before.end() :], value
+        if name in LISTS or name in WORDS:
+            words = [_WORD.fullmatch(word) for word in value.split(",")]
+            parts = [(joint(word[1]), word[2]) for word in words if word is not None]
+            text = ",".join(f"{known}{rest}" for known, rest in parts if known is not None)
+        elif name in JOINTS or name == POINT:
+            text = (joint if name in JOINTS else point)(value) or ""
+        elif name.startswith(REACHED):
+            known = joint(name.removeprefix(REACHED))
+            name = "" if known is None else REACHED + known
+        if name and (text or not value):
+            found[start + name] = text
+    return found

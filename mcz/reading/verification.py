@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from typing import Any
 
 from mcz.brief import counted, printable
 from mcz.container import payloads
@@ -12,6 +11,7 @@ from mcz.container.source import ByteSource
 from mcz.errors import MczError
 from mcz.reading.clip import Clip
 from mcz.reading.file import Attachment, File
+from mcz.reading.source_info import source_facts
 from mcz.schema import parse
 from mcz.types import JsonObject, Params
 
@@ -91,23 +91,15 @@ def _clip(clip: Clip) -> JsonObject:
         source = clip.source
     except MczError:  # which is among the problems
         source = None
-    return {"name": clip.name, "n_frames": clip.n_frames, **_source(source)}
+    return {"name": clip.name, "n_frames": clip.n_frames, **source_facts(source)}
 
 
 def _skeleton(file: File, id_: bytes) -> JsonObject:
     try:
         skeleton = file.skeleton(id_, with_source=True)
     except MczError:
-        return {"name": id_.hex(), "id": id_.hex(), **_source(None)}
-    return {"name": skeleton.name or id_.hex(), "id": id_.hex(), **_source(skeleton.source)}
-
-
-def _source(source: Any) -> JsonObject:
-    return {
-        "source_path": source.path if source else None,
-        "source_bytes": source.size if source else None,
-        "source_sha256": source.sha256.hex() if source else None,
-    }
+        return {"name": id_.hex(), "id": id_.hex(), **source_facts(None)}
+    return {"name": skeleton.name or id_.hex(), "id": id_.hex(), **source_facts(skeleton.source)}
 
 
 def _attachment(file: File, held: Attachment) -> JsonObject:
@@ -172,19 +164,12 @@ def _result(problems: list[str] | None, quick: bool) -> str:
 
 def text_lines(document: Params) -> list[str]:
     """The report as text, each name on one line and without what would steer a terminal."""
-    verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
-    lines = [
-        f"Verification of {document['file']}: {verdict}",
-        "",
-        _fact("size", f"{document['file_bytes']:,} bytes"),
-        _fact("SHA-256", document["sha256"]),
-    ]
+    lines = [_fact("size", f"{document['file_bytes']:,} bytes")]
+    lines.append(_fact("SHA-256", document["sha256"]))
     if "format_version" in document:
         needs = f"needs a reader of {document['needs_version']}, profile {document['profile']}"
         lines.append(_fact("format", f"MCZ {document['format_version']}, {needs}"))
-    lines.append(_fact("checked by", document["tool"]))
-    if document["date"]:
-        lines.append(_fact("date", document["date"]))
+    lines += _tool_and_date(document)
     lines += [_fact("checked", text) for text in document["checked"]]
     lines += [_fact("not checked", text) for text in document["not_checked"]]
     if "totals" in document:
@@ -194,32 +179,40 @@ def text_lines(document: Params) -> list[str]:
         lines.append(_fact("holds", f"{', '.join(counts)}, {totals['aliases']} further names"))
         text = f"{counted(totals['files'], 'file')}, {totals['files_bytes']:,} bytes"
         lines.append(_fact("gives back", text))
-    lines += ["", f"Problems: {len(document['problems']) or 'none'}"]
-    lines += [f"  {text}" for text in document["problems"]]
+    lines += _problems(document)
     for kind in ("clips", "skeletons", "attachments"):
         lines += _rows(kind, document[kind])
     if document["aliases"]:
         lines += ["", "Further names: name, and of what"]
         lines += [f"  {row['name']}  {row['of']} {row['target']}" for row in document["aliases"]]
-    return [printable(line) for line in lines]
+    return _under_title(document["file"], document, lines)
 
 
 def bag_lines(document: Params) -> list[str]:
     """The report of a bag as text, without those of the archives in it."""
-    verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
-    lines = [f"Verification of the bag {document['bag']}: {verdict}", ""]
-    lines.append(_fact("checked by", document["tool"]))
-    if document["date"]:
-        lines.append(_fact("date", document["date"]))
+    lines = _tool_and_date(document)
     version, algorithms = document["bagit_version"], ", ".join(document["algorithms"])
     lines.append(_fact("checked", f"each file against the manifests: {algorithms}"))
     lines.append(_fact("format", f"BagIt {version}"))
     count = counted(document["payload_files"], "file")
     lines.append(_fact("payload", f"{count}, {document['payload_bytes']:,} bytes"))
     lines += [_fact(name, value) for name, value in document["info"].items()]
-    lines += ["", f"Problems: {len(document['problems']) or 'none'}"]
-    lines += [f"  {text}" for text in document["problems"]]
-    return [printable(line) for line in lines]
+    return _under_title(f"the bag {document['bag']}", document, lines + _problems(document))
+
+
+def _under_title(of: str, document: Params, lines: list[str]) -> list[str]:
+    verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
+    return [printable(line) for line in (f"Verification of {of}: {verdict}", "", *lines)]
+
+
+def _tool_and_date(document: Params) -> list[str]:
+    date = [_fact("date", document["date"])] if document["date"] else []
+    return [_fact("checked by", document["tool"]), *date]
+
+
+def _problems(document: Params) -> list[str]:
+    problems = document["problems"]
+    return ["", f"Problems: {len(problems) or 'none'}", *(f"  {text}" for text in problems)]
 
 
 def _fact(name: str, text: str) -> str:

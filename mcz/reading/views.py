@@ -1,13 +1,18 @@
-"""``clip.values``: the motion signal as something to slice."""
+"""Views of a clip of which little is decoded: values to slice, and few frames as a preview."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from mcz.errors import OptionError
 from mcz.indexing import Rows, row_numbers
+from mcz.reading.signal_info import SignalInfo
+from mcz.reading.signal_reader import SignalReader
 from mcz.types import Values
 
 
@@ -25,31 +30,16 @@ class FrameValues(NamedTuple):
     values: Values
 
 
-class Readable(Protocol):
-    """What a clip has that its values need."""
-
-    n_frames: int
-
-    @property
-    def n_channels(self) -> int: ...
-
-    def read(self, frames: tuple[int, int] | None = None) -> Values: ...
-
-
 class ClipValues:
     """The motion signal of a clip, sliced by frames like an array of shape ``shape``."""
 
     dtype = np.dtype("<f8")
 
-    def __init__(self, clip: Readable) -> None:
-        self._clip = clip
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self._clip.n_frames, self._clip.n_channels
+    def __init__(self, read: Callable[..., Values], shape: tuple[int, int]) -> None:
+        self._read, self.shape = read, shape
 
     def __len__(self) -> int:
-        return self._clip.n_frames
+        return self.shape[0]
 
     def __repr__(self) -> str:
         n_frames, n_channels = self.shape
@@ -64,16 +54,16 @@ class ClipValues:
         if not _is_one_axis(rows):
             whole: Values = np.asarray(self)[key]
             return whole
-        chosen = row_numbers(rows, self._clip.n_frames, "frame")
+        chosen = row_numbers(rows, len(self), "frame")
         first, stop = _span(chosen)
-        found = self._clip.read(frames=(first, stop))
+        found = self._read(frames=(first, stop))
         if isinstance(chosen, range):
             return found[(slice(None, None, chosen.step), *rest)]
         part: Values = found[(chosen - first, *rest)]
         return part
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Values:
-        return np.asarray(self._clip.read(), dtype=dtype)
+        return np.asarray(self._read(), dtype=dtype)
 
 
 def _is_one_axis(key: object) -> bool:
@@ -84,10 +74,77 @@ def _is_one_axis(key: object) -> bool:
 
 
 def _span(rows: Rows) -> tuple[int, int]:
-    """The frames from the first to the last of ``rows``, (0, 0) for none."""
     if isinstance(rows, int):
         return rows, rows + 1
     if not len(rows):
         return 0, 0
     ends = (rows[0], rows[-1]) if isinstance(rows, range) else (rows.min(), rows.max())
     return int(min(ends)), int(max(ends)) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """Some frames of a clip, ascending and counted from 0; a row of values for each.
+
+    ``mask`` is None where all values are valid. ``step``: the frames between two of them, but for
+    the last, which may be nearer.
+    """
+
+    frames: NDArray[np.int64]
+    values: Values
+    mask: NDArray[np.bool_] | None
+    step: int
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether every frame is ``step`` behind the one before."""
+        return bool((np.diff(self.frames) == self.step).all())
+
+    def masked(self) -> Values:
+        """The values, NaN where invalid."""
+        return self.values if self.mask is None else np.where(self.mask, self.values, np.nan)
+
+
+def preview(
+    reader: SignalReader, n_frames: int, columns: Sequence[int] | slice = slice(None)
+) -> Preview:
+    """The frames that a clip of ``n_frames`` can show without decoding the rest.
+
+    ``reader`` reads the motion signal in its coarsest resolution; of what it gives these
+    ``columns`` are kept.
+    """
+    info = reader.info
+    frames, step = _frames(info, n_frames, reader.name)
+    per_frame = info.layout.samples_per_frame
+    parts, masks = [], []
+    for block in reader.blocks(info.skip, info.skip + n_frames):
+        a, b = np.searchsorted(frames, (block.start - info.skip, block.stop - info.skip)).tolist()
+        picked = frames[a:b] + info.skip - block.start
+        rows = (picked[:, None] * per_frame + np.arange(per_frame)).ravel()
+        parts.append(block.values[rows])
+        valid = np.ones(parts[-1].shape, np.bool_) if block.mask is None else block.mask[rows]
+        masks.append(valid)
+    if not parts:
+        values, _ = reader.read(0, 0)
+        parts, masks = [values], [np.ones(values.shape, np.bool_)]
+    valid = np.concatenate(masks)[:, columns]
+    values = np.concatenate(parts)[:, columns]
+    return Preview(frames, values, None if valid.all() else valid, step)
+
+
+def _frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray[np.int64], int]:
+    """The frames that are shown, counted from the first of the clip, and how far apart they are."""
+    codec = info.codec
+    if codec.preview is not None:
+        stored = codec.preview(info.header, info.layout, info.spans)
+        frames = stored - info.skip
+        frames = frames[(frames >= 0) & (frames < n_frames)]
+        return frames, int(frames[1] - frames[0]) if len(frames) > 1 else 1
+    if info.counts.n_resolutions == 1:
+        raise OptionError(
+            f"codec {codec.name} has stored it in one resolution, so that "
+            "there is nothing to show without decoding it",
+            clip=name,
+        )
+    step = 2 ** (info.counts.n_resolutions - 1)
+    return np.arange(0, n_frames, step, dtype=np.int64), step

@@ -167,7 +167,7 @@ def _cut(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
 def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
     """The clips that are wanted, coded anew."""
     from mcz.container.writer import Writer
-    from mcz.writing.prepare import prepare, under_its_path
+    from mcz.writing.planning import prepare, under_its_path
     from mcz.writing.tuning import write_motion
 
     codec, params = by_name(chosen(wanted.codec, wanted.effort)), wanted.params or {}

@@ -28,7 +28,7 @@ from mcz.formats.find import skeletons_around
 from mcz.hints import PYTHON_HINTS, Words, worded
 from mcz.motion import Motion
 from mcz.reading.file import reached
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.types import Params
 from mcz.viewing.contents import Contents, FarAway, OnDisk
 

@@ -23,7 +23,7 @@ from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.types import JsonObject, Params
 from mcz.viewing.multipart import Readable, boundary_of, save_files
 from mcz.viewing.requests import Refused, object_of, params_of, text_of
@@ -148,7 +148,7 @@ class Work:
         """How far one clip is from another, as ``mcz diff --by-joint --json`` says it."""
         from mcz.metrics.document import difference
         from mcz.reading.differences import document_of
-        from mcz.reading.ratios import clip_ratios
+        from mcz.reading.sizes import clip_ratios
 
         sides = [object_of(asked, key) for key in "ab"]
         ratios = []

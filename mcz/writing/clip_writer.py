@@ -1,37 +1,141 @@
-"""A planned clip -> chunks: its skeletons and models, CLIP, segments, CEND, its quality record."""
+"""A planned clip -> chunks: its skeletons and models, CLIP, segments, CEND, its quality record.
+
+The clip is decoded from its final bytes before it ends. SPEC.md, "CEND", is normative.
+"""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Segment
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.limits import Profile, check
 from mcz.container.packed import pack_skeleton
+from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.skeletons import build_skeleton
+from mcz.container.source import ByteSource, open_source
 from mcz.container.time_base import put_time_base, time_base_of
+from mcz.container.value_hash import ValueDigest, canonical
 from mcz.container.writer import Writer
-from mcz.errors import LimitError
+from mcz.errors import ChecksumError, LimitError
 from mcz.formats import FORMATS
-from mcz.motion import Motion, Skeleton
-from mcz.reading.quality_joints import with_indices, with_names
+from mcz.motion import Motion, Signal, Skeleton
+from mcz.reading.clip import Clip
+from mcz.reading.signal_info import SignalInfo, read_signal
+from mcz.reading.signal_reader import SignalReader
+from mcz.reading.stored_clip import with_indices, with_names
 from mcz.types import Params, Progress, Values
-from mcz.writing.clip_check import ClipCopy
-from mcz.writing.names import alias_once
-from mcz.writing.planning import ClipPlan, SignalPlan, clip_record, plan_clip
-from mcz.writing.prepare import Prepared, StoredSkeleton
+from mcz.writing.draft import alias_once
+from mcz.writing.planning import (
+    ClipPlan,
+    Prepared,
+    SignalPlan,
+    StoredSkeleton,
+    clip_record,
+    plan_clip,
+)
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource
 
+NO_HASH = bytes(32)
+
+
 # (entries of a quality record as stored, decoded values of each signal) -> its entries
 Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """A signal as a reader has it: of a lossless codec ``values`` are those that were given."""
+
+    values: Values
+    sha256: bytes
+
+
+class ClipCopy:
+    """CLIP and segments a second time, in memory, where they can be decoded.
+
+    The file of the clip itself may be a pipe.
+    """
+
+    def __init__(self, profile: Profile) -> None:
+        self._out = io.BytesIO()
+        self.writer = Writer(self._out, profile=profile)
+
+    def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+        self.writer.segment(header, streams)
+
+    def decoded(self, motion: Motion, coded: Sequence[SignalPlan]) -> list[Decoded]:
+        """The signals; raises ChecksumError where a channel differs that may not."""
+        self.writer.end_clip(motion.n_frames, NO_HASH, [NO_HASH] * len(motion.signals))
+        directory, data = self.writer.directory, open_source(self._out.getvalue())
+        container = Container(data, max_decoded=2**53, directory=directory)
+        row = directory.clips[motion.name]
+        record = container.clip(row)
+        found = []
+        for index, part in enumerate(coded):
+            info = read_signal(container, row, record, index, motion.skeleton, motion.frame_rate)
+            info = replace(info, own_codec=part.codec)
+            found.append(_decoded(container, info, motion.signals[index], part.lossy_channels()))
+        return found
+
+
+def _decoded(
+    container: Container, info: SignalInfo, signal: Signal, free: NDArray[np.bool_]
+) -> Decoded:
+    reader = SignalReader(container, info, None, 0, signal.name)
+    values = np.empty(signal.values.shape) if free.any() else signal.values
+    digest, n_frames = ValueDigest(), info.layout.n_frames
+    for block in reader.blocks(0, n_frames):
+        rows = slice(*(edge * signal.samples_per_frame for edge in (block.start, block.stop)))
+        kept = ~free if free.any() else slice(None)
+        is_same = _is_same(signal.values[rows, kept], block.values[:, kept])
+        mask = None if signal.mask is None else signal.mask[rows]
+        if not is_same or not _is_same_mask(mask, block.mask):  # CEND-07
+            raise ChecksumError(
+                f"frames {block.start}:{block.stop}: codec {info.codec.name} decodes other values "
+                "than it was given",
+                where=f"signal {info.index}",
+            )
+        if free.any():
+            values[rows] = block.values
+        digest.update(block.values, block.mask)
+    return Decoded(values, digest.digest())
+
+
+def _is_same(given: Values, found: Values) -> bool:
+    """Whether the bits are the same, those of NaN apart."""
+    own, other = (np.ascontiguousarray(values).view(np.int64) for values in (given, found))
+    if given.dtype == found.dtype and np.array_equal(own, other):
+        return True
+    return canonical(given) == canonical(found)
+
+
+def _is_same_mask(given: NDArray[np.bool_] | None, found: NDArray[np.bool_] | None) -> bool:
+    if given is None or found is None:
+        return (given is None or bool(given.all())) and (found is None or bool(found.all()))
+    return np.array_equal(given, found)
+
+
+def check_values(stream: BinaryIO, names: Iterable[str]) -> None:
+    """Decode clips of the file in ``stream`` and compare their hashes, before it gets its name."""
+    stream.flush()
+    container = Container(ByteSource(stream), max_decoded=2**53)
+    for name in names:
+        clip = Clip(container, container.directory.clips[name])
+        for info in clip.signals:
+            clip.check_values(info.index)
+    stream.seek(0, os.SEEK_END)
 
 
 def write_skeletons(writer: Writer, skeletons: Sequence[StoredSkeleton]) -> bytes:
@@ -72,17 +176,10 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
 
 
 def write_clip(
-    writer: Writer,
-    motion: Motion,
-    codec: Codec,
-    params: Params,
-    progress: Progress | None = None,
-    *,
-    quality: bool = True,
+    writer: Writer, motion: Motion, codec: Codec, params: Params
 ) -> dict[str, str] | None:
     """``write_plan`` of a motion as it is."""
-    plan = plan_clip(Prepared(motion), codec, params, writer.profile)
-    return write_plan(writer, plan, progress, quality=quality)
+    return write_plan(writer, plan_clip(Prepared(motion), codec, params, writer.profile))
 
 
 def file_in_memory(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> bytes:
@@ -147,8 +244,8 @@ def _referred(writer: Writer, plan: ClipPlan) -> payloads.Clip:
     prepared, source = plan.prepared, plan.motion.source
     for model in plan.models:
         writer.shared(ChunkType.MODL, model)
-    own = StoredSkeleton(plan.motion.skeleton, prepared.derives)
-    skeleton = write_skeletons(writer, (*prepared.bases, own))
+    skeletons = prepared.skeletons or (StoredSkeleton(plan.motion.skeleton),)
+    skeleton = write_skeletons(writer, skeletons)
     template = None
     if source is not None:
         template = writer.template(FORMATS[source.format].id, source.template)
@@ -162,7 +259,6 @@ def _write_signal(
     plan: SignalPlan,
     progress: Progress | None,
 ) -> None:
-    """Write the segments of a signal, to the file and to the copy that is decoded."""
     for segment in plan.encoded.segments:
         header, streams = _segment(outs[0].profile, motion, index, plan.source, segment)
         for out in outs:

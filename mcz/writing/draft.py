@@ -1,21 +1,28 @@
-"""A file that is being written in steps, each of which is kept or leaves no trace."""
+"""A file that is being written in steps, a failed one of which leaves no trace, and its names."""
 
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
+from itertools import chain, count
+from pathlib import Path
 from typing import BinaryIO
 
+from mcz.container import payloads
 from mcz.container.copies import Copy
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
+from mcz.container.metadata_keys import KEYS, PRIVATE
+from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
-from mcz.errors import MczError, SourceError
+from mcz.errors import MczError, MotionError, SourceError
 from mcz.hints import Hint
 
 Digest = bytes | Callable[[], bytes]
+METADATA_KEYS = tuple(KEYS)
 
 
 class Draft:
@@ -52,12 +59,13 @@ class Draft:
             uncopied=uncopied,
             short=short,
         )
-        self._commit()
+        self.keep()
 
     def write(self, data: bytes, /) -> int:
         return (self._pending if self._hold else self._sink).write(data)
 
-    def _commit(self) -> None:
+    def keep(self) -> None:
+        """Keep what was written since the last step."""
         self._sink.write(self._pending.getbuffer())
         self._pending = io.BytesIO()
 
@@ -71,11 +79,7 @@ class Draft:
             self._pending = io.BytesIO()
             self.writer.rewind(before, offset)
             raise
-        self._commit()
-
-    def keep(self) -> None:
-        """Keep what was written since the last step."""
-        self._commit()
+        self.keep()
 
     def holds(self, path: str, digest: bytes) -> bool:
         """Whether the file restores these bytes as ``path``; raises where it restores others."""
@@ -88,7 +92,7 @@ class Draft:
 
     def finish(self) -> None:
         self.writer.finish()
-        self._commit()
+        self.keep()
 
 
 def _snapshot(directory: Directory) -> Directory:
@@ -96,3 +100,39 @@ def _snapshot(directory: Directory) -> Directory:
     for name in ("shared", "attachments", "aliases", "clips"):
         setattr(kept, name, getattr(directory, name).copy())
     return kept
+
+
+def alias_once(writer: Writer, name: str, id_: bytes) -> None:
+    """Let ``name`` be that of the skeleton ``id_``, unless it is another's already."""
+    check_name(name)
+    if name not in writer.directory.aliases:
+        writer.alias(name, payloads.OF_SKELETON, id_)
+
+
+def check_name(path: str) -> None:
+    """Raise MotionError where a file cannot be stored and restored under ``path``."""
+    try:
+        path.encode("utf-8")
+    except UnicodeEncodeError:
+        raise MotionError(
+            f"the name {os.fsencode(path)!r} is not UTF-8, as MCZ keeps names; rename the file"
+        ) from None
+    if not is_plain_path(path):
+        raise MotionError(f"source path {path!r} is not relative and plain; rename the file")
+
+
+def check_metadata(metadata: Mapping[str, str], name: str) -> None:
+    """Raise MotionError for a key that neither SPEC.md's registry has nor is private."""
+    for key in metadata:
+        if key not in METADATA_KEYS and not key.startswith(PRIVATE):
+            raise MotionError(
+                f"metadata key {key!r} is not registered; registered are "
+                f"{', '.join(METADATA_KEYS)}, and private keys begin with {PRIVATE!r}",
+                clip=name,
+            )
+
+
+def clip_name(path: str, directory: Directory) -> str:
+    """The relative path without its suffix; with it, or a number, where that name is taken."""
+    names = chain((Path(path).with_suffix("").as_posix(), path), (f"{path}#{n}" for n in count(2)))
+    return next(name for name in names if name not in directory.clips)

@@ -1,33 +1,89 @@
-"""One source file on its way into an MCZ file: read, coded, named."""
+"""One source file on its way into an MCZ file: read, coded, named, and the options of all that."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
+from mcz import jobs, threads
 from mcz.clock import SAME_RATE
-from mcz.container.limits import LARGE, Profile
+from mcz.codecs import DEFAULT, by_name, chosen
+from mcz.codecs.contract import Codec
+from mcz.container.limits import BASE, LARGE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError, remark_of
 from mcz.formats import Format, format_of, wants_skeleton
 from mcz.hints import Hint, Remark
 from mcz.kinematics.rest import height_note
 from mcz.motion import Skeleton
-from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
-from mcz.reading.source_files import content_note, read_bytes, read_skeleton
-from mcz.reading.source_options import SourceOptions, checked_rate
-from mcz.reading.source_rates import stating_rate
-from mcz.types import Progress
+from mcz.reading.read import NONE, NOTE, Given, Taken, take
+from mcz.reading.source_files import (
+    SourceOptions,
+    checked_rate,
+    content_note,
+    read_bytes,
+    read_skeleton,
+)
+from mcz.reading.source_info import stating_rate
+from mcz.types import Params, Progress
 from mcz.units import in_unit
 from mcz.writing.clip_writer import write_skeletons
-from mcz.writing.draft import Draft
-from mcz.writing.names import check_name, clip_name
-from mcz.writing.options import EncodingOptions
-from mcz.writing.prepare import StoredSkeleton, derived_from, prepare
+from mcz.writing.draft import Draft, check_name, clip_name
+from mcz.writing.planning import StoredSkeleton, prepare, read_with
 from mcz.writing.tuning import write_motion
+
+
+@dataclass(frozen=True, slots=True)
+class EncodingOptions:
+    """How values are encoded: the name of a codec and its parameters.
+
+    Raises OptionError for an unknown codec.
+    """
+
+    codec: str = DEFAULT
+    params: Params = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        by_name(self.codec)
+
+    @property
+    def found(self) -> Codec:
+        """The codec of that name."""
+        return by_name(self.codec)
+
+
+def encoding_options(
+    codec: str | None, effort: str | None, params: Params | None
+) -> EncodingOptions:
+    """Options of a codec, or of an ``effort`` in its place; raises OptionError for both."""
+    return EncodingOptions(chosen(codec, effort), dict(params or {}))
+
+
+@dataclass(frozen=True, slots=True)
+class WritingOptions:
+    """How a file is written.
+
+    ``force`` replaces a file that is there. ``copies``: what holds clips together stands in the
+    file a second time. ``threads`` may code at once, by default one a processor, and ``jobs``
+    processes, by default one; the bytes are the same.
+    """
+
+    force: bool = False
+    profile: Profile = BASE
+    copies: bool = False
+    threads: int | None = None
+    jobs: int | None = None
+    progress: Progress | None = None
+
+    @contextmanager
+    def in_force(self) -> Iterator[None]:
+        """Let what is called meanwhile use so many threads and processes."""
+        with threads.limited(self.threads), jobs.limited(self.jobs):
+            yield
 
 
 class Entry:
@@ -101,12 +157,8 @@ class Entry:
         codec, params = self.encoding.found, self.encoding.params
         if not codec.lossless:  # the file does not come back: what comes states its rate
             motion = stating_rate(motion)
-        base = taken.skeleton
-        if base is None:
-            prepared = prepare(motion, codec, params)
-        else:
-            derives = derived_from(motion.skeleton, base)
-            prepared = prepare(motion, codec, params, (self._stored(base),), derives=derives)
+        base = None if taken.skeleton is None else self._stored(taken.skeleton)
+        prepared = prepare(motion, codec, params, read_with(motion.skeleton, base))
         self.quality = write_motion(writer, prepared, codec, params, progress)
         return "parsed"
 

@@ -1,4 +1,4 @@
-"""``mcz.write`` and ``mcz.encode``: one motion, or one source file, to a new MCZ file.
+"""``mcz.write``, ``mcz.encode`` and ``mcz.to_npz``: one motion, or one source file, to a new file.
 
 A motion on its way: ``prepare`` gives it the domain of its codec, ``tuning`` finds the parameters
 that meet a target, ``planning`` decides which chunks a clip is, ``clip_writer`` writes them.
@@ -8,30 +8,94 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
+from mcz.brief import brief
+from mcz.container.chunks import ChunkType
+from mcz.container.directory import ClipRow, Directory
 from mcz.container.limits import profile_named
 from mcz.container.writer import Writer
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.formats import is_table
 from mcz.motion import Motion
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
+from mcz.tables.files import table_of
+from mcz.tables.files import to_npz as npz_of
 from mcz.threads import limited
 from mcz.types import Params, Progress, Target
-from mcz.writing.atomic import replacing
-from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry
-from mcz.writing.inputs import refuse_inputs
-from mcz.writing.names import check_metadata
-from mcz.writing.options import encoding_options
-from mcz.writing.prepare import prepare, under_its_path
-from mcz.writing.sources import with_true_sources
+from mcz.writing.atomic import refuse_inputs, replacing
+from mcz.writing.draft import Draft, check_metadata
+from mcz.writing.entry import Entry, encoding_options
+from mcz.writing.planning import prepare, under_its_path, with_true_sources
 from mcz.writing.tuning import write_motion
-from mcz.writing.written import Written, written
 
 SHORT = 65536  # bytes of a source file whose skeleton and texts are a large part of what is written
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenClip:
+    """Of a clip its name, the shape of its motion, and of a lossy one its quality record."""
+
+    name: str
+    n_frames: int
+    n_channels: int
+    quality: Mapping[str, str] | None = None
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What ``write`` and ``encode`` have written.
+
+    ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal. ``notes``: what
+    is odd about the source file. ``source_bytes``: what the file gives back, of ``encode`` the
+    source and the ASF that it was read with; 0 where there is no source. ``inputs``: of ``encode``
+    these files.
+    """
+
+    size: int
+    clips: tuple[WrittenClip, ...]
+    n_skeletons: int
+    n_attachments: int
+    decoded_bytes: int
+    notes: tuple[str, ...] = ()
+    source_bytes: int = 0
+    inputs: tuple[str, ...] = ()
+
+    __repr__ = brief
+
+
+def written(
+    directory: Directory,
+    size: int,
+    quality: Mapping[str, str] | None = None,
+    notes: tuple[str, ...] = (),
+    source_bytes: int = 0,
+) -> Written:
+    """What a file of one clip or none holds, with its size and the quality record of that clip."""
+    return Written(
+        size=size,
+        clips=tuple(
+            WrittenClip(row.name, row.n_frames, row.signals[0].n_channels, quality)
+            for row in directory.clips.values()
+        ),
+        n_skeletons=sum(kind == ChunkType.SKEL for kind, _ in directory.shared),
+        n_attachments=len(directory.attachments),
+        decoded_bytes=max(map(_decoded_bytes, directory.clips.values()), default=0),
+        notes=notes,
+        source_bytes=source_bytes,
+    )
+
+
+def _decoded_bytes(row: ClipRow) -> int:
+    return max(
+        8 * row.n_frames * signal.samples_per_frame * max(1, signal.n_channels)
+        for signal in row.signals
+    )
 
 
 def write(
@@ -128,3 +192,15 @@ def encode(
     directory, size = draft.writer.directory, draft.writer.offset
     found = written(directory, size, entry.quality, entry.notes, entry.source_bytes)
     return replace(found, inputs=tuple(map(str, entry.inputs)))
+
+
+def to_npz(motion: Motion, target: Target, *, force: bool = False) -> None:
+    """Write channels, skeleton, rotations and positions of ``motion`` as an NPZ without pickles.
+
+    docs/tables.md lists the arrays; "about" in the file says in words how they hang together.
+    ``target`` is a path, an fsspec target or a binary stream. Raises ExistsError where it exists
+    and not ``force``, and AccessError.
+    """
+    data = npz_of(table_of(motion))
+    with replacing(target, force=force) as stream:
+        stream.write(data)

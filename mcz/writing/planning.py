@@ -1,9 +1,10 @@
-"""The plan of a clip: all that is decided of it before its first byte is written."""
+"""The plan of a clip: a motion made ready for its codec, and what is decided before the writing."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +20,153 @@ from mcz.container.strict import is_plain_path
 from mcz.container.time_base import put_time_base, time_base_of
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
-from mcz.motion import ROLES, Motion, Source
+from mcz.kinematics import point_set
+from mcz.kinematics.marker_motion import in_positions
+from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
+from mcz.motion import ROLES, Motion, Signal, Skeleton, Source
+from mcz.reading.source_info import stating_rate
 from mcz.schema import MAX_COUNT, build
 from mcz.types import JsonObject, Params
-from mcz.writing.prepare import Prepared
-from mcz.writing.signal_source import MemorySource, as_stored
-from mcz.writing.sources import with_source_hash
+from mcz.units import axes_of
+from mcz.writing.signal_source import MemorySource, as_stored, group_kind, settle
 
 BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSkeleton:
+    """A skeleton that a file stores.
+
+    Where it ``derives``, its base is the one before it. ``path`` names its own file, which the MCZ
+    file restores; empty: it restores none.
+    """
+
+    skeleton: Skeleton
+    derives: bool = False
+    path: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A motion as a codec takes it, and the skeletons that are stored: its own alone, or last."""
+
+    motion: Motion
+    skeletons: tuple[StoredSkeleton, ...] = ()
+
+
+def prepare(
+    motion: Motion, codec: Codec, params: Params, skeletons: tuple[StoredSkeleton, ...] = ()
+) -> Prepared:
+    """``motion``, or the positions of its points where ``codec`` codes those.
+
+    ``skeletons`` are those of ``Prepared``, of the motion as it is given. Raises OptionError where
+    positions have no meaning, MotionError where there are none.
+    """
+    options, skeletons = codec.options(params), skeletons or (StoredSkeleton(motion.skeleton),)
+    if not wants_positions(codec, options, motion.skeleton):
+        return Prepared(motion, skeletons)
+    check_bones(motion.skeleton, f"codec {codec.name}, of positions,")
+    made = in_positions(motion, virtual_markers=bool(options.get("virtual_markers")))
+    if made is motion:
+        return Prepared(motion, skeletons)
+    return Prepared(made, (*skeletons, StoredSkeleton(made.skeleton, derives=True)))
+
+
+def read_with(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[StoredSkeleton, ...]:
+    """What is stored of a skeleton that was read with ``base``, whose file stays as it is."""
+    if base is None:
+        return (StoredSkeleton(skeleton),)
+    derives = skeleton.base is not None or axes_of(skeleton) != axes_of(base.skeleton)
+    return base, StoredSkeleton(skeleton, derives)
+
+
+def under_its_path(skeleton: Skeleton) -> StoredSkeleton:
+    """``skeleton``, stored with the path of its own file where it has one."""
+    path = skeleton.source.path if skeleton.source is not None else ""
+    return StoredSkeleton(skeleton, path=path)
+
+
+def wants_positions(codec: Codec, options: Params, skeleton: Skeleton) -> bool:
+    """Whether a codec is to be given the positions of points instead of the channels of a clip."""
+    if not codec.positions or options.get("domain") == "channels" or not skeleton.joints:
+        return False
+    return point_set(skeleton) != "markers"
+
+
+def check_bones(skeleton: Skeleton, what: str) -> None:
+    """Raise OptionError where rotations move no point, since no bone has a length.
+
+    Arrays of body models are such: ``what`` would then be about the root alone.
+    """
+    if has_no_lengths(skeleton):
+        raise OptionError(
+            f"{what} has no meaning: {NO_LENGTHS}, so that rotations move no point; "
+            "rest offsets give them one"
+        )
+
+
+def with_true_sources(motion: Motion, *, lossless: bool) -> Motion:
+    """``motion`` whose sources state the size and the hash of what it restores.
+
+    Values may have been replaced since they were read: then the source is of no known file. A
+    skeleton that is no longer that of its own file has none. Raises MotionError or FormatError
+    where the source cannot hold the values.
+    """
+    motion = replace(motion, skeleton=_with_true_source(motion.skeleton)).counted_by_ones()
+    source = motion.source
+    if source is None:
+        return motion
+    if source.format not in FORMATS:
+        raise MotionError(f"source format {source.format!r} is not one of {', '.join(FORMATS)}")
+    if source.sha256 and _facts(_restored(motion, lossless)) == (source.size, source.sha256):
+        return motion
+    return with_source_hash(replace(motion, source=source.of_no_file()), lossless=lossless)
+
+
+def _with_true_source(skeleton: Skeleton) -> Skeleton:
+    source = skeleton.source
+    if source is None:
+        return skeleton
+    try:
+        data = FORMATS["asf"].write(skeleton) if source.format == "asf" else b""
+    except MotionError:  # printed anew, and the format cannot say it
+        data = b""
+    known = (source.size, source.sha256) == _facts(data)
+    return skeleton if data == source.template and known else replace(skeleton, source=None)
+
+
+def with_source_hash(motion: Motion, *, lossless: bool) -> Motion:
+    """``motion`` with size and hash of its source file, which was changed or cut since.
+
+    Unless ``lossless``, its values may lie off their grids.
+    """
+    if motion.source is None or motion.source.sha256:
+        return motion
+    motion = stating_rate(motion)
+    size, digest = _facts(_restored(motion, lossless))
+    assert motion.source is not None
+    return replace(motion, source=replace(motion.source, size=size, sha256=digest))
+
+
+def _restored(motion: Motion, lossless: bool) -> bytes:
+    assert motion.source is not None
+    stored = as_stored(motion)
+    signals = tuple(_as_read(signal, lossless) for signal in stored.signals)
+    data: bytes = FORMATS[motion.source.format].write(replace(stored, signals=signals))
+    return data
+
+
+def _as_read(signal: Signal, lossless: bool) -> Signal:
+    try:
+        return settle(signal)[1]
+    except MotionError:
+        if lossless:
+            raise
+        return signal
+
+
+def _facts(data: bytes) -> tuple[int, bytes]:
+    return len(data), hashlib.sha256(data).digest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +227,7 @@ def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile
         _signal_plan(motion, index, codec, options, profile) for index in range(len(motion.signals))
     )
     models = tuple(model for plan in signals for model in _models(plan.encoded, profile))
-    stored = Prepared(motion, prepared.bases, prepared.derives)
-    return ClipPlan(stored, options, models, signals)
+    return ClipPlan(Prepared(motion, prepared.skeletons), options, models, signals)
 
 
 def plan_open_clip(
@@ -170,13 +309,8 @@ def _source_record(source: Source | None, template: bytes | None) -> payloads.Cl
 
 def _signal_record(plan: SignalPlan) -> payloads.Signal:
     signal, codec, encoded = plan.source.signal, plan.codec, plan.encoded
-    kinds = {"all": payloads.GROUP_ALL, "joint": payloads.GROUP_JOINT}
-    own = signal.channels is not None
-    kind = kinds.get(codec.grouping, payloads.GROUP_CHANNEL)
-    if own and codec.grouping == "joint":
-        kind = payloads.GROUP_CHANNEL
-    listed = plan.source.is_listed
-    kind = payloads.GROUP_LISTED if listed else kind
+    own, listed = signal.channels is not None, plan.source.is_listed
+    kind = payloads.GROUP_LISTED if listed else group_kind(signal, codec.grouping)
     sizes = [len(group) for group in plan.source.layout.groups] if listed else None
     return payloads.Signal(
         name=signal.name,

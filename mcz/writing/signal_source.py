@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import accumulate, pairwise
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Layout
-from mcz.container import note_records
+from mcz.container import note_records, payloads
 from mcz.container.masks import build_mask
 from mcz.errors import MotionError
 from mcz.formats import recording_of
-from mcz.motion import Exceptions, Motion, Signal, Skeleton
+from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridKind, values_of_texts
+from mcz.reading.signal_info import parse_groups
 from mcz.schema import build
 from mcz.types import Params
 
@@ -47,7 +47,9 @@ class MemorySource:
         signal = motion.signals[index]
         found = codec.partition(motion.skeleton, options) if codec.partition and options else None
         self.is_listed = found is not None
-        groups, exact = found or (make_groups(motion.skeleton, signal, codec.grouping), ())
+        kinds = payloads.Groups(kind=group_kind(signal, codec.grouping))
+        usual = parse_groups(kinds, motion.skeleton, signal.n_channels, signal.name)
+        groups, exact = found or (usual, ())
         self.is_lossless = codec.lossless
         self.exact = [channel for group in exact for channel in groups[group]]
         # What a lossy codec returns is no longer the number that an exception spells.
@@ -126,7 +128,6 @@ class MemorySource:
 
 
 def _with_exceptions_of(signal: Signal, channels: Sequence[int]) -> Signal:
-    """``signal`` with the exceptions of these channels alone."""
     old = signal.exceptions
     kept = np.flatnonzero(np.isin(old.channels, channels))
     texts = tuple(old.texts[i] for i in kept)
@@ -233,12 +234,8 @@ def _with_strays(signal: Signal, stray: NDArray[np.bool_]) -> Exceptions:
     )
 
 
-def make_groups(skeleton: Skeleton, signal: Signal, grouping: str) -> tuple[tuple[int, ...], ...]:
-    """The channels of each group; a signal with channels of its own has no joints."""
-    if grouping == "all" and signal.n_channels:
-        return (tuple(range(signal.n_channels)),)
+def group_kind(signal: Signal, grouping: str) -> int:
+    """The ``kind`` of GROUPS for a codec's grouping; channels of its own have no joints."""
     if grouping == "joint" and signal.channels is None:
-        ends = accumulate(len(joint.channels) for joint in skeleton.joints)
-        bounds = pairwise([0, *ends])
-        return tuple(tuple(range(start, stop)) for start, stop in bounds if start < stop)
-    return tuple((channel,) for channel in range(signal.n_channels))
+        return payloads.GROUP_JOINT
+    return payloads.GROUP_ALL if grouping == "all" else payloads.GROUP_CHANNEL

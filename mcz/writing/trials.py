@@ -1,33 +1,49 @@
-"""Trials of a setting: the clip is written to memory, and measured as a reader has it.
+"""Trials of parameters: the clip is written to memory, and measured as a reader has it.
 
-Nothing is trusted that the public reader did not give.
+Nothing is trusted that the public reader did not give. ``bounded`` meets a greatest error by finer
+steps where it is missed, ``weighted`` the mean errors of joints by what each of them weighs.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec
+from mcz.codecs.parameters import Dial
 from mcz.container.limits import Profile
 from mcz.container.reader import Container
 from mcz.container.source import open_source
-from mcz.errors import ContactWarning, OptionError
+from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.kinematics import positions_of
+from mcz.kinematics.words import joints_of
 from mcz.metrics import Comparison, compare
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.sizes import clip_sizes
-from mcz.types import Params
+from mcz.types import JsonObject, Params
 from mcz.writing.clip_writer import file_in_memory
-from mcz.writing.prepare import Prepared
+from mcz.writing.planning import Prepared
 
 Floats = NDArray[np.float64]
 
 BLOCK_FRAMES = 4096  # whose positions are in memory at a time
+
+REFINEMENT = "refinement"
+MOST_OCTAVES = 7
+MOST_ROUNDS = 10  # with one step
+MOST_STEPS = 6
+FINER = 0.85  # from one step to the next
+MARGIN = 0.3  # octaves that are added to what a frame misses
+Limits = Sequence[tuple[str, float]]  # a joint or a group of joints, and its limit in cm
+QUALITY, WEIGHTS = "quality", "weights"
+MOST_WEIGHINGS = 8
+OVER = 1.15  # by how much more a weight grows than the square of what is missed
+MOST_WEIGHT = 2.0**24
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,3 +137,68 @@ def _error(target: Target, comparison: Comparison) -> float:
         why = "; ".join(comparison.notes) or "no position is known in any frame"
         raise OptionError(f"{target.name} has no meaning: {why}")
     return float(value)
+
+
+def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
+    """A step and the refinement of frames that meet the bound, and what the record says of it.
+
+    Raises OptionError where none that was tried does.
+    """
+    step = (dial.guess and dial.guess(target.name, target.limit)) or 1.0
+    step = min(max(step, dial.low), dial.high)
+    for _ in range(MOST_STEPS):
+        octaves: NDArray[np.int64] = np.zeros(trial.motion.n_frames, np.int64)
+        for _ in range(MOST_ROUNDS):
+            found = {dial.parameter: step, REFINEMENT: octaves}
+            try:
+                errors = trial.frame_errors(found)
+            except MotionError as error:
+                text = f"{target.name} {target.limit:g} cannot be met: {error}"
+                raise OptionError(text) from error
+            if not (errors > target.limit).any():
+                reached = float(errors.max(initial=0.0))
+                return found, {"target_reached": repr(reached)}
+            octaves = _refined(octaves, errors / target.limit)
+        missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
+        step = max(step * FINER, dial.low)
+    raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
+
+
+def _refined(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
+    """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and beside it."""
+    with np.errstate(divide="ignore"):
+        missing = np.where(ratios > 1, np.ceil(np.log2(ratios) + MARGIN), 0.0).astype(np.int64)
+    padded = np.pad(missing, 1)
+    added = np.maximum(missing, np.maximum(padded[:-2], padded[2:]))
+    return np.minimum(octaves + added, MOST_OCTAVES)
+
+
+def weighted(
+    dial: Dial, trial: Trials, limits: Limits, found: Params
+) -> tuple[JsonObject, dict[str, str]]:
+    """Weights with which the joints keep their ``limits``, with the parameters ``found``.
+
+    Also returns what the quality record says of it. Raises OptionError where they cannot be kept.
+    """
+    skeleton = trial.motion.skeleton
+    groups = [(name, joints_of(skeleton, name, QUALITY), limit) for name, limit in limits]
+    given = found.get(WEIGHTS)
+    weights = np.ones(skeleton.n_joints) if given is None else np.array(given)
+    for _ in range(MOST_WEIGHINGS):
+        errors = trial.joint_errors({**found, WEIGHTS: weights})
+        means = [float(errors[joints].mean()) for _, joints, _ in groups]
+        if all(mean <= limit for mean, (_, _, limit) in zip(means, groups, strict=True)):
+            remarks = {
+                f"quality_reached.{name}": repr(mean)
+                for mean, (name, _, _) in zip(means, groups, strict=True)
+            }
+            return {WEIGHTS: weights}, remarks
+        for mean, (_, joints, limit) in zip(means, groups, strict=True):
+            if mean > limit:
+                factor = (mean / limit) ** 2 * OVER
+                weights[joints] = np.minimum(weights[joints] * factor, MOST_WEIGHT)
+    worst = max(zip(means, groups, strict=True), key=lambda pair: pair[0] / pair[1][2])
+    raise OptionError(
+        f"quality: {worst[1][0]}={worst[1][2]:g}cm cannot be kept with {dial.parameter} "
+        f"{found.get(dial.parameter)}: {worst[0]:g} cm was reached"
+    )

@@ -7,8 +7,7 @@ measure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from operator import itemgetter
 
 import numpy as np
@@ -22,12 +21,9 @@ from mcz.hints import Hint
 from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.types import JsonObject, Params, Progress
-from mcz.writing.bounding import REFINEMENT, bounded
 from mcz.writing.clip_writer import Amend, write_plan
-from mcz.writing.planning import asked, plan_clip
-from mcz.writing.prepare import Prepared, check_bones
-from mcz.writing.trials import Target, Trials
-from mcz.writing.weighing import QUALITY, Limits, weighted
+from mcz.writing.planning import Prepared, asked, check_bones, plan_clip
+from mcz.writing.trials import QUALITY, REFINEMENT, Limits, Target, Trials, bounded, weighted
 
 PRESET = "preset"
 GOAL = 0.985  # of a target: near enough to stop
@@ -39,15 +35,8 @@ GUESSED = 1.25  # from a setting that was guessed to the next
 SAME = 3  # figures in a row that do not differ: the next setting is the last of the range
 NEAR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried beside the one that was found
 
+Found = tuple[JsonObject, dict[str, str]]  # parameters, and what the quality record says
 Point = tuple[float, float]  # a setting and its figure
-
-
-@dataclass(frozen=True, slots=True)
-class Tuned:
-    """Parameters that meet what was asked for, and what the quality record says of that."""
-
-    params: Params
-    remarks: Mapping[str, str] = field(default_factory=dict)
 
 
 def write_motion(
@@ -64,12 +53,12 @@ def write_motion(
     Returns what the quality record says, ``amend`` has the last word on it; None where there is
     none. Raises OptionError where a target cannot be met or has no meaning for this clip.
     """
-    found = tuned(prepared.motion, codec, params, writer.profile)
-    plan = plan_clip(prepared, codec, found.params, writer.profile)
-    return write_plan(writer, plan, progress, remarks=found.remarks, amend=amend)
+    found, remarks = tuned(prepared.motion, codec, params, writer.profile)
+    plan = plan_clip(prepared, codec, found, writer.profile)
+    return write_plan(writer, plan, progress, remarks=remarks, amend=amend)
 
 
-def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Tuned:
+def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Found:
     """``params`` with a setting of the dial that meets the targets among them, on trial files."""
     options = codec.options(params)
     targets = asked(options)
@@ -85,14 +74,14 @@ def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Tun
         check_bones(motion.skeleton, f"{codec.name}: a preset that promises an error in cm")
     limits = options.get(QUALITY)
     if codec.dial is None or not (targets or limits):
-        return Tuned(params)
+        return {**params}, {}
     target = _target(motion, codec.dial, options, targets) if targets else None
     trial = Trials(motion, codec, params, profile)
     if limits:
         found, remarks = _with_quality(codec, target, trial, limits)
     else:
         found, remarks = _meet(codec, target, trial)
-    return Tuned({**params, **found}, remarks)
+    return {**params, **found}, remarks
 
 
 def _check_preset(codec: Codec, params: Params, options: Params, targets: Params) -> None:
@@ -102,9 +91,6 @@ def _check_preset(codec: Codec, params: Params, options: Params, targets: Params
     others = [*targets, *([codec.dial.parameter] if options[codec.dial.parameter] else [])]
     if others:
         raise OptionError(f"{PRESET} and {others[0]} are given, only one can be")
-
-
-Found = tuple[JsonObject, dict[str, str]]  # parameters, and what the quality record says
 
 
 def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Limits) -> Found:
@@ -126,7 +112,6 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
 
 
 def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
-    """Parameters that meet a target, none where there is none."""
     assert codec.dial is not None
     if target is None:
         return {}, {}
@@ -153,7 +138,6 @@ def _check_places(motion: Motion, dial: Dial, target: Target) -> None:
 
 
 def _searched(dial: Dial, target: Target, trial: Trials) -> Found:
-    """The setting of the dial that meets a target, and what the quality record says of it."""
     setting, reached, ended = search(dial, target, trial)
     remarks = {"target_reached": repr(reached)}
     if reached < PROMISED * target.limit:
@@ -237,7 +221,6 @@ def _beside(
 def _bracket(
     dial: Dial, target: Target, measure: Callable[[Target, float], float]
 ) -> tuple[Point, Point, bool]:
-    """A setting that meets the target and one that does not, or the end of the range."""
     guessed = dial.guess and dial.guess(target.name, target.limit)
     setting = _fitting(dial, guessed or 1.0)
     found = setting, _figure(dial, measure, target, setting)
@@ -279,7 +262,6 @@ def _figure(
 
 
 def _fitting(dial: Dial, setting: float) -> float:
-    """The setting of the dial nearest to the one that is wanted."""
     return min(max(round(setting) if dial.whole else setting, dial.low), dial.high)
 
 

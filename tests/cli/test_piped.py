@@ -15,8 +15,8 @@ import mcz
 from mcz import live_frames
 from mcz.formats import FORMATS
 from mcz.live.strict_reader import StrictFrames
-from mcz.reading.source_options import SourceOptions
-from mcz.writing.options import EncodingOptions
+from mcz.reading.source_files import SourceOptions
+from mcz.writing.entry import EncodingOptions
 from tests.commands import ENV, ROOT, Started
 from tests.live_codec import encode_live
 

@@ -19,8 +19,7 @@ from mcz.kinematics import point_names, points_and_markers_of
 from mcz.kinematics.marker_motion import NOTE, in_positions
 from mcz.sample import bvh_walk, marker_walk
 from mcz.writing.clip_writer import write_plan
-from mcz.writing.planning import plan_clip
-from mcz.writing.prepare import Prepared, StoredSkeleton
+from mcz.writing.planning import Prepared, StoredSkeleton, plan_clip
 from tests.commands import Call
 
 

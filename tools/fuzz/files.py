@@ -17,9 +17,10 @@ import mcz
 from mcz.container.scan import scan
 from mcz.errors import LimitError, MczError, OptionError, UnsupportedError
 from mcz.reading.clip import Clip
+from mcz.reading.faults import validate
 from mcz.reading.file import File
 from mcz.reading.post_filtering import filtered_part
-from mcz.reading.report import info, validate
+from mcz.reading.report import info
 from mcz.reading.signal_reader import SignalReader
 from tools.fuzz.guard import hold
 from tools.fuzz.repair import unhashed

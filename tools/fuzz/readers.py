@@ -16,7 +16,7 @@ import mcz
 from mcz.formats import FORMATS, asf
 from mcz.formats.line_by_line import Floats
 from mcz.motion import Motion, Skeleton
-from mcz.reading.report import validate
+from mcz.reading.faults import validate
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tools.fuzz.guard import hold
 from tools.fuzz.seeds import sources

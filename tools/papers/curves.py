@@ -36,7 +36,7 @@ from mcz.container.limits import BASE
 from mcz.errors import MczError, MotionError
 from mcz.reading.sizes import clip_sizes
 from mcz.training import Recipe, train
-from mcz.writing.prepare import prepare
+from mcz.writing.planning import prepare
 from mcz.writing.signal_source import MemorySource
 
 LOW, HIGH = 0.09, 2.3  # cm

@@ -16,7 +16,7 @@ from mcz.conversion.scenes.usda import usda
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.motion import Motion
-from mcz.reading.source_options import SourceOptions
+from mcz.reading.source_files import SourceOptions
 from mcz.version import VERSION
 
 KEY_ERROR_MM = 0.1

@@ -27,7 +27,7 @@ from mcz.codecs.space_choices import live_sample
 from mcz.container.limits import BASE
 from mcz.motion import Motion
 from mcz.reading.sizes import clip_sizes
-from mcz.writing.prepare import prepare
+from mcz.writing.planning import prepare
 from mcz.writing.signal_source import MemorySource
 from tools.papers.curves import POINT_BYTES, live_seconds, point_of, walk
 from tools.papers.kwak.clips import Clip, motion_in_positions, source_of

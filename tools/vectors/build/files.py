@@ -47,10 +47,8 @@ from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import deflate, parse, varint
-from mcz.writing.clip_check import ClipCopy, Decoded
-from mcz.writing.clip_writer import write_plan, write_skeleton
-from mcz.writing.planning import SignalPlan, plan_clip
-from mcz.writing.prepare import Prepared
+from mcz.writing.clip_writer import ClipCopy, Decoded, write_plan, write_skeleton
+from mcz.writing.planning import Prepared, SignalPlan, plan_clip
 from tools.records import built, id_of, update
 from tools.vectors.build.edits import Edit, Made, put
 from tools.vectors.build.motions import dance, puppet
