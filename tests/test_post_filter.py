@@ -22,7 +22,7 @@ from mcz.sample import acclaim_walk, marker_walk
 from mcz.transforms.post_filter import CUTOFFS, DELAY, SCALE, PostFilter, filter_rows
 from mcz.transforms.post_filter import filter_taps as taps_of
 from tests.motions import written
-from tools.vectors.valid.filtered import plain_rows, plain_taps
+from tests.plain_post_filter import plain_rows, plain_taps
 
 ROOT = Path(__file__).parents[1]
 SECTION = (ROOT / "SPEC.md").read_text("utf-8").split("\n## Post filter\n")[1].split("\n## ")[0]

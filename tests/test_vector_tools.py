@@ -118,6 +118,7 @@ def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatc
     names = ["valid/raw/plain", "valid/raw/widths", "uncommon/lossless/newer-version"]
     monkeypatch.setattr(requirements, "ARGUED", {})
     monkeypatch.setattr(requirements, "caught", dict)
+    monkeypatch.setattr(requirements, "table_rows", dict)
     monkeypatch.setattr(requirements, "VECTORS", {"RAW-01": ("valid/*",), "A-02": ("*/plain",)})
     assert requirements.requirements(names) == {
         "valid/raw/plain": ["A-02", "RAW-01"],

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,8 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, ChunkType
 from mcz.container.limits import LARGE
 from mcz.container.segments import SegmentHeader
-from mcz.motion import Channel, Motion, Signal
+from mcz.formats import FORMATS
+from mcz.motion import Channel, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
 from tools.vectors import source_bases
@@ -29,8 +31,10 @@ from tools.vectors.build import extensions, motions
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.edits import Made, both, indexed, put, raw_stream
 from tools.vectors.build.files import Crafter, file_of, finished, rehash
-from tools.vectors.build.source_files import ODD, PLAIN, take
+from tools.vectors.build.source_files import ODD, PLAIN, called, take
 from tools.vectors.codec_bases import coded, noted
+
+SOURCES = Path(__file__).parent / "sources"
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,30 @@ def plain() -> Base:
 def numbered(*numbers: int) -> Motion:
     """The dance with these frame numbers."""
     return motions.dance(len(numbers), frame_numbers=np.array(numbers))
+
+
+@base
+def zeros(n_frames: int, name: str = "wave", *beside: str, rate: int | None = None) -> Motion:
+    """So many frames, of the channels of the skeleton that a row of coded clips has.
+
+    ``beside``: further signals, as ``analog:3:2``, of 3 channels and 2 rows a frame.
+    """
+    signals = [Signal(np.zeros((n_frames, 0)))]
+    for label, size, rows in (word.rsplit(":", 2) for word in beside):
+        values = np.zeros((n_frames * int(rows), int(size)))
+        channels = (Channel(""),) * int(size)
+        signals.append(Signal(values, name=label, channels=channels, samples_per_frame=int(rows)))
+    frame_rate = Fraction(rate) if rate else None
+    return Motion(Skeleton(()), tuple(signals), name=name, frame_rate=frame_rate)
+
+
+@base
+def read(file: str, path: str = "") -> Base:
+    """The clip of a file below ``sources``, which it restores as ``path``."""
+    data = (SOURCES / file).read_bytes()
+    stem, _, suffix = (path or file).rpartition("/")[2].rpartition(".")
+    motion = called(FORMATS[suffix].read(data, stem), path or file)
+    return Base((motion,), None, ((path or file, data),))
 
 
 @base
@@ -233,13 +261,6 @@ def twin() -> Motion:
 def column(values: list[float], kind: str, digits: int = 0, **more: Any) -> Motion:
     """One channel on a grid of this kind."""
     return motions.column(values, Grid(GridKind[kind], digits, **more))
-
-
-@base
-def grid_case(name: str) -> Motion:
-    """A channel of values at the ends of a grid."""
-    grid, values = motions.grid_cases()[name]
-    return motions.column(values, grid)
 
 
 @base

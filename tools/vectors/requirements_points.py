@@ -4,21 +4,7 @@ from __future__ import annotations
 
 # What shows a rule beside the vectors that catch a decoder without it.
 VECTORS: dict[str, tuple[str, ...]] = {
-    "BITS-01": ("valid/*-prefix",),
-    "PREFIX-05": ("valid/*/codes-*",),
-    "BASES-07": ("valid/lsdt-*/model-entries",),
     "BASES-09": ("uncommon/*/model-missing", "uncommon/container/frames-0-model-missing"),
-    "SPACE-04": ("valid/*/cosines*",),
-    "SPACE-05": ("valid/*/learned*", "valid/*/known*", "valid/*/model-shared"),
-    "SPACE-09": ("valid/lsdt-*/step-*",),
-    "SPACE-10": ("valid/*/weights*",),
-    "WIND-11": ("valid/lsdt-clip/*", "valid/mdtt/*", "valid/pca-rdo/*", "valid/*/longer*"),
-    "WIND-14": ("valid/pca-rdo/courses-*",),
-    "FRAME-04": ("valid/lsdt-frame/segments-*", "valid/lsdt-frame/cut-*"),
-    "FRAME-08": ("valid/lsdt-frame/*",),
-    "ONLINE-16": ("valid/online/*",),
-    "ONLINE-24": ("valid/online/step*",),
-    "FILT-02": ("valid/filtered/*",),
 }
 
 LOST = "Every packet of a vector has come; what a reader does who misses some is shown by"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mcz.container import payloads
-from mcz.formats import amc, asf
+from mcz.formats import FORMATS, amc, asf
 from mcz.formats.layout import Detail
 from mcz.formats.table_layout import SectionFields, TableDetail, TableTemplate
 from mcz.motion import Motion
@@ -20,13 +20,13 @@ from tools.vectors.build.c3d_files import c3d_file, c3d_outputs, take_c3d
 from tools.vectors.build.files import Crafter, finished
 from tools.vectors.build.source_files import AMC, ASF, EXAMPLE, called, with_source
 from tools.vectors.build.table_files import MARKERS, TIMES, VICON
-from tools.vectors.valid.sources.tables import take_table
 
 
 def table(path: str) -> Motion:
     """A table that stands in ``table_files``."""
     texts = {"plain.trc": MARKERS, "times.trc": TIMES, "sections.csv": VICON}
-    return take_table(texts[path], path)
+    stem, _, suffix = path.partition(".")
+    return called(FORMATS[suffix].read(texts[path], stem), path)
 
 
 def c3d(**fields: Any) -> Motion:

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.formats import FORMATS
-from mcz.formats.arrays.layout import Kind, Piece, build_arrays, parse_arrays
+from mcz.formats.arrays.layout import Kind, Piece
 from mcz.motion import Motion
 from mcz.schema import varint
-from tools.vectors.build.source_files import called, unhashed
+from tools.vectors.build.source_files import called
 
 SPEC = "Template of arrays; The bytes of arrays"
 FULL, WIDE, ROOM = 0xFFFFFFFF, 0xFFFFFFFFFFFFFFFF, 128
@@ -116,19 +116,6 @@ def take_arrays(data: bytes, path: str) -> Motion:
     return motion
 
 
-def pieces_of(motion: Motion) -> list[Piece]:
-    assert motion.source is not None
-    return list(parse_arrays(motion.source.template, motion.source.detail))
-
-
-def with_pieces(motion: Motion, pieces: Sequence[Piece]) -> Motion:
-    """``motion`` with other pieces, without the size and hash of its file."""
-    motion = unhashed(motion)
-    assert motion.source is not None
-    template, detail = build_arrays(pieces)
-    return replace(motion, source=replace(motion.source, template=template, detail=detail))
-
-
 def raw(piece: Piece, **fields: Any) -> bytes:
     """The bytes of a piece with other fields, also those that no schema admits."""
     piece = replace(piece, **fields)
@@ -146,10 +133,6 @@ def raw(piece: Piece, **fields: Any) -> bytes:
             said = bytes((piece.type, piece.flags)) + varint(len(piece.runs))
             return kind + varint(piece.signal) + said + runs
     return kind + varint(piece.start) + varint(piece.stop)
-
-
-def number_piece(signal: int, type_: int, *runs: tuple[int, int], flags: int = 0) -> Piece:
-    return Piece(Kind.DATA, signal=signal, type=type_, flags=flags, runs=runs)
 
 
 def floats(*shape: int, seed: int = 1) -> NDArray[np.float64]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,8 @@ from numpy.typing import NDArray
 from mcz.formats import c3d
 from mcz.motion import Motion
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, real
-from tools.vectors.build.source_files import HEADING, called
+from tools.vectors.build.source_files import called
 
-C3D_SPEC = f"{HEADING}; Template and detail of C3D; The bytes of C3D"
 ORDERS = {"intel": INTEL, "dec": DEC, "sgi": SGI}
 
 
@@ -60,21 +58,3 @@ def take_c3d(source: bytes, name: str) -> Motion:
     motion = called(c3d.read(source, name), f"{name}.c3d")
     assert c3d.write(motion) == source, name
     return motion
-
-
-def c3d_rotations() -> Made:
-    """Two frames of one rotation at 2 samples a frame, in the block behind the data."""
-    file = c3d_file(2)
-    rotation = {
-        "USED": file.number(1),
-        "RATIO": file.number(2),
-        "DATA_START": file.number(0),
-        "LABELS": file.texts([b"pelvis"]),
-    }
-    file.parameters = {"ROTATION": rotation}
-    size = len(file.build())
-    start = -(-size // 512)
-    rotation["DATA_START"] = file.number(start + 1)
-    matrices = [float(k * k % 19) / 8 for k in range(2 * 2 * 17)]
-    file.tail = bytes(512 * start - size) + struct.pack(f"<{len(matrices)}f", *matrices)
-    return file

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from mcz.container import payloads
 from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
@@ -10,8 +10,6 @@ from mcz.container.copies import Copy
 from mcz.schema import deflate, varint
 from tools.records import built
 from tools.vectors.build.files import Crafter
-
-Edit = Callable[[list[Copy]], list[Copy]]
 
 
 def copies_of(crafter: Crafter, start: int = len(SIGNATURE)) -> list[Copy]:

@@ -22,7 +22,7 @@ from mcz.coding import mixing
 from mcz.coding.start import start_states
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
-from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.files import file_of, partial
 from tools.vectors.build.motions import puppet, wave
 
 HEADING = "Codec 17: qbc"
@@ -288,29 +288,6 @@ def motion_of(plan: Plan, made: Sequence[Path], **changes: Any) -> Motion:
 
 def file_with(plan: Plan, made: Sequence[Path], motion: Motion, **edits: Any) -> bytes:
     return file_of(motion, codec=codec_of(plan, made), **edits)
-
-
-class Curves(Whole):
-    """A Shelf of files of one clip that qbc codes."""
-
-    def curve(
-        self,
-        name: str,
-        purpose: str,
-        plan: Plan,
-        made: Sequence[Path] = (),
-        *,
-        spec: str = HEADING,
-        motion: Motion | None = None,
-        requests: Sequence[tuple[int, tuple[int, int], Sequence[int] | None]] = (),
-        **edits: Any,
-    ) -> None:
-        """Add a file; ``requests`` are (resolution, frames, joints or None)."""
-        made = made or paths(plan)
-        motion = motion_of(plan, made) if motion is None else motion
-        data = file_with(plan, made, motion, **edits)
-        parts = [request(plan, made, motion, *one) for one in requests]
-        self.hold(name, spec, purpose, data, motion, parts=tuple(parts))
 
 
 def request(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import struct
 import zlib
 from collections.abc import Callable, Sequence
@@ -11,18 +10,9 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
-from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
-from tools.records import built, span
+from tools.records import span
 
-BAD_STEPS = {  # that no codec takes, by what their vectors are called
-    "0": 0.0,
-    "minus": -1.0,
-    "NaN": math.nan,
-    "infinite": math.inf,
-    "tiny": 2.0**-100 * (1 - 2.0**-53),
-    "huge": 2.0**100 * (1 + 2.0**-52),
-}
 Edit = Callable[[bytes], bytes]
 Made = list[tuple[SegmentHeader, Sequence[bytes]]]  # segments before they are built
 
@@ -51,10 +41,6 @@ def put(schema: Any, path: str, new: bytes) -> Edit:
 def says(data: bytes) -> Edit:
     """Put another header of the codec into CLIP."""
     return put(payloads.Clip, "signals.0.header", varint(len(data)) + data)
-
-
-def binary64(value: float) -> bytes:
-    return struct.pack("<d", value)
 
 
 def swap(old: bytes, new: bytes) -> Edit:
@@ -167,23 +153,3 @@ def raw_stream(ordinals: Sequence[Sequence[int]], widths: Sequence[int]) -> byte
 def indexed(**changes: Any) -> Callable[[Any], Any]:
     """What INDX says of the clip, so that it agrees with what was edited."""
     return lambda row: replace(row, **changes)
-
-
-class Nth:
-    """An edit of the one of this number alone, from 0."""
-
-    def __init__(self, number: int, edit: Callable[[Any], Any]) -> None:
-        self.number, self.edit, self.count = number, edit, -1
-
-    def __call__(self, value: Any) -> Any:
-        self.count += 1
-        return self.edit(value) if self.count == self.number else value
-
-
-def all_integers(n_channels: int) -> Edit:
-    run = {"n_channels": n_channels, "grid": Grid(GridKind.INTEGER)}
-    return put(payloads.Clip, "signals.0.grids", b"\1" + built(payloads.GridRun, run, "grids"))
-
-
-def two_rows(found: Any) -> Any:
-    return replace(found, signals=(replace(found.signals[0], samples_per_frame=2),))

@@ -7,22 +7,18 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Encoded, Segment
-from mcz.codecs.lossless import fast
 from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.heads import OWN_FORM, form_of_grid, scale_of
 from mcz.coding.ordinals.streams import constant_head
 from mcz.coding.quick import streams as quick
-from mcz.motion import Motion
 from mcz.numbers import Grid
 from mcz.schema import varint
-from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.lossless_clips import (
     COUNTS,
     MULTIPLES,
@@ -34,7 +30,6 @@ from tools.vectors.build.lossless_clips import (
 )
 
 Ints = NDArray[np.int64]
-HEADING = "Codec 1: fast"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,29 +57,6 @@ class Coded:
 Head = Coded | Constant | Copy
 USUAL = Coded()
 REST = Coded(PLAIN, scale=0, from_last=0)
-
-
-def codec_of(*segments: Sequence[Head]) -> Codec:
-    """Codec fast with these heads, channel by channel, in the first segment, the second, ...
-
-    The last counts for all further segments; a channel without a head is ``USUAL``. A parameter
-    ``segment_frames`` of 0 makes segments as long as the grids allow.
-    """
-
-    def encode(source: Any, params: Any) -> Encoded:
-        layout = source.layout
-        made: list[Segment] = []
-        fixed, start = params["segment_frames"] or layout.n_frames, 0
-        ends = sorted({*source.breaks, layout.n_frames})
-        while start < layout.n_frames:
-            stop = min(start + fixed, *(end for end in ends if end > start))
-            heads = segments[min(len(made), len(segments) - 1)] if segments else ()
-            streams = streams_of(layout, source.ordinals(start, stop), heads)
-            made.append(Segment(start, stop - start, streams))
-            start = stop
-        return Encoded(b"", iter(made))
-
-    return replace(fast.CODEC, encode=encode)
 
 
 def streams_of(layout: Any, ordinals: Ints, heads: Sequence[Head]) -> tuple[bytes, ...]:
@@ -160,20 +132,3 @@ def _head(head: Coded, plan: Ints) -> bytes:
         data += varint(int(plan[own.TOP])) + varint(int(plan[own.DEPTH]))
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
     return data + bytes((head.scale,)) + b"".join(map(varint, folded))
-
-
-class Streams(Whole):
-    """A Shelf of files of one clip that fast codes."""
-
-    def code(
-        self,
-        name: str,
-        purpose: str,
-        motion: Motion,
-        heads: Sequence[Head] = (),
-        spec: str = HEADING,
-        **rest: Any,
-    ) -> None:
-        parts = rest.pop("parts", ())
-        data = file_of(motion, codec=codec_of(heads), **rest)
-        self.hold(name, spec, purpose, data, motion, parts=parts)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs import bitstream, by_name, raw
+from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Request, Span, model_finder
 from mcz.container import index_records, payloads
 from mcz.container.chunks import (
@@ -47,11 +47,10 @@ from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import deflate, parse, varint
-from mcz.writing.clip_writer import ClipCopy, Decoded, write_plan, write_skeleton
+from mcz.writing.clip_writer import ClipCopy, Decoded, write_plan
 from mcz.writing.planning import Prepared, SignalPlan, plan_clip
 from tools.records import built, id_of, update
 from tools.vectors.build.edits import Edit, Made, put
-from tools.vectors.build.motions import dance, puppet
 
 OK, REFUSED, UNSUPPORTED = 0, 1, 3
 
@@ -321,12 +320,6 @@ class Crafter(Writer):
         return build_chunk(b"INDX", payload, ChunkFlag.ANCILLARY)
 
 
-def heading_of(name: str) -> str:
-    """The heading of SPEC.md of the codec called ``name``."""
-    id_ = by_name(name).id
-    return f"Codec {id_}: {bitstream(id_)}"
-
-
 def file_of(
     *motions: Motion,
     index: bool = True,
@@ -391,18 +384,6 @@ class Shelf:
         self.vectors.append(Vector(f"{self.folder}/{name}", headings, purpose, data, **rest))
 
 
-class Broken(Shelf):
-    """A Shelf of files that must be refused."""
-
-    def add(self, name: str, spec: str, purpose: str, data: bytes, **rest: Any) -> None:
-        rest.setdefault("exit", (REFUSED,))
-        Shelf.add(self, name, spec, purpose, data, **rest)
-
-    def edited(self, name: str, spec: str, purpose: str, **edits: Any) -> None:
-        """The file of one dance, edited."""
-        self.add(name, spec, purpose, file_of(dance(), **edits))
-
-
 class Whole(Shelf):
     """A Shelf of files that must be decoded; its ``exit`` are the codes that are allowed."""
 
@@ -416,13 +397,6 @@ class Whole(Shelf):
         """Add a file of these clips."""
         rest.setdefault("exit", self.exit)
         self.add(name, spec, purpose, data, arrays=arrays(*motions), **rest)
-
-
-def skeleton_chunk() -> bytes:
-    crafter = Crafter()
-    before = len(crafter.data)
-    write_skeleton(crafter, puppet())
-    return crafter.data[before:]
 
 
 def partial(motion: Motion, frames: tuple[int, int], joints: Sequence[int] | None = None) -> Any:
@@ -463,10 +437,3 @@ def live_file(motion: Motion, **edits: Any) -> bytes:
     """The clip as a live one: packets of one frame, of kind 2 where that can be."""
     given = {"packets": True, "frames": 1, "segment_frames": 1, "grouping": "all"}
     return file_of(motion, **given | edits)
-
-
-class Unrestorable(Broken):
-    """A Shelf of files whose sources must be refused."""
-
-    def add(self, name: str, spec: str, purpose: str, data: bytes, **rest: Any) -> None:
-        super().add(name, spec, purpose, data, modes=("sources",), **rest)

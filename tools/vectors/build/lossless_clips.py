@@ -20,10 +20,8 @@ from mcz.coding.ordinals import streams as ordinal_streams
 from mcz.coding.ordinals.choices import Lattice
 from mcz.coding.ordinals.counts import Law
 from mcz.coding.start import start_states
-from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
-from tools.vectors.build.files import Whole, file_of
 
 Ints = NDArray[np.int64]
 # Forms; 1 to 15: digits of base 10.
@@ -181,21 +179,3 @@ def _code_to_the_fault(ordinals: Ints, plans: Sequence[Ints]) -> bytes:
     fault = loops.code_rows(state, data, rows, np.stack(plans), ordinal_streams.powers())
     assert fault >= 0
     return data[: coding.finish(state, data)].tobytes()
-
-
-class Streams(Whole):
-    """A Shelf of files of one clip that lossless codes."""
-
-    def code(
-        self,
-        name: str,
-        purpose: str,
-        motion: Motion,
-        heads: Sequence[Head] = (),
-        spec: str = HEADING,
-        **rest: Any,
-    ) -> None:
-        parts = rest.pop("parts", ())
-        codec = codec_of(heads, version=rest.pop("version", 0))
-        data = file_of(motion, codec=codec, **rest)
-        self.hold(name, spec, purpose, data, motion, parts=parts)

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridFlag, GridKind
+from mcz.numbers import Grid, GridKind
 
 HUNDREDTHS = Grid(GridKind.FIXED, 2)
-UNROUNDED = (Grid(GridKind.INTEGER), Grid(GridKind.FIXED, 1), HUNDREDTHS)
 LONG = 70_000  # frames, more than a u16 counts
 INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
 INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
@@ -117,41 +116,3 @@ def with_mask() -> Motion:
     mask = np.ones((4, 6), np.bool_)
     mask[0:2, 4], mask[2, 5] = False, False
     return dance(signals=(Signal(numbers(4, 6), (HUNDREDTHS,) * 6, mask=mask),))
-
-
-def grid_cases() -> dict[str, tuple[Grid, list[float]]]:
-    """Grids of every kind, each with values at its ends and between them."""
-    flag = GridFlag
-    bits = [0.0, -0.0, 1.5, -INFINITE, INFINITE, NOT_A_NUMBER]
-    tiny = [5e-324, -1.7976931348623157e308]
-    return {
-        "fixed": (Grid(GridKind.FIXED, 4), [9.3722, -0.0, 0.0, -7.5, 225179981368.5247]),
-        "fixed-integers": (Grid(GridKind.FIXED, 0), [7.0, -7.0, 2251799813685247.0]),
-        "fixed-22-digits": (Grid(GridKind.FIXED, 22), [1e-22, -3e-22, 2.251799813685247e-7]),
-        "trimmed": (Grid(GridKind.TRIMMED, 4, flag.POINT_ZERO), [12.313, -27.0, -0.0, 0.0001]),
-        "general": (Grid(GridKind.GENERAL, 6), [0.0, -0.0, 1e-14, 123456.0, -1.5e300, 1e-307]),
-        "general-exponent3": (
-            Grid(GridKind.GENERAL, 6, flag.EXPONENT3),
-            [3.18055e-15, 0.0001, -99.9999, 100000.0, 1234560.0],
-        ),
-        "general-point-zero": (Grid(GridKind.GENERAL, 6, flag.POINT_ZERO), [24.0, 7e-9, -0.0]),
-        "general-15-digits": (
-            Grid(GridKind.GENERAL, 15),
-            [0.123456789012345, -9.99999999999999e307, 8.88888888888888e-300, 1e22, 1e23],
-        ),
-        "text64": (Grid(GridKind.TEXT64, 0), [0.1, -0.0, 1e300, 0.30000000000000004, *tiny]),
-        "text64-17-digits": (Grid(GridKind.TEXT64, 17), [0.1, -2.0, 1e22, *tiny]),
-        "text64-fixed": (Grid(GridKind.TEXT64, 84), [0.1, -1e20, 3.5]),
-        "text32": (Grid(GridKind.TEXT32), [0.1, -0.0, 3.4028235e38, 1e-45, 16777216.0]),
-        "printed": (Grid(GridKind.PRINTED, 4, style=210), [0.0005, -0.0, 1.5, 225179981368.5247]),
-        "printed-32": (Grid(GridKind.PRINTED, 32, style=144), [0.1000000014901161, -0.0, 1e-45]),
-        "printed-32-few": (Grid(GridKind.PRINTED, 32, style=2), [0.33, -0.0, 16777216.0, 0.01]),
-        "printed-64": (Grid(GridKind.PRINTED, 64, style=210), [0.1, -0.0, 1e22, *tiny]),
-        "printed-64-few": (Grid(GridKind.PRINTED, 64, style=195), [0.1234, -0.0, 1e22, 5e-324]),
-        "printed-131": (Grid(GridKind.PRINTED, 131, 64, style=194), [-0.273, 0.0, 1e-307, 1.57]),
-        "integer": (Grid(GridKind.INTEGER), [0, -1, 2**53, -(2**53), 127]),
-        "scaled": (Grid(GridKind.SCALED, scale=0.1), [3 * 0.1, -7 * 0.1, 0.0, 10**15 * 0.1]),
-        "binary32": (Grid(GridKind.BINARY32), [*bits, 2.0**-149, -3.4028234663852886e38]),
-        "binary64": (Grid(GridKind.BINARY64), [*bits, *tiny]),
-        "vax-f": (Grid(GridKind.VAX_F), [0.0, 1.0, -0.5, 1.7014117331926443e38, 2.0**-128]),
-    }

@@ -5,7 +5,7 @@ The values are summed from the coefficients, never decoded: a decoder has to agr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,22 +15,15 @@ from numpy.typing import NDArray
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded
 from mcz.codecs.online import coder as online_coder
-from mcz.codecs.online.units import Unit
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import varint
-from tools.vectors.build.edits import stream
-from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.files import file_of
 from tools.vectors.build.online_units import (
-    GOLOMB,
-    HEADING,
-    MIXED,
     ONE,
     ONLINE,
     Coding,
     Plan,
     header,
     segments_of,
-    units_of,
 )
 from tools.vectors.build.spatial_clips import Ints
 
@@ -102,49 +95,6 @@ def file_with(
     return file_of(motion, codec=codec_of(plan, coding), **{"grouping": "all", **edits})
 
 
-class Groups(Whole):
-    """A Shelf of files of one clip of online."""
-
-    def plan(
-        self,
-        name: str,
-        purpose: str,
-        plan: Plan,
-        requests: Iterable[tuple[int, int]] = (),
-        *,
-        spec: str = "",
-        motion: Motion | None = None,
-        **edits: Any,
-    ) -> None:
-        """Add a file; ``requests`` are frames, ``spec`` are headings beside the codec's."""
-        motion = motion_of(plan) if motion is None else motion
-        data = file_with(plan, motion, **edits)
-        parts = tuple(partial(motion, frames) for frames in requests)
-        headings = f"{HEADING}; {spec}" if spec else HEADING
-        self.hold(name, headings, purpose, data, motion, parts=parts)
-
-
-def both(name: str, purpose: str, plan: Plan) -> Iterable[tuple[str, str, Plan]]:
-    """Names, purposes and plans for either coder; ``purpose`` ends without a full stop."""
-    yield name, f"{purpose}.", replace(plan, coder=MIXED)
-    yield f"{name}-golomb", f"{purpose}, Golomb.", replace(plan, coder=GOLOMB)
-
-
 def numbered(values: Sequence[int]) -> Callable[[int, int], int]:
     """Steps of these codes in turn."""
     return lambda number, kind: values[number]
-
-
-def with_stream(plan: Plan, data: bytes) -> bytes:
-    """The file of ``plan`` with another stream; the hash stays."""
-    return file_with(plan, segments=stream(0, lambda _: data))
-
-
-def only_units(plan: Plan) -> list[Unit]:
-    """The units of the only segment."""
-    (units,) = units_of(plan)
-    return units
-
-
-def head_of(kind: int, n_frames: int) -> bytes:
-    return varint(4 * n_frames + kind)

@@ -22,7 +22,7 @@ from mcz.coding.start import start_states
 from mcz.coding.streams import scale_of
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
-from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.files import file_of
 from tools.vectors.build.motions import wave
 
 HEADING = "Codec 18: pca"
@@ -143,21 +143,3 @@ def motion_of(plan: Plan) -> Motion:
 
 def file_with(plan: Plan, motion: Motion, **edits: Any) -> bytes:
     return file_of(motion, codec=codec_of(plan), grouping="all", **edits)
-
-
-class Parts(Whole):
-    """A Shelf of files of one clip that pca codes."""
-
-    def hold_plan(
-        self,
-        name: str,
-        purpose: str,
-        plan: Plan,
-        requests: Sequence[tuple[int, int]] = (),
-        **edits: Any,
-    ) -> None:
-        """Add a file; ``requests`` are frames."""
-        motion = motion_of(plan)
-        data = file_with(plan, motion, **edits)
-        parts = tuple(partial(motion, frames) for frames in requests)
-        self.hold(name, f"{HEADING}; Residuals", purpose, data, motion, parts=parts)

@@ -6,10 +6,9 @@ depend on a machine's arithmetic. Values are those of the decoder.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,13 +22,11 @@ from mcz.codecs.posewave.contact_keeper import Keeper, Piece
 from mcz.codecs.posewave.exact import build_exact, groups_of
 from mcz.codecs.posewave.header import Header, PosewaveHeader, parse_header
 from mcz.codecs.posewave.segment import Weights, encode_segment
-from mcz.motion import Joint, Motion, Signal, Skeleton
+from mcz.motion import Joint, Skeleton
 from mcz.numbers import Grid
 from tools.records import built
-from tools.vectors.build.files import Whole, file_of, partial
-from tools.vectors.build.motions import channels, wave
+from tools.vectors.build.motions import channels
 
-HEADING = "Codec 3: posewave"
 Floats = NDArray[np.float64]
 
 PLAIN_FIELDS: dict[str, Any] = {
@@ -198,55 +195,7 @@ def values_of(plan: Plan, resolution: int = 0) -> Floats:
     return values
 
 
-def motion_of(plan: Plan, resolution: int = 0, **more: Any) -> Motion:
-    """The clip as it is decoded."""
-    fields: dict[str, Any] = {
-        "name": "pose",
-        "signals": (Signal(values_of(plan, resolution), plan.grids),),
-    }
-    return Motion(plan.skeleton, **(fields | more))
-
-
-def file_with(plan: Plan, motion: Motion | None = None, **edits: Any) -> bytes:
-    motion = motion_of(plan) if motion is None else motion
-    return file_of(motion, codec=codec_of(plan), grouping="all", **edits)
-
-
-class Poses(Whole):
-    """A Shelf of files of one clip that posewave codes."""
-
-    def plan(
-        self,
-        name: str,
-        purpose: str,
-        plan: Plan,
-        spec: str = "",
-        requests: Sequence[tuple[int, tuple[int, int], Sequence[int] | None]] = (),
-        more: Mapping[str, Any] = MappingProxyType({}),
-        **edits: Any,
-    ) -> None:
-        """Add a file; ``requests`` are (finest resolutions left out, frames, joints).
-
-        ``more`` are fields of its motion.
-        """
-        motion = motion_of(plan, **more)
-        parts = []
-        for left_out, frames, joints in requests:
-            coarse = motion_of(plan, left_out, **more) if left_out else motion
-            arguments, found = partial(coarse, frames, joints)
-            option = ("--resolution", str(left_out)) if left_out else ()
-            parts.append(((*arguments, *option), found))
-        data = file_with(plan, motion, **edits)
-        self.hold(name, spec or HEADING, purpose, data, motion, parts=tuple(parts))
-
-
 # Skeletons and how they move
-
-
-def waves(n_frames: int, skeleton: Skeleton, size: float = 0.25, seed: int = 0) -> Floats:
-    """A smooth curve with some noise for each channel, no two alike."""
-    columns = [wave(n_frames, seed + 3 * c) for c in range(skeleton.n_channels)]
-    return size * np.array(columns, np.float64).T.reshape(n_frames, len(columns))
 
 
 def acclaim() -> Skeleton:

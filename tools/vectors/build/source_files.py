@@ -9,16 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.codecs.contract import Codec
-from mcz.container import payloads
 from mcz.formats import FORMATS, bvh
-from mcz.motion import Motion, Signal, Skeleton
+from mcz.motion import Motion, Signal
 from mcz.numbers import Grid
-from mcz.schema import deflate, inflate, parse
-from mcz.writing.clip_writer import write_skeleton
-from tools.records import built, update
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.edits import Edit
-from tools.vectors.build.files import Crafter
 from tools.vectors.build.wavelet_clips import Plan, Wave
 
 Columns = Sequence[tuple[Grid, Sequence[int]]]  # a grid, and the integers of its channel
@@ -101,13 +96,6 @@ ASF = b"""\
   end
 """.replace(b"\n", b"\r\n")
 # The last of a key's lines counts, a bone without an end does not; no name is none.
-ODD_ASF = (
-    ASF.replace(b":name mannequin", b":name \xe9\r:name")
-    .replace(b"position 0 0 0", b"position 1 2 3\r   position(-0 +.5 1.e1 7)")
-    .replace(b"angle deg", b"angle deg\r  ANGLE RADIANS")
-    .replace(b"name ltibia", b"name first second\r     name ltibia third")
-    .replace(b":hierarchy", b"  begin\r     name lost\r:hierarchy")
-)
 # The worked example of SPEC.md, "Source reconstruction".
 EXAMPLE = b":DEGREES\n1\nroot 1 2\ntoe 3\n2\nroot 4 5\ntoe 6"
 # Another order of bones, numbers with a gap, a frame without ltibia, no last line end.
@@ -139,14 +127,6 @@ JOINT = """\
 TEXT_SPEC = f"{HEADING}; The text of AMC and BVH"
 
 
-def padded(style: str) -> bytes:
-    """A BVH file whose numbers are printed in a style of ``format``."""
-    head = PLAIN.partition(b"Frames:")[0]
-    values = [[(r * 31 + c * c * 7) % 100 - 50 for c in range(9)] for r in range(20)]
-    rows = ["".join(format(float(v), style) for v in row) for row in values]
-    return head + "\n".join(("Frames: 20", "Frame Time: 0.01", *rows, "")).encode()
-
-
 def take(data: bytes, name: str) -> Motion:
     """The motion in a BVH file, its source called after it."""
     return called(bvh.read(data, name), f"{name}.bvh")
@@ -155,13 +135,6 @@ def take(data: bytes, name: str) -> Motion:
 def called(motion: Motion, path: str) -> Motion:
     assert motion.source is not None
     return replace(motion, source=replace(motion.source, path=path))
-
-
-def with_asf(crafter: Crafter, skeleton: Skeleton) -> bytes:
-    """Write the skeleton and the name of its file."""
-    id_ = write_skeleton(crafter, skeleton)
-    crafter.alias("small.asf", payloads.OF_SKELETON, id_)
-    return id_
 
 
 def hierarchy(n_joints: int) -> str:
@@ -181,12 +154,6 @@ def restored(motion: Motion) -> bytes:
     return FORMATS[motion.source.format].write(motion)
 
 
-def unhashed(motion: Motion) -> Motion:
-    """``motion`` without size and hash of its source, which a writer then finds."""
-    assert motion.source is not None
-    return replace(motion, source=replace(motion.source, size=0, sha256=b""))
-
-
 def blank(n_rows: int, grids: Sequence[Grid], name: str) -> Motion:
     """Zeros and their source, a BVH file of plain numbers: as many joints as ``grids`` need.
 
@@ -202,22 +169,6 @@ def blank(n_rows: int, grids: Sequence[Grid], name: str) -> Motion:
 def path_of(motion: Motion) -> str:
     assert motion.source is not None
     return motion.source.path
-
-
-def with_template(edit: Edit, *, deflated: bool = False) -> Edit:
-    """Edit the template inside a SRCE, which becomes a stored one, or a deflated one."""
-
-    def edit_payload(payload: bytes) -> bytes:
-        fields = parse(payloads.Srce, payload, "SRCE")
-        text = fields.data
-        if fields.flags & payloads.ENCODING:
-            text = inflate(fields.data, fields.size, "SRCE")
-        text = edit(text)
-        packed = deflate(text) if deflated else text
-        update(fields, {"flags": int(deflated), "size": len(text), "data": packed})
-        return built(payloads.Srce, fields, "SRCE")
-
-    return edit_payload
 
 
 def with_source(motion: Motion, text: bytes, detail: Edit | None = None) -> Motion:

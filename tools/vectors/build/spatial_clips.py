@@ -7,7 +7,7 @@ machine's arithmetic; values are those of the decoder.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,12 +31,11 @@ from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
 from mcz.codecs.spatial import lsdt_frame, window_streams
 from mcz.codecs.spatial.prefix_streams import codes_from, fields_of
 from mcz.codecs.spatial.windows import WindowsHeader
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import parse, varint
-from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.files import file_of
 
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
-SCATTERED = (0, 40, 3, 37, 6, 33, 9, 30, 12)  # shifts: sums of such vectors are rounded
 Ints = NDArray[np.int64]
 Lengths = tuple[Sequence[int], Sequence[int]]  # of the codes of gaps and values
 FRAME, CLIP, MDTT, PCA_RDO = "lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo"
@@ -58,24 +57,6 @@ def still(number: int, n_rows: int, n: int) -> Ints:
     return np.zeros((n_rows, n), np.int64)
 
 
-def noise(number: int, n_rows: int, n: int) -> Ints:
-    """Coefficients of five digits."""
-    i, k = np.ogrid[:n_rows, :n]
-    return ((i * i * 7919 + 31 * i * k + 577 * k * k) % 99991 - 49995).astype(np.int64)
-
-
-def listed(*tables: Any) -> Callable[[int, int, int], Ints]:
-    """These tables in turn, filled with zeros on the right and below."""
-
-    def fill(number: int, n_rows: int, n: int) -> Ints:
-        table = np.zeros((n_rows, n), np.int64)
-        for own, row in zip(table, tables[number], strict=False):
-            own[: len(row)] = row
-        return table
-
-    return fill
-
-
 def basis_of(n_points: int, n_vectors: int, seed: int = 0, **changes: Any) -> Basis:
     """A basis of integers of all sizes; ``shifts`` and ``entries`` may be given."""
     i, j = np.ogrid[:n_vectors, :n_points]
@@ -85,10 +66,6 @@ def basis_of(n_points: int, n_vectors: int, seed: int = 0, **changes: Any) -> Ba
     } | changes
     entries = np.array(fields["entries"], np.int64).reshape(n_vectors, n_points)
     return Basis(np.array(fields["shifts"], np.int64), entries)
-
-
-WEIGHTS = bytes((0, 1, 2, 3, 4, 127, 128, 130, 136, 139, 254, 255))
-UNLIKE = (basis_of(3, 1), basis_of(3, 3, 1), basis_of(3, 2, 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,13 +248,6 @@ def values_of(plan: Plan) -> NDArray[np.float64]:
     return values
 
 
-def markers(n: int, **changes: Any) -> Skeleton:
-    """So many markers."""
-    own = tuple(map(Channel, POSITION_KINDS))
-    joints = tuple(Joint(f"m{j}", channels=own) for j in range(n))
-    return Skeleton(joints, **({"name": "markers", "unit_cm": 1.0, "up_axis": "y"} | changes))
-
-
 def motion_of(plan: Plan, **changes: Any) -> Motion:
     """The clip as it is decoded: plain scalars of one joint, or as ``changes`` have it."""
     names = tuple(Channel("", f"n{c}") for c in range(plan.n_channels))
@@ -290,31 +260,3 @@ def motion_of(plan: Plan, **changes: Any) -> Motion:
 def file_with(plan: Plan, motion: Motion | None = None, **edits: Any) -> bytes:
     motion = motion_of(plan) if motion is None else motion
     return file_of(motion, codec=codec_of(plan), **{"grouping": "all", **edits})
-
-
-class Spaces(Whole):
-    """A Shelf of files of one clip that a codec of the family codes."""
-
-    def __init__(self, codec: str) -> None:
-        super().__init__(f"valid/{codec}")
-        self.codec = codec
-        self.spec = HEADINGS[codec]
-
-    def plan(
-        self,
-        name: str,
-        purpose: str,
-        plan: Plan,
-        requests: Iterable[tuple[int, int]] = (),
-        *,
-        spec: str = "",
-        motion: Motion | None = None,
-        **edits: Any,
-    ) -> None:
-        """Add a file; ``requests`` are frames, ``spec`` are headings beside the codec's."""
-        plan = replace(plan, codec=self.codec)
-        motion = motion_of(plan) if motion is None else motion
-        data = file_with(plan, motion, **edits)
-        parts = tuple(partial(motion, frames) for frames in requests)
-        headings = f"{self.spec}; {spec}" if spec else self.spec
-        self.hold(name, headings, purpose, data, motion, parts=parts)

@@ -24,7 +24,7 @@ from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
 from mcz.transforms import dwt
 from mcz.transforms.wavelets import Wavelet, by_id
-from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.files import file_of, partial
 from tools.vectors.build.motions import puppet, wave
 
 HEADING = "Codec 16: wavelet"
@@ -264,29 +264,6 @@ def motion_of(plan: Plan, channels: Sequence[Wave], **changes: Any) -> Motion:
 def file_with(plan: Plan, channels: Sequence[Wave], motion: Motion, **edits: Any) -> bytes:
     grouping = edits.pop("grouping", "channel")
     return file_of(motion, codec=codec_of(plan, channels), grouping=grouping, **edits)
-
-
-class Waves(Whole):
-    """A Shelf of files of one clip that mrdwt codes."""
-
-    def wave(
-        self,
-        name: str,
-        purpose: str,
-        plan: Plan,
-        channels: Sequence[Wave] = (),
-        *,
-        spec: str = HEADING,
-        motion: Motion | None = None,
-        requests: Sequence[tuple[int, tuple[int, int], Sequence[int] | None]] = (),
-        **edits: Any,
-    ) -> None:
-        """Add a file; ``requests`` are (resolution, frames, joints or None)."""
-        channels = channels or waves(plan)
-        motion = motion_of(plan, channels) if motion is None else motion
-        data = file_with(plan, channels, motion, **edits)
-        parts = [request(plan, channels, motion, *one) for one in requests]
-        self.hold(name, spec, purpose, data, motion, parts=tuple(parts))
 
 
 def request(

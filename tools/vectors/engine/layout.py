@@ -41,7 +41,7 @@ from mcz.container.packets import (
 from mcz.container.segments import SegmentHeader, build_segment, mask_of
 from mcz.container.segments import parse_header as parse_segment
 from mcz.container.source import open_source
-from mcz.errors import FormatError, MczError
+from mcz.errors import FormatError, MczError, TruncatedError
 from mcz.schema import EXTENDED, build, deflate, parse, read_varint
 from tools.records import id_of
 
@@ -64,19 +64,10 @@ class Segment:
         """The parts of ``payload``; streams at the end may be missing that are empty."""
         header, start = parse_segment(payload)
         for size in (*range(1, len(payload)), 0):  # most have streams
-            at, bitmap = start + size, int.from_bytes(payload[start : start + size], "little")
-            lengths = []
-            for index in range(8 * size):
-                length = 0
-                if bitmap >> index & 1:
-                    length, at = read_varint(payload, at)
-                lengths.append(length)
-            extension = b""
-            if header.flags & EXTENDED and at < len(payload):
-                length, at = read_varint(payload, at)
-                extension, at = payload[at : at + length], at + length
-            if payload[at : at + 4] == struct.pack("<I", zlib.crc32(payload[:at])):
-                break
+            with suppress(TruncatedError):
+                lengths, extension, at = cls._table(payload, start, size, header.flags)
+                if payload[at : at + 4] == struct.pack("<I", zlib.crc32(payload[:at])):
+                    break
         else:
             raise ValueError("the payload is no segment")
         streams, at = [], at + 4
@@ -84,6 +75,22 @@ class Segment:
             streams.append(payload[at : at + length])
             at += length
         return cls(header, streams, extension)
+
+    @staticmethod
+    def _table(payload: bytes, start: int, size: int, flags: int) -> tuple[list[int], bytes, int]:
+        """Lengths of streams and extension, behind a bitmap of ``size``, and where they end."""
+        at, bitmap = start + size, int.from_bytes(payload[start : start + size], "little")
+        lengths = []
+        for index in range(8 * size):
+            length = 0
+            if bitmap >> index & 1:
+                length, at = read_varint(payload, at)
+            lengths.append(length)
+        extension = b""
+        if flags & EXTENDED and at < len(payload):
+            length, at = read_varint(payload, at)
+            extension, at = payload[at : at + length], at + length
+        return lengths, extension, at
 
     def build(self) -> bytes:
         return build_segment(self.header, self.streams, self.extension)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,16 +10,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from mcz.cli.conformance import answer
 from mcz.container.versions import FORMAT_NAME
 from tools.vectors.bases import Base, base_bytes, base_of
 from tools.vectors.build.files import OK, REFUSED, Vector, arrays, partial
+from tools.vectors.engine.coded import CLIP_KEYS, coded_file
 from tools.vectors.engine.edits import edited
 
 FOLDER = Path(__file__).parent.parent / "tables"
-HEAD = {"folder", "spec", "base", "file", "rules", "also", "modes", "exit", "edit"}
-ROW = {"purpose", "spec", "rules", "also", "fault", "base", "file", "edit"} | {
-    "exit", "modes", "parts", "holds", "since",
+HEAD = {"folder", "spec", "base", "file", "rules", "also", "modes", "exit", "edit"} | CLIP_KEYS
+ROW = {"purpose", "spec", "rules", "also", "fault", "base", "file", "edit"} | CLIP_KEYS | {
+    "exit", "modes", "parts", "holds", "since", "clips",
 }  # fmt: skip
+Arrays = tuple[tuple[dict[str, Any], bytes], ...]
+DECODED = "decoded"  # what a file holds whose row says it with edits
 KINDS = MALFORMED, IMPOSSIBLE, CHECKSUM = "malformed", "impossible", "checksum"
 PARTS, MOST_CHECKSUMS = "invalid/parts/", 3  # a folder about checksums; vectors beside it
 EFFECTS = ("crash", "memory", "hang", "wrong data", "silent loss")
@@ -63,10 +68,25 @@ class Row:
 
     @property
     def data(self) -> bytes:
-        base = base_bytes(self.fields["base"], self.fields.get("file", {}))
         edits = self.fields.get("edit", [])
         edits = [edits] if isinstance(edits, str) else edits
-        return edited(base, edits, self.constants)
+        return edited(self._base(), edits, self.constants)
+
+    def _base(self) -> bytes:
+        fields, options = self.fields, self.fields.get("file", {})
+        if not self.coded:
+            return base_bytes(fields["base"], options)
+        clips = [{**fields, **own} for own in fields.get("clips", [{}])]
+        motions = [base_of(clip["base"]).motions[0] for clip in clips]
+        return coded_file(list(zip(motions, clips, strict=True)), self.constants, **options)
+
+    @property
+    def coded(self) -> bool:
+        """Whether the row writes segments out: it holds what mcz decodes.
+
+        The row's hashes and the other decoder vouch for that.
+        """
+        return bool({"segments", "clips"} & set(self.fields))
 
     def vector(self) -> Vector:
         """The file, and what a decoder must make of it."""
@@ -74,27 +94,48 @@ class Row:
         group = self.name.partition("/")[0]
         exit_ = fields.get("exit", REFUSED if group == "invalid" else OK)
         exit_ = tuple(exit_) if isinstance(exit_, list) else (exit_,)
-        held = base_of(fields.get("holds", fields["base"])) if OK in exit_ else Base()
-        modes = tuple(fields.get("modes", "arrays").split())
+        data, modes = self.data, tuple(fields.get("modes", "arrays").split())
+        held, listed = Base(), ()
+        if OK in exit_ and (self.coded or fields.get("holds") == DECODED):
+            listed = _answered(data)
+            restored = _answered(data, "--source") if "sources" in modes else ()
+            held = Base(sources=tuple((row["path"], content) for row, content in restored))
+        elif OK in exit_:
+            held = base_of(fields.get("holds", fields["base"]))
+            listed = arrays(*held.motions)
         return Vector(
             self.name,
             tuple(heading.strip() for heading in fields["spec"].split(";")),
             fields["purpose"],
-            self.data,
+            data,
             exit=exit_,
-            arrays=arrays(*held.motions),
+            arrays=listed,
             sources=held.sources if "sources" in modes else (),
             modes=modes,
             parts=tuple(
-                _part(held, text) if OK in exit_ else (tuple(text.split()), ())
+                _part(data, held, text) if OK in exit_ else (tuple(text.split()), ())
                 for text in fields.get("parts", ())
             ),
             since=fields.get("since", FORMAT_NAME),
         )
 
 
-def _part(held: Base, text: str) -> Any:
-    """A partial read, such as ``dance 1:3`` or ``dance 1:3 0,2``: clip, frames, joints."""
+def _answered(data: bytes, *arguments: str) -> Arrays:
+    """The arrays of a file or of a part of it, or its sources, as mcz decodes them."""
+    _, output = answer(data, arguments)
+    line, _, content = output.partition(b"\n")
+    found = []
+    for row in next(iter(json.loads(line).values())):
+        size = row.pop("bytes")
+        found.append((row, content[:size]))
+        content = content[size:]
+    return tuple(found)
+
+
+def _part(data: bytes, held: Base, text: str) -> Any:
+    """A partial read: ``dance 1:3`` or ``dance 1:3 0,2``, clip, frames, joints, or arguments."""
+    if text.startswith("--"):
+        return tuple(text.split()), _answered(data, *text.split())
     clip, frames, *joints = text.rsplit(" ", text.count(" "))
     (motion,) = (motion for motion in held.motions if motion.name == clip)
     start, _, stop = frames.partition(":")

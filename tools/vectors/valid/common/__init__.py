@@ -1,1 +1,0 @@
-"""Legal clips of more than one codec: functions that add them to the shelf of any."""
