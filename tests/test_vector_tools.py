@@ -115,7 +115,7 @@ def test_every_invalid_vector_has_a_fault() -> None:
 
 
 def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ["valid/raw/plain", "valid/raw/widths", "uncommon/lossless/newer-version"]
+    names = ["valid/raw/plain", "valid/raw/widths", "uncommon/container/open-clip"]
     monkeypatch.setattr(requirements, "ARGUED", {})
     monkeypatch.setattr(requirements, "caught", dict)
     monkeypatch.setattr(requirements, "table_rows", dict)
@@ -123,7 +123,7 @@ def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatc
     assert requirements.requirements(names) == {
         "valid/raw/plain": ["A-02", "RAW-01"],
         "valid/raw/widths": ["RAW-01"],
-        "uncommon/lossless/newer-version": [],
+        "uncommon/container/open-clip": [],
     }
     for table in ({"RAW-01": ("valid/lossless/*",)}, {"RAW-01": ()}, {"RAW": ("valid/*",)}):
         monkeypatch.setattr(requirements, "VECTORS", table)

@@ -20,13 +20,10 @@ from mcz.codecs.curves import qbc, streams
 from mcz.codecs.parameters import SCALED
 from mcz.coding import mixing
 from mcz.coding.start import start_states
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.motion import Motion, Skeleton
 from mcz.schema import varint
-from tools.vectors.build.files import file_of, partial
-from tools.vectors.build.motions import puppet, wave
+from tools.vectors.build.files import partial
 
-HEADING = "Codec 17: qbc"
-PUPPET = (4, 2)  # channels of its joints that have any
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 Ints = NDArray[np.int64]
 Point = tuple[int, ...]
@@ -108,33 +105,6 @@ def header(plan: Plan, **parts: bytes) -> bytes:
         else b"",
     }
     return b"".join((fields | parts).values())
-
-
-def paths(plan: Plan, sizes: Sequence[int] = (3,), **changes: Any) -> tuple[Path, ...]:
-    """Joints of so many channels: smooth marks, and curves of all sorts, no two alike."""
-    made = []
-    for seed, size in enumerate(sizes):
-        columns = [wave(len(plan.marks), 5 * seed + c) for c in range(size)]
-        marks = [tuple(round(100 * v) for v in row) for row in zip(*columns, strict=True)]
-        pieces = {
-            mark: _pieces(plan.between(mark), marks[mark], 7 * seed + mark)
-            for mark in range(len(plan.marks) - 1)
-            if (mark + seed) % 4
-        }
-        made.append(Path(marks, pieces, size=size, **changes))
-    return tuple(made)
-
-
-def _pieces(left: int, start: Point, seed: int) -> list[Piece]:
-    """Curves near ``start``, of lengths that do not follow a rule."""
-    found = []
-    while left:
-        r = (seed * seed * 29 + 13 * len(found)) % 31
-        n = min(left, 1 + r % (left // 2 + 2))
-        end, middle = (tuple(v + (r * k) % 53 - 26 for v in start) for k in (19, 37))
-        found.append(Piece(n, end, middle))
-        left -= n
-    return found
 
 
 def still(plan: Plan, size: int = 1, **changes: Any) -> Path:
@@ -274,22 +244,6 @@ def sizes_of(made: Sequence[Path]) -> list[int]:
     return [len(path.marks[0]) if path.marks else path.size for path in made]
 
 
-def motion_of(plan: Plan, made: Sequence[Path], **changes: Any) -> Motion:
-    """The clip as it is decoded: a joint of plain scalars each, or as ``changes`` have it."""
-    joints = tuple(
-        Joint(f"dial {j}", channels=tuple(Channel("", f"needle {c}") for c in range(size)))
-        for j, size in enumerate(sizes_of(made))
-    )
-    values = values_of(plan, made, skeleton=changes.get("skeleton"))
-    signal = Signal(values, mask=changes.pop("mask", None))
-    fields = {"skeleton": Skeleton(joints, name="dials"), "signals": (signal,), "name": "curve"}
-    return Motion(**(fields | changes))
-
-
-def file_with(plan: Plan, made: Sequence[Path], motion: Motion, **edits: Any) -> bytes:
-    return file_of(motion, codec=codec_of(plan, made), **edits)
-
-
 def request(
     plan: Plan,
     made: Sequence[Path],
@@ -303,8 +257,3 @@ def request(
     coarse = replace(motion, signals=(first, *motion.signals[1:]))
     arguments, arrays = partial(coarse, frames, joints)
     return (*arguments, "--resolution", str(resolution)), arrays
-
-
-def dance_of(plan: Plan, made: Sequence[Path], **changes: Any) -> Motion:
-    """The puppet, whose third joint has no channels."""
-    return motion_of(plan, made, **({"skeleton": puppet(), "name": "dance"} | changes))

@@ -67,11 +67,6 @@ def plus(tail: bytes) -> Edit:
     return lambda payload: payload + tail
 
 
-def flip(offset: int) -> Edit:
-    """Flip the lowest bit of the byte at ``offset``."""
-    return lambda data: at(offset, bytes((data[offset] ^ 1,)))(data)
-
-
 def framed(**changes: bytes) -> Edit:
     """Edit the header of a chunk; its header_check and crc are made anew unless they are given."""
 

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Encoded, Segment
-from mcz.codecs.lossless import lossless
 from mcz.coding.ordinals import heads as lossless_heads
 from mcz.coding.ordinals import streams as ordinal_streams
 from mcz.coding.ordinals.choices import Lattice
@@ -27,7 +25,6 @@ Ints = NDArray[np.int64]
 # Forms; 1 to 15: digits of base 10.
 PLAIN, MULTIPLES, PRODUCTS, COUNTS, BINARY32, BINARY64 = 0, 32, 33, 34, 88, 117
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
-HEADING = "Codec 128: lossless"
 WHOLE, SIX = Grid(GridKind.INTEGER), Grid(GridKind.GENERAL, 6)
 DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 
@@ -66,29 +63,6 @@ class Copy:
 
 Head = Coded | Constant | Copy
 USUAL = Coded()
-
-
-def codec_of(*segments: Sequence[Head], version: int = 0) -> Codec:
-    """Codec lossless with these heads, channel by channel, in the first segment, the second, ...
-
-    The last counts for all further segments; a channel without a head is ``USUAL``. A parameter
-    ``segment_frames`` of 0 makes segments as long as the grids allow.
-    """
-
-    def encode(source: Any, params: Any) -> Encoded:
-        layout = source.layout
-        made: list[Segment] = []
-        fixed, start = params["segment_frames"] or layout.n_frames, 0
-        ends = sorted({*source.breaks, layout.n_frames})
-        while start < layout.n_frames:
-            stop = min(start + fixed, *(end for end in ends if end > start))
-            heads = segments[min(len(made), len(segments) - 1)] if segments else ()
-            streams = _streams(layout, source.ordinals(start, stop), heads)
-            made.append(Segment(start, stop - start, streams))
-            start = stop
-        return Encoded(b"", iter(made), version=version)
-
-    return replace(lossless.CODEC, encode=encode)
 
 
 def _streams(layout: Any, ordinals: Ints, heads: Sequence[Head]) -> tuple[bytes, ...]:

@@ -12,7 +12,6 @@ from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 
 HUNDREDTHS = Grid(GridKind.FIXED, 2)
-LONG = 70_000  # frames, more than a u16 counts
 INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
 INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
 

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded
 from mcz.codecs.online import coder as online_coder
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from tools.vectors.build.files import file_of
 from tools.vectors.build.online_units import (
     ONE,
     ONLINE,
@@ -77,22 +75,6 @@ def codec_of(plan: Plan, coding: type[Coding] = Coding) -> Any:
         "parameters": raw.CODEC.parameters,
     }
     return replace(by_name(ONLINE), **changes, dial=None)
-
-
-def motion_of(plan: Plan, **changes: Any) -> Motion:
-    """The clip as it is decoded: plain scalars of one joint, or as ``changes`` have it."""
-    names = tuple(Channel("", f"n{c}") for c in range(plan.n_channels))
-    skeleton = Skeleton((Joint("dial", channels=names),), name="dial")
-    signal = Signal(values_of(plan), mask=changes.pop("mask", None))
-    fields = {"skeleton": skeleton, "signals": (signal,), "name": "wave"}
-    return Motion(**(fields | changes))
-
-
-def file_with(
-    plan: Plan, motion: Motion | None = None, *, coding: type[Coding] = Coding, **edits: Any
-) -> bytes:
-    motion = motion_of(plan) if motion is None else motion
-    return file_of(motion, codec=codec_of(plan, coding), **{"grouping": "all", **edits})
 
 
 def numbered(values: Sequence[int]) -> Callable[[int, int], int]:

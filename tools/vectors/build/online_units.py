@@ -23,7 +23,6 @@ from tools.vectors.build import spatial_clips
 from tools.vectors.build.spatial_clips import FRAME, Ints, waves
 
 ONLINE = "online"
-HEADING = "Codec 21: online"
 STR, LTR, INTRA = 0, 1, 2  # what the first frame of a unit is predicted from
 MIXED, GOLOMB = 0, 1  # coders
 AS_IS, REORDERED = 0, 1  # orders

@@ -20,12 +20,8 @@ from mcz.codecs.table_kernels import code_table
 from mcz.coding import mixing
 from mcz.coding.start import start_states
 from mcz.coding.streams import scale_of
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
-from tools.vectors.build.files import file_of
-from tools.vectors.build.motions import wave
 
-HEADING = "Codec 18: pca"
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 Ints = NDArray[np.int64]
 
@@ -55,24 +51,6 @@ class Plan:
     parts: tuple[Part, ...]
     decimals: int = 2
     empty: tuple[int, ...] = ()
-
-
-def part_of(n_frames: int, n_channels: int, count: int, seed: int = 0, **changes: Any) -> Part:
-    """Integers of all sizes, no two segments alike."""
-    table = [
-        [(37 * (i + seed) + 11 * c * c) % 129 - 64 for c in range(n_channels)] for i in range(count)
-    ]
-    columns = [wave(n_frames, 3 * seed + i) for i in range(count)]
-    rows = [[round(100 * column[f]) for column in columns] for f in range(n_frames)]
-    fields = {
-        "means": [(-1) ** c * 50 * c * c for c in range(n_channels)],
-        "basis": table,
-        "coefficients": rows,
-        "shifts": [6 + i % 2 for i in range(count)],
-        "forms": [(i % 4) * 64 + 8 + i for i in range(count)],
-        "n_frames": n_frames,
-    }
-    return Part(**(fields | changes))
 
 
 def stream_of(part: Part, decimals: int) -> bytes:
@@ -131,15 +109,3 @@ def values_of(plan: Plan) -> NDArray[np.float64]:
         lambda segment, _, __: made[segment].streams[0],
     )
     return values
-
-
-def motion_of(plan: Plan) -> Motion:
-    """The clip as it is decoded: plain scalars of one joint."""
-    n_channels = len(plan.parts[0].means)
-    names = tuple(Channel("", f"needle {c}") for c in range(n_channels))
-    skeleton = Skeleton((Joint("dial", channels=names),), name="dial")
-    return Motion(skeleton, (Signal(values_of(plan)),), name="wave")
-
-
-def file_with(plan: Plan, motion: Motion, **edits: Any) -> bytes:
-    return file_of(motion, codec=codec_of(plan), grouping="all", **edits)

@@ -39,8 +39,6 @@ UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 Ints = NDArray[np.int64]
 Lengths = tuple[Sequence[int], Sequence[int]]  # of the codes of gaps and values
 FRAME, CLIP, MDTT, PCA_RDO = "lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo"
-WINDOWS = "Codec 20: lsdt-clip"
-HEADINGS = {FRAME: "Codec 19: lsdt-frame", CLIP: WINDOWS, MDTT: WINDOWS, PCA_RDO: WINDOWS}
 
 
 def waves(number: int, n_rows: int, n: int) -> Ints:

@@ -14,18 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_name, raw
+from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.parameters import SCALED
 from mcz.codecs.wavelet import mrdwt, streams
 from mcz.coding import mixing
 from mcz.coding.start import start_states
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.motion import Motion
 from mcz.schema import varint
 from mcz.transforms import dwt
 from mcz.transforms.wavelets import Wavelet, by_id
 from tools.vectors.build.files import file_of, partial
-from tools.vectors.build.motions import puppet, wave
 
 HEADING = "Codec 16: wavelet"
 HAAR, DB2, DB3, DB8, BIOR = 1, 2, 3, 8, 10  # ids
@@ -116,19 +115,6 @@ def header(plan: Plan, **parts: bytes) -> bytes:
 
 def counted(taps: Sequence[float]) -> bytes:
     return varint(len(taps)) + struct.pack(f"<{len(taps)}d", *taps)
-
-
-def waves(plan: Plan, n_channels: int = 1, **changes: Any) -> tuple[Wave, ...]:
-    """Channels of smooth approximations and sparse details, no two alike."""
-    made = []
-    for seed in range(n_channels):
-        bands = [[round(100 * value) for value in wave(plan.lengths[-1], seed)]]
-        bands += [
-            details(plan, plan.lengths[level], 5 * seed + level)
-            for level in range(plan.levels, 0, -1)
-        ]
-        made.append(Wave(bands, **changes))
-    return tuple(made)
 
 
 def details(plan: Plan, count: int, seed: int) -> list[int]:
@@ -253,14 +239,6 @@ def values_of(plan: Plan, channels: Sequence[Wave], resolution: int = 0) -> NDAr
     return values
 
 
-def motion_of(plan: Plan, channels: Sequence[Wave], **changes: Any) -> Motion:
-    """The clip as it is decoded: plain scalars of one joint, or as ``changes`` have it."""
-    names = tuple(Channel("", f"needle {c}") for c in range(len(channels)))
-    skeleton = Skeleton((Joint("dial", channels=names),), name="dial")
-    signal = Signal(values_of(plan, channels), mask=changes.pop("mask", None))
-    return Motion(**({"skeleton": skeleton, "signals": (signal,), "name": "wave"} | changes))
-
-
 def file_with(plan: Plan, channels: Sequence[Wave], motion: Motion, **edits: Any) -> bytes:
     grouping = edits.pop("grouping", "channel")
     return file_of(motion, codec=codec_of(plan, channels), grouping=grouping, **edits)
@@ -279,14 +257,3 @@ def request(
     coarse = replace(motion, signals=(first, *motion.signals[1:]))
     arguments, arrays = partial(coarse, frames, joints)
     return (*arguments, "--resolution", str(resolution)), arrays
-
-
-def dance_of(plan: Plan, made: Sequence[Wave] = (), **changes: Any) -> Motion:
-    """The puppet, whose third joint has no channels."""
-    fields = {"skeleton": puppet(), "name": "dance"} | changes
-    return motion_of(plan, made or waves(plan, 6), **fields)
-
-
-def as_codec(name: str, made: Codec) -> Codec:
-    own = by_name(name)
-    return replace(own, encode=made.encode, parameters=raw.CODEC.parameters, dial=None)

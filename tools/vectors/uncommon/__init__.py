@@ -1,5 +1,5 @@
-"""Files that are rare but legal: containers, and a module for the folders of all codecs."""
+"""Files that are rare but legal: containers."""
 
-from tools.vectors.uncommon import codecs, container
+from tools.vectors.uncommon import container
 
-MODULES = (container, codecs)
+MODULES = (container,)
