@@ -123,35 +123,53 @@ def build_chunk(kind: bytes, payload: bytes, flags: int = 0) -> bytes:
 def parse_header(data: bytes, offset: int) -> Chunk:
     """The chunk whose header is ``data``, which was read at ``offset``."""
     if len(data) < HEADER.size:
-        raise TruncatedError(f"a chunk header at {offset} ends after {len(data)} of 16 bytes")
+        raise TruncatedError(
+            f"a chunk header at {offset} ends after {len(data)} of 16 bytes", offset=offset
+        )
     kind, flags, reserved, check, length = HEADER.unpack(data[: HEADER.size])
     if check != zlib.crc32(data[:6] + data[8:16]) & 0xFFFF:  # CHUNK-02
         raise ChecksumError(
-            f"header_check of the chunk at {offset} is {check:#06x}, which is wrong"
+            f"header_check of the chunk at {offset} is {check:#06x}, which is wrong",
+            offset=offset,
+            value=check,
         )
     if not (kind.isalpha() and kind.isascii()):  # CHUNK-08
-        raise FormatError(f"chunk type {kind!r} at {offset} is not four ASCII letters")
+        raise FormatError(
+            f"chunk type {kind!r} at {offset} is not four ASCII letters", offset=offset
+        )
     if reserved or flags & ~KNOWN_FLAGS:  # CHUNK-09
         raise FormatError(
-            f"chunk {kind.decode()} at {offset}: flags {flags:#x}, reserved {reserved}"
+            f"chunk {kind.decode()} at {offset}: flags {flags:#x}, reserved {reserved}",
+            offset=offset,
+            value=flags,
         )
     if length == OPEN_LENGTH:
         if kind != ChunkType.DATA:  # CHUNK-10
-            raise FormatError(f"chunk {kind.decode()} at {offset} is open; only DATA may be")
+            raise FormatError(
+                f"chunk {kind.decode()} at {offset} is open; only DATA may be", offset=offset
+            )
         return Chunk(kind, flags, offset, None)
     if length > MAX_COUNT:
-        raise FormatError(f"chunk {kind.decode()} at {offset}: length {length} is beyond 2^53 - 1")
+        raise FormatError(
+            f"chunk {kind.decode()} at {offset}: length {length} is beyond 2^53 - 1",
+            offset=offset,
+            value=length,
+        )
     return Chunk(kind, flags, offset, length)
 
 
 def read_chunk(source: ByteSource, offset: int) -> Chunk:
     """The chunk at ``offset``, its payload not read; raises TruncatedError past the file's end."""
     if offset + HEADER.size > source.size:
-        raise TruncatedError(f"the file ends at {source.size}, in a chunk header at {offset}")
+        raise TruncatedError(
+            f"the file ends at {source.size}, in a chunk header at {offset}", offset=offset
+        )
     chunk = parse_header(source.read(offset, HEADER.size), offset)
     if chunk.length is not None and chunk.offset + chunk.size > source.size:  # CHUNK-05
         raise TruncatedError(
-            f"chunk {chunk.label} ends at {chunk.offset + chunk.size}, the file at {source.size}"
+            f"chunk {chunk.label} ends at {chunk.offset + chunk.size}, the file at {source.size}",
+            offset=offset,
+            value=chunk.length,
         )
     return chunk
 
@@ -159,9 +177,13 @@ def read_chunk(source: ByteSource, offset: int) -> Chunk:
 def read_payload(source: ByteSource, chunk: Chunk, limit: int) -> bytes:
     """The checked payload of ``chunk``; raises ChecksumError, or LimitError beyond ``limit``."""
     if chunk.length is None:
-        raise FormatError(f"chunk {chunk.label} is open")
+        raise FormatError(f"chunk {chunk.label} is open", offset=chunk.offset)
     if chunk.length > limit:
-        raise LimitError(f"chunk {chunk.label}: {chunk.length} bytes are over the limit of {limit}")
+        raise LimitError(
+            f"chunk {chunk.label}: {chunk.length} bytes are over the limit of {limit}",
+            offset=chunk.offset,
+            value=chunk.length,
+        )
     return check_chunk(source.read(chunk.offset, chunk.size), chunk)
 
 
@@ -169,9 +191,9 @@ def check_chunk(data: bytes, chunk: Chunk) -> bytes:
     """The payload in ``data``, the bytes of the whole ``chunk``, after its crc was checked."""
     found = parse_header(data, chunk.offset)
     if chunk.length is None or len(data) != chunk.size:
-        raise FormatError(f"chunk {chunk.label} is not whole")
+        raise FormatError(f"chunk {chunk.label} is not whole", offset=chunk.offset)
     if (found.type, found.length) != (chunk.type, chunk.length):
-        raise FormatError(f"chunk {chunk.label} is not what the index says")
+        raise FormatError(f"chunk {chunk.label} is not what the index says", offset=chunk.offset)
     check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
     return data[HEADER.size : -CRC.size]
 
@@ -181,7 +203,9 @@ def check_crc(chunk: Chunk, computed: int, crc: bytes) -> None:
     (stored,) = CRC.unpack(crc)
     if stored != computed:  # CHUNK-03
         raise ChecksumError(
-            f"crc of chunk {chunk.label} is {computed:#010x}, stored is {stored:#010x}"
+            f"crc of chunk {chunk.label} is {computed:#010x}, stored is {stored:#010x}",
+            offset=chunk.offset,
+            value=stored,
         )
 
 
@@ -200,7 +224,9 @@ def parse_foot(data: bytes, offset: int) -> Foot | None:
         return None
     flags, crc, index_offset, index_length, _ = FOOT.unpack(data)
     if crc != zlib.crc32(data[:4] + data[8:]):  # FOOT-02
-        raise ChecksumError(f"crc of FOOT at {offset} is {crc:#010x}, which is wrong")
+        raise ChecksumError(
+            f"crc of FOOT at {offset} is {crc:#010x}, which is wrong", offset=offset, value=crc
+        )
     if flags:  # FOOT-01
         raise FormatError(f"FOOT at {offset}: flags {flags:#x}, of which none is defined")
     if index_length and (

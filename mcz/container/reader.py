@@ -359,7 +359,8 @@ class Container:
         # INDX-02, INDX-03, PACK-04, PACK-08, PACK-09, PACK-11, PACK-15
         if not is_packet(data, Packet(row.packet, 0, body, fresh, implied)):
             raise ChecksumError(
-                f"crc of the packet at {row.offset} is wrong, or it is not frame {number}"
+                f"crc of the packet at {row.offset} is wrong, or it is not frame {number}",
+                offset=row.offset,
             )
         return body
 
@@ -374,7 +375,10 @@ class Container:
 
     def _check_row(self, row: SegmentRow) -> None:
         if row.stop > self.source.size:
-            raise FormatError(f"a segment is said to lie at {row.offset}, past the end of the file")
+            raise FormatError(
+                f"a segment is said to lie at {row.offset}, past the end of the file",
+                offset=row.offset,
+            )
         limit = self.profile.packet_bytes if row.packet else self.profile.chunk_bytes
         check(f"DATA at {row.offset}: bytes", row.size, limit)
 
@@ -397,13 +401,16 @@ def _table_in(data: bytes, row: SegmentRow, counts: StreamCounts) -> StreamTable
     except TruncatedError as error:
         if len(data) < row.size:
             raise
-        raise FormatError(f"DATA payload at {row.offset}: {error}") from None
+        raise FormatError(f"DATA payload at {row.offset}: {error}", offset=row.offset) from None
     if table.header != row.header:
         raise FormatError(
-            f"segment at {row.offset} is {table.header}, but the index says {row.header}"
+            f"segment at {row.offset} is {table.header}, but the index says {row.header}",
+            offset=row.offset,
         )
     if table.payload_size != row.size:  # DATA-01
         raise FormatError(
-            f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes"
+            f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes",
+            offset=row.offset,
+            value=table.payload_size,
         )
     return table

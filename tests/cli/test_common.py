@@ -160,7 +160,7 @@ def test_errors_are_json_where_it_is_asked_for(
     cut.write_bytes(data)
     found = document("decode", cut, "--to", "csv")
     assert (found["class"], found["exit_code"]) == ("ChecksumError", 1)
-    assert "offset" in found
+    assert f" at {found['offset']} " in found["message"] and found["value"] is not None
     (tmp_path / "walk.bvh").write_bytes(b"HIERARCHY")
     found = document("sample", tmp_path)
     assert (found["class"], found["hint"]) == ("ExistsError", "force")
