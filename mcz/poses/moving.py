@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -16,6 +16,9 @@ from mcz.motion import Motion, Skeleton, check_poses
 from mcz.skeleton import Joints, joint_columns, joint_list
 from mcz.types import Reals, Values
 from mcz.units import unit_cm_of
+
+if TYPE_CHECKING:
+    from mcz.kinematics.frames import FramePoses
 
 Frames = tuple[int, int] | slice | None
 
@@ -40,6 +43,13 @@ class Decoded(Protocol):
 
 
 Moving = Motion | Decoded
+
+
+def poses_of(skeleton: Skeleton) -> FramePoses:
+    """The poses of a skeleton; kernels are loaded then, not where poses are imported."""
+    from mcz.kinematics.frames import frame_poses_of
+
+    return frame_poses_of(skeleton)
 
 
 def frame_range(moving: Moving, frames: Frames) -> tuple[int, int]:

@@ -13,7 +13,6 @@ from mcz.errors import MotionError, OptionError
 from mcz.kinematics import first_points
 from mcz.kinematics import point_names as names_of_points
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.frames import frame_poses_of
 from mcz.motion import Skeleton
 from mcz.poses.changes import accelerations_of, velocities_of
 from mcz.poses.conversions import from_matrices
@@ -23,6 +22,7 @@ from mcz.poses.moving import (
     as_type,
     frame_range,
     joint_numbers,
+    poses_of,
     scale_to,
     values_of,
 )
@@ -84,7 +84,7 @@ def positions(
 
 def _positions(moving: Moving, joints: Joints, span: tuple[int, int]) -> Floats:
     points = chosen_points(moving.skeleton, joints)
-    poses = frame_poses_of(moving.skeleton)
+    poses = poses_of(moving.skeleton)
     needed = poses.above(poses.joints_of(points))
     return poses.positions(values_of(moving, span, needed), points)
 
@@ -204,7 +204,7 @@ def root(
     skeleton, span = moving.skeleton, frame_range(moving, frames)
     scale = scale_to(skeleton, unit)
     (number,) = joint_numbers(skeleton, 0 if joint is None else joint)
-    poses = frame_poses_of(skeleton)
+    poses = poses_of(skeleton)
     values = values_of(moving, span, poses.above([number]))
     turns = from_matrices(poses.world(values, [number]), "quat")
     return Root(

@@ -6,9 +6,16 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import OptionError
-from mcz.kinematics.frames import frame_poses_of
 from mcz.poses.conversions import check_form, check_order, from_matrices
-from mcz.poses.moving import Frames, Moving, as_type, frame_range, joint_numbers, values_of
+from mcz.poses.moving import (
+    Frames,
+    Moving,
+    as_type,
+    frame_range,
+    joint_numbers,
+    poses_of,
+    values_of,
+)
 from mcz.skeleton import Joints
 from mcz.types import Reals
 
@@ -46,7 +53,7 @@ def rotations(
         raise OptionError(f"space {space!r}: one of {', '.join(SPACES)}")
     skeleton, span = moving.skeleton, frame_range(moving, frames)
     chosen = joint_numbers(skeleton, joints)
-    poses = frame_poses_of(skeleton)
+    poses = poses_of(skeleton)
     needed = chosen if space == "local" else poses.above(chosen)
     values = values_of(moving, span, needed)
     turns = poses.local(values, chosen) if space == "local" else poses.world(values, chosen)
