@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mcz.errors import FormatError, TruncatedError
 from mcz.schema.records import Record, RecordType
 from mcz.schema.types import UVARINT, Checked, Exactly, Sized, Text, as_construct
-from mcz.schema.varints import MAX_COUNT, varint
+from mcz.schema.varints import MAX_COUNT, read_varint, varint
 
 R = TypeVar("R", bound=Record)
 Numbers: TypeAlias = NDArray[np.int64]
@@ -26,6 +26,7 @@ Item: TypeAlias = int | bytes | str
 Row: TypeAlias = tuple[Item, ...]
 
 MOST_BYTES = 8  # of a varint
+FEW = 8  # varints, which Python reads sooner than NumPy
 
 
 class Table(Sequence[R], Generic[R]):
@@ -183,6 +184,12 @@ def _piece(data: np.ndarray, at: int, size: int) -> np.ndarray:
 
 def read_varints(data: np.ndarray, at: int, count: int) -> tuple[Numbers, int]:
     """The ``count`` varints at ``at``, and where they end; raises FormatError."""
+    if count <= FEW:
+        few, found, end = data[at : at + MOST_BYTES * count].tobytes(), [], 0
+        for _ in range(count):
+            value, end = read_varint(few, end)
+            found.append(value)
+        return np.array(found, np.int64), at + end
     if count > len(data) - at:  # CONV-13
         raise TruncatedError(f"{count} varints run past the end")
     short = data[at : at + count]
