@@ -1,4 +1,4 @@
-"""What no vector shows of the container: parts of attachments, salvage of what is no chunk."""
+"""The container beyond its vectors: parts of attachments, salvage of what is no chunk."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ class ClipRow:
 
     @property
     def packed(self) -> Packed | None:
-        """What an index says of the segments, where they were not unpacked yet."""
+        """The segments as an index has them, while they were not unpacked."""
         return None
 
     def __eq__(self, other: object) -> bool:
@@ -134,7 +134,7 @@ class ClipRow:
 
 
 class PackedClipRow(ClipRow):
-    """That of an index: ``segments`` stay packed until they are asked for.
+    """A row of an index, whose ``segments`` stay packed until they are asked for.
 
     They raise FormatError where the index is wrong.
     """

@@ -1,4 +1,4 @@
-"""What a parser finds in the bytes of a file."""
+"""Events: the things that a parser finds in the bytes of a file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ChunkEvent:
 
     @property
     def end(self) -> int:
-        """Where it ends, of an open DATA where its first packet begins."""
+        """The offset behind it; of an open DATA that of its first packet."""
         chunk = self.chunk
         return chunk.payload_offset if chunk.length is None else chunk.offset + chunk.size
 

@@ -86,7 +86,7 @@ def index_record(directory: Directory, since: IndexPlace | None = None) -> Index
 
 @dataclass(slots=True)
 class Listing:
-    """What an index lists: all of ``new``, which lies behind ``start``.
+    """The content of an index: all of ``new``, which lies behind ``start``.
 
     ``behind``: new ancillary chunks of the clip before.
     """
@@ -162,5 +162,5 @@ def segment_rows(clip: ClipRow) -> Packed:
 
 
 def end_of(clip: ClipRow, rows: Packed) -> int:
-    """Where the last of these segments of a clip ends, or its CLIP."""
+    """The end of the last of these segments of a clip, or of its CLIP."""
     return clip.clip.stop + sum(gap + size for gap, size, *_ in rows)

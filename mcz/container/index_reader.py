@@ -96,7 +96,7 @@ def _inflated(payload: bytes, offset: int, limit: int, where: str) -> tuple[Indx
 
 
 def named(data: bytes, offset: int) -> PreviousIndex:
-    """How an INDX is named whose bytes at ``offset`` are ``data``."""
+    """The name of the INDX whose bytes at ``offset`` are ``data``."""
     (crc,) = CRC.unpack(data[-CRC.size :])
     return PreviousIndex(offset=offset, length=len(data), crc=crc)
 
@@ -171,14 +171,14 @@ def _add(table: dict[str, T], name: str, row: T) -> None:
 
 
 def _bounds(counts: Numbers, total: int, what: str) -> Numbers:
-    """Where the items of each begin in a table of ``total`` items, and where the last ones end."""
+    """The first item of each in a table of ``total`` items, and the end of the last ones."""
     if counts.sum(dtype=np.float64) != total:  # INDX-08
         raise FormatError(f"INDX: {what} are not as many as their counts say")
     return np.concatenate(([0], np.cumsum(counts)))
 
 
 def _ends(sizes: Numbers, start: int) -> Numbers:
-    """Where things of these sizes end that lie one after the other from ``start`` on."""
+    """The ends of things of these sizes that lie one after the other from ``start`` on."""
     if start + sizes.sum(dtype=np.float64) > MAX_COUNT:  # CONV-01
         raise FormatError("INDX: an offset beyond 2^53 - 1")
     return start + np.cumsum(sizes)
@@ -209,7 +209,7 @@ class ClipTables:
         self.ends = self._ends()
 
     def _ends(self) -> Numbers:
-        """Where the CEND of each clip ends."""  # INDX-01
+        """The end of the CEND of each clip."""  # INDX-01
         number, segments = self.clips.numbers, self.index.segments
         inside = np.concatenate(([0], _ends(segments.numbers("gap") + segments.numbers("size"), 0)))
         data = np.diff(inside[self.segment_bounds])

@@ -110,7 +110,7 @@ def pack_skeleton(payload: bytes) -> bytes:
 
 
 def is_packed(payload: bytes, where: str) -> bool:
-    """Whether the fields of a SKEL are packed."""
+    """True where the fields of a SKEL are packed."""
     return parse(PackedSkel, payload, where).size is not None
 
 

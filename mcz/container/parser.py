@@ -167,7 +167,7 @@ class Parser:
         return Fault(begin, error, self._chunk, is_lost=is_lost)
 
     def _found(self) -> Event | None:
-        """What is whole at ``at`` or behind it."""
+        """The next thing that is whole, at ``at`` or behind it."""
         while True:
             begin = self.at
             for match in self.candidate.finditer(self._data, begin - self._start):
@@ -220,7 +220,7 @@ class Parser:
             self.state = rows[self.state]
 
     def _position(self, start: int, stop: int, what: str = "a packet") -> int:
-        """Where the byte at ``start`` lies in the buffer, which has all up to ``stop``."""
+        """The place of the byte at ``start`` in the buffer, which has all up to ``stop``."""
         if stop > self._start + len(self._data):
             if self.size is not None and stop > self.size:
                 raise TruncatedError(f"{self._name} ends at {self.size}, in {what} at {self.at}")
@@ -228,7 +228,7 @@ class Parser:
         return start - self._start
 
     def _thing(self) -> Event | None:
-        """What begins at ``at``; raises FormatError where it is not whole."""
+        """The thing that begins at ``at``; raises FormatError where it is not whole."""
         if self._parts is not None:
             return self._continued(*self._parts)
         if self.state == PACKETS:

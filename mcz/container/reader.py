@@ -154,7 +154,7 @@ class Container:
         return foot
 
     def _directory(self, foot: Foot, tail: bytes) -> Directory:
-        """What INDX says, and those that it continues."""
+        """The content of INDX, and of those that it continues."""
         if foot.index_length < FRAMING:
             raise FormatError(f"FOOT: an index of {foot.index_length} bytes")
         begin = self.source.size - len(tail)

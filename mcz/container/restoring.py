@@ -165,7 +165,7 @@ def _copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy
 
 
 def _sound_spans(found: Found) -> list[tuple[int, int]]:
-    """Where the chunks and FOOTs lie that were found whole, in file order."""
+    """The spans of chunks and FOOTs that were found whole, in file order."""
     feet = [(at, at + FOOT.size) for at in found.feet]
     return sorted(feet + [(chunk.offset, _end(chunk, found)) for chunk in found.chunks])
 
@@ -203,7 +203,7 @@ def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
 
 
 def _last_index(source: ByteSource, found: Found) -> Directory | None:
-    """What the last INDX says that is whole, and those that it continues up to a damaged one."""
+    """The content of the last whole INDX, and of those that it continues up to a damaged one."""
     for chunk in reversed(found.chunks):
         if chunk.type == ChunkType.INDX:
             whole: list[Listed] = []

@@ -87,7 +87,7 @@ class TolerantParser(Parser):
         return event
 
     def _found(self) -> Event | None:
-        """What is whole at ``at`` or behind it; a packet that was short is tried when it came."""
+        """The next thing that is whole; a packet that was short is tried when it came."""
         while True:
             end = self._start + len(self._data)
             pattern = _ANY_PACKET if self.state == PACKETS else _ANY_CHUNK
@@ -112,7 +112,7 @@ class TolerantParser(Parser):
                 raise Short(max(end + 1, min(self._short.values(), default=0)))
 
     def _tried_at(self, at: int) -> Event | None:
-        """What is whole at ``at``, or the end of a search that was given up."""
+        """The thing that is whole at ``at``, or the end of a search that was given up."""
         state, chunk = self.state, self._chunk
         self.at, self._tried = at, 0
         self._short.pop(at, None)

@@ -162,7 +162,7 @@ def rename_clips(
 
 
 def _renamed(file: File, thing: Thing, new: str) -> Change:
-    """What makes a thing one that is called ``new``: the path of a clip's source may follow."""
+    """The change that names a thing ``new``: the path of a clip's source may follow."""
     path = path_of(file, thing) if thing[0] == CLIP else ""
     suffix = PurePosixPath(path).suffix
     return Change(new, new + suffix if path and path == thing[1] + suffix else None)

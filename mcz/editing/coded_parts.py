@@ -59,7 +59,7 @@ class Ask:
 
 
 def ask_of(entry: Entry, profile: Profile) -> Ask:
-    """What is asked for so that ``entry`` can be joined."""
+    """The request by which ``entry`` can be joined."""
     return Ask(entry.path, entry.name, entry.options, entry.encoding, profile)
 
 

@@ -147,7 +147,7 @@ class Merging:
             yield found
 
     def _plan(self, file: File, double: list[str]) -> Plan:
-        """What of ``file`` goes into the new file; ``double`` learns what cannot."""
+        """The parts of ``file`` that go into the new file; ``double`` learns those that cannot."""
         plan = whole(file)
         for thing in list(plan.things):
             kind, name = thing
@@ -196,7 +196,7 @@ class Merging:
 
 
 def _content(file: File, thing: Thing) -> Callable[[], object]:
-    """What finds the content of a thing, which is the same in two that can stand for each other."""
+    """A finder of the content of a thing, the same in two that can stand for each other."""
     kind, name = thing
     if kind == ALIAS:
         return _of_alias(file, name)

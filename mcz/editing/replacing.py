@@ -150,7 +150,7 @@ class _Editor(Copier):
         return cut.clip.name != self.edited.name
 
     def replacement(self) -> Replacement:
-        """What was done."""
+        """The report of the replacement."""
         addresses = self.edited.skeleton.addresses()
         return Replacement(
             clip=self.edited.name,

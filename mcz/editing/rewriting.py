@@ -76,7 +76,7 @@ def things_in(held: File | Directory) -> Iterator[Thing]:
 
 @dataclass(slots=True)
 class Plan:
-    """What of a file goes into a new one.
+    """The parts of a file that go into a new one.
 
     ``things`` are what has a name, clips in their new order, and what is said otherwise of them.
     ``shared`` goes along, needed by a clip or not. ``purges``: no META is carried over, for the

@@ -83,7 +83,7 @@ class SomeSignals(Clip):
 
 
 def has_motion(clip: Clip) -> bool:
-    """Whether a clip, or the rest of one, has its first signal."""
+    """True of a clip, or the rest of one, that has its first signal."""
     return not isinstance(clip, SomeSignals) or 0 in clip.kept
 
 

@@ -134,7 +134,7 @@ def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
 
 
 def _meant(file: File, one: Stored) -> Thing:
-    """What a file is, or what the alias stands for that it is."""
+    """The thing that a file is, or that the alias which it is stands for."""
     return file.alias_of(one.name) if one.kind == ALIAS else (one.kind, one.name)
 
 

@@ -281,7 +281,7 @@ class LiveWriter:
         self._has_data, self._was_masked = True, False
 
     def _repeats(self) -> bool:
-        """Whether the fresh frame that is due is preceded by what a reader needs who joins."""
+        """True where the fresh frame that is due follows what a reader needs who joins."""
         asked = self.traffic.asked
         if self._repeat is not None:
             return self._repeat > 0 and (self._n_fresh - 1) % self._repeat == 0

@@ -1,4 +1,4 @@
-"""What a file, or a source file, says of itself: the document of ``mcz info``."""
+"""The document of ``mcz info``: a file, or a source file, described."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def _recording(clip: Clip) -> JsonObject | None:
 
 
 def _arrays(clip: Clip) -> list[JsonObject] | None:
-    """What became of the arrays of the source, None where it has none."""
+    """The fate of the arrays of the source, None where it has none."""
     if clip.source is None or FORMATS[clip.source.format].arrays is None:
         return None
     return arrays_of(clip.motion((0, 0)).source, [signal.name for signal in clip.signals])

@@ -51,7 +51,7 @@ class SignalInfo:
 
     @property
     def has_poses(self) -> bool:
-        """Whether it is a motion whose channels are those of the skeleton."""
+        """True of a motion whose channels are those of the skeleton."""
         return self.role == "motion" and self.channels is None
 
     @property

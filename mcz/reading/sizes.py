@@ -1,4 +1,4 @@
-"""Where the bytes of a file go: parts of clips, ratios, shares of groups, and every range of bytes.
+"""The bytes of a file: parts of clips, ratios, shares of groups, and every range of bytes.
 
 docs/measures.md, "Sizes and ratios", is normative.
 """

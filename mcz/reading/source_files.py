@@ -94,7 +94,7 @@ def read_bytes(path: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class SourceOptions:
-    """What the caller says of a source file.
+    """Facts about a source file that its caller states.
 
     ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit``,
     ``up``, the axis that points up ("y", "-z"), ``forward``, the one that a figure faces, and
@@ -130,7 +130,7 @@ class SourceOptions:
 
     @property
     def axes(self) -> tuple[str | None, str | None, str | None]:
-        """What is said of axes, as ``facing`` takes it."""
+        """The stated axes, as ``facing`` takes them."""
         return self.up, self.forward, self.handedness
 
     def applied_to(self, motion: Motion) -> Motion:

@@ -114,7 +114,7 @@ def _decoded(
 
 
 def _is_same(given: Values, found: Values) -> bool:
-    """Whether the bits are the same, those of NaN apart."""
+    """True where the bits are the same, those of NaN apart."""
     own, other = (np.ascontiguousarray(values).view(np.int64) for values in (given, found))
     if given.dtype == found.dtype and np.array_equal(own, other):
         return True

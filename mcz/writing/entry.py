@@ -39,7 +39,7 @@ from mcz.writing.tuning import write_motion
 
 @dataclass(frozen=True, slots=True)
 class EncodingOptions:
-    """How values are encoded: the name of a codec and its parameters.
+    """Options of encoding: the name of a codec and its parameters.
 
     Raises OptionError for an unknown codec.
     """
@@ -65,7 +65,7 @@ def encoding_options(
 
 @dataclass(frozen=True, slots=True)
 class WritingOptions:
-    """How a file is written.
+    """Options of the file that is written.
 
     ``force`` replaces a file that is there. ``copies``: what holds clips together stands in the
     file a second time. ``threads`` may code at once, by default one a processor, and ``jobs``

@@ -73,7 +73,7 @@ def prepare(
 
 
 def read_with(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[StoredSkeleton, ...]:
-    """What is stored of a skeleton that was read with ``base``, whose file stays as it is."""
+    """The stored skeletons of one that was read with ``base``, whose file stays as it is."""
     if base is None:
         return (StoredSkeleton(skeleton),)
     derives = skeleton.base is not None or axes_of(skeleton) != axes_of(base.skeleton)

@@ -1,4 +1,4 @@
-"""What the codecs of ordinals keep to, on every grid: any numbers come back."""
+"""Properties of the codecs of ordinals, on every grid: any numbers come back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a manifest row says of a file itself: the codecs and source formats of its clips."""
+"""The part of a manifest row about the file itself: codecs and source formats of its clips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which vectors show the rules of posewave and of what it is made of."""
+"""The vectors of the rules of posewave and of its parts."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class Vector:
 
 
 class _Unchecked(ClipCopy):
-    """What a codec decodes of streams that a reader may refuse; of a lossless one what it had."""
+    """The values that a codec decodes of streams a reader may refuse; of a lossless one its own."""
 
     def __init__(self, profile: Profile) -> None:
         super().__init__(profile)
@@ -252,7 +252,7 @@ class Crafter(Writer):
         return short and self._implies_rest(header, streams)
 
     def _implies_rest(self, header: SegmentHeader, streams: Sequence[bytes]) -> bool:
-        """Whether a packet of kind 2 would say the same as this segment."""
+        """True where a packet of kind 2 would say the same as this segment."""
         before, others = self._implying, header.flags & ~(FRESH | MASKS)
         if header.signal or header.n_frames > 1 or header.lead or header.tail or others:
             return False

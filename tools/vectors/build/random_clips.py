@@ -195,7 +195,7 @@ def _fill(chance: Chance) -> Callable[[int, int, int], Ints]:
 
 
 def _about(chance: Chance) -> dict[str, Any]:
-    """What lsdt-frame, lsdt-clip and online have in common."""
+    """The common part of lsdt-frame, lsdt-clip and online."""
     apart = chance.random() < 0.4
     n = 3 * chance.randrange(1, 4) if apart else chance.randrange(1, 8)
     bases = ()

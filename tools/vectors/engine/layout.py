@@ -248,7 +248,7 @@ class Layout:
             at += len(part.build())
 
     def indexed(self, listing: Listing) -> Listing:
-        """What an INDX has to say where it said ``listing`` of the base file."""
+        """The content that an INDX needs where it had ``listing`` of the base file."""
         moved = {part.place: part for part in self.parts if part.place is not None}
         was, new = listing.new, Directory()
         for name, (kind, target) in was.aliases.items():
@@ -326,7 +326,7 @@ Moved = Mapping[int | None, Part]
 
 
 def _moved(chunk: Chunk, moved: Moved) -> Chunk | None:
-    """Where a chunk of the base file lies now; None where it is not there any more."""
+    """The place of a chunk of the base file now; None where it is not there any more."""
     part = moved.get(chunk.payload_offset)
     if part is None:
         return None
@@ -341,7 +341,7 @@ def has_segment(part: Part) -> bool:
 
 
 def listing_of(part: Part, data: bytes) -> tuple[Listing, PreviousIndex | None]:
-    """What an INDX of the file ``data`` lists, and which one it continues."""
+    """The content of an INDX of the file ``data``, and the one that it continues."""
     at = (part.place or 0) - HEADER.size
     chunk = data[at : at + len(part.payload) + FRAMING]
     listed = parse_index(chunk, at, LIMIT)
@@ -363,7 +363,7 @@ def stop_of(part: Part) -> int:
 
 
 def previous_of(part: Part) -> PreviousIndex:
-    """How an INDX names this one that it continues."""
+    """The name that an INDX has for this one, which it continues."""
     chunk = part.build()
     (crc,) = CRC.unpack(chunk[-CRC.size :])
     return PreviousIndex(offset=part.offset - HEADER.size, length=len(chunk), crc=crc)

@@ -82,7 +82,7 @@ class Row:
 
     @property
     def coded(self) -> bool:
-        """Whether the row writes segments out: it holds what mcz decodes.
+        """True where the row writes segments out: it holds what mcz decodes.
 
         The row's hashes and the other decoder vouch for that.
         """
