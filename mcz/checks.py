@@ -109,7 +109,7 @@ def _items(value: object) -> tuple[object, ...]:
 def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
     """The rule of a field that is a ``kind``."""
 
-    def form(value: object) -> Any:
+    def form(value: object) -> object:
         if not isinstance(value, kind):
             raise TypeError
         return value

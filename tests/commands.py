@@ -80,7 +80,7 @@ class Started:
         self.stdin.flush()
 
     def address(self) -> str:
-        """Where it listens."""
+        """The address that it listens on."""
         return self.stderr.readline().decode().split()[-1]
 
     def end(self) -> int:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,7 +166,9 @@ def _signal(values: Values, name: str, channels: tuple[Channel, ...] | None) -> 
     )
 
 
-def _frames(dataset: Dataset, times: Floats, name: str) -> tuple[Any, NDArray[np.int64] | None]:
+def _frames(
+    dataset: Dataset, times: Floats, name: str
+) -> tuple[Fraction | None, NDArray[np.int64] | None]:
     """The rate, None while unknown, and the frame numbers, None for 1, 2, 3, ..."""
     fps = dataset.attrs.get("fps")
     in_seconds = dataset.attrs.get("time_unit", "seconds" if fps else "frames") == "seconds"

@@ -197,7 +197,7 @@ class _Places:
             clip.ancillary.append(chunk)
 
     def differences(self, listed: Directory) -> list[str]:
-        """What an index says that is not so, in words; empty where it is right."""
+        """The faults of an index, in words; empty where it is right."""
         found = []
         if listed.head != self.head:
             found.append("its copy of HEAD differs from HEAD")

@@ -171,7 +171,7 @@ def _sound_spans(found: Found) -> list[tuple[int, int]]:
 
 
 def _meet(spans: list[tuple[int, int]], start: int, stop: int) -> bool:
-    """Whether one of them has bytes of ``start`` <= offset < ``stop``."""
+    """True where one of them has bytes of ``start`` <= offset < ``stop``."""
     index = bisect_right(spans, (start, stop))
     return any(a < stop and start < b for a, b in spans[max(0, index - 1) : index + 1])
 

@@ -385,7 +385,7 @@ def recoded_quality(
 
 
 def _keys(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
-    """What a quality record says of a cut, of which ``old`` tells of earlier ones."""
+    """The entries of a quality record about a cut; ``old`` has those of earlier ones."""
     now = {key: value for key, value in old.items() if key.startswith("cut-")}
     if cut.resolution:
         before = _first_number(old.get("cut-resolution", ""), 1)

@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -42,6 +42,10 @@ from mcz.reading.stored_clip import StoredClip
 from mcz.reading.views import ClipValues, FrameValues, Masked, Preview, preview
 from mcz.skeleton import Joints, joint_list
 from mcz.types import Values
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 
 class Clip(StoredClip):
@@ -320,7 +324,7 @@ class Clip(StoredClip):
 
     def to_xarray(
         self, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
-    ) -> Any:
+    ) -> Dataset:
         """The whole clip as an ``xarray.Dataset``: see ``mcz.to_xarray``."""
         from mcz.tables.labelled import to_xarray
 
@@ -333,7 +337,7 @@ class Clip(StoredClip):
         joints: Joints = None,
         unit: str | None = None,
         flat: bool = False,
-    ) -> Any:
+    ) -> DataFrame:
         """A table of the whole clip as a ``pandas.DataFrame``: see ``mcz.to_pandas``."""
         from mcz.tables.frames import to_pandas
 

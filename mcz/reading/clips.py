@@ -34,7 +34,7 @@ def clip_called(clips: Clips, name: str) -> str:
 
 
 def names_of(clips: Clips) -> dict[str, set[str]]:
-    """What the clips may be called, as ``clips_meant`` finds it, for who asks for many."""
+    """The names that clips may have, as ``clips_meant`` finds it, for who asks for many."""
     known: dict[str, set[str]] = {name: {name} for name in clips}
     for names in _ways(clips):
         found: dict[str, set[str]] = {}
@@ -56,7 +56,7 @@ def clips_meant(clips: Clips, name: str) -> list[str]:
 
 
 def _ways(clips: Clips) -> Iterator[Named]:
-    """What the clips may be called, the plainest way first; the last reads of their sources."""
+    """The names that clips may have, the plainest way first; the last reads of their sources."""
     names = [(name, name) for name in clips]
     others = list(_of_clips(clips))
     yield others

@@ -198,7 +198,7 @@ def clip_problems(file: File, clip: Clip) -> list[Problem]:
 
 
 def _clip_errors(clip: Clip) -> Iterator[MczError]:
-    """What is wrong with each signal; one that is unsupported does not hide more."""
+    """The faults of each signal; one that is unsupported does not hide more."""
     found = _error(lambda: clip.signals)
     yield from found
     sound = not found

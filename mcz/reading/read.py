@@ -100,7 +100,7 @@ class Taken:
 
     @property
     def remark(self) -> str:
-        """What is to be said of the skeleton, "" where that is nothing."""
+        """The remark about the skeleton, "" where there is none."""
         return self.chosen.remark if self.chosen is not None else ""
 
 
@@ -165,7 +165,7 @@ def _asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> Chosen
 
 
 def how_given(skeleton: Skeleton) -> str:
-    """What is recorded of a skeleton that somebody named."""
+    """The record of a skeleton that somebody named."""
     name = _file_of(skeleton)
     return f"ASF as given: {name}" if name else "skeleton as given"
 

@@ -184,7 +184,7 @@ class Share:
 
 
 def byte_shares(clip: Clip) -> list[Share]:
-    """What each group of each signal takes, by resolution, and beside that; no part is empty.
+    """The bytes of each group of each signal, by resolution, and beside that; no part is empty.
 
     Reads the stream tables alone. The sum is the payload of ``mcz info``.
     """

@@ -167,7 +167,7 @@ def contradiction(format_name: str, template: bytes, rate: Fraction, step: int) 
 
 
 def recording(motion: Motion) -> Recording | None:
-    """What the source of ``motion`` says beside all numbers; None where it says nothing.
+    """The facts that the source of ``motion`` states beside all numbers; None where it has none.
 
     Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is that of a clip.
     Raises FormatError on bad bytes.
@@ -205,7 +205,7 @@ def read_recording(
 def scaling_of(
     signals: Sequence[SignalInfo], index: int, recording: Callable[[], Recording | None]
 ) -> Scaling | None:
-    """What the stored numbers of a signal mean; None where they are the values themselves."""
+    """The meaning of the stored numbers of a signal; None where they are the values themselves."""
     analog = next((info for info in signals if info.role == ANALOG), None)
     if analog is None or analog.index != index:
         return None

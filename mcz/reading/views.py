@@ -97,7 +97,7 @@ class Preview:
 
     @property
     def is_regular(self) -> bool:
-        """Whether every frame is ``step`` behind the one before."""
+        """True where every frame is ``step`` behind the one before."""
         return bool((np.diff(self.frames) == self.step).all())
 
     def masked(self) -> Values:

@@ -230,7 +230,7 @@ def _name(file: object) -> str:
 
 
 def _identity(file: object) -> object:
-    """What tells a file from all others; None for what is no file."""
+    """The identity of a file; None for what is no file."""
     if isinstance(file, (str, os.PathLike)):
         path = os.fspath(file)
         if isinstance(path, str) and "://" in path:

@@ -49,7 +49,7 @@ class WrittenClip:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What ``write`` and ``encode`` have written.
+    """The result of ``write`` and ``encode``.
 
     ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal. ``notes``: what
     is odd about the source file. ``source_bytes``: what the file gives back, of ``encode`` the
@@ -76,7 +76,7 @@ def written(
     notes: tuple[str, ...] = (),
     source_bytes: int = 0,
 ) -> Written:
-    """What a file of one clip or none holds, with its size and the quality record of that clip."""
+    """The content of a file of one clip or none, its size, and the quality record of that clip."""
     return Written(
         size=size,
         clips=tuple(

@@ -87,7 +87,7 @@ def under_its_path(skeleton: Skeleton) -> StoredSkeleton:
 
 
 def wants_positions(codec: Codec, options: Params, skeleton: Skeleton) -> bool:
-    """Whether a codec is to be given the positions of points instead of the channels of a clip."""
+    """True where a codec takes the positions of points instead of the channels of a clip."""
     if not codec.positions or options.get("domain") == "channels" or not skeleton.joints:
         return False
     return point_set(skeleton) != "markers"
