@@ -20,6 +20,7 @@ from mcz.numbers import (
     Tokens,
     choose_grid,
     fit,
+    print_values,
     scan,
 )
 
@@ -498,3 +499,31 @@ def test_vax_values(stored: str, value: float) -> None:
 def test_text_of_the_greatest_number_that_reads_as_infinity(token: bytes, grid: Grid) -> None:
     """A grid would print it so, but its number is another: an exception."""
     assert not grid.ordinals_of_tokens(scan(token, [0], [len(token)]))[1].any()
+
+
+@given(
+    st.lists(DOUBLES | st.integers(-999, 999).map(lambda n: n / 64), max_size=30),
+    st.sampled_from([0, 1, 4, 6, 15, 22]),
+    st.sampled_from([0, GridFlag.POINT_ZERO, GridFlag.NO_ZERO, GridFlag.PLUS, GridFlag.EXPONENT3]),
+)
+def test_a_matrix_is_printed_as_number_by_number(
+    numbers: list[float], digits: int, flag: int
+) -> None:
+    grids = [Grid(GridKind.FIXED, digits)]
+    if digits:
+        grids.append(Grid(GridKind.TRIMMED, digits, flag & GridFlag(15)))
+    if 1 <= digits <= 15:
+        grids.append(Grid(GridKind.GENERAL, digits, flag))
+    grids.append(Grid(GridKind.TEXT64))
+    values = np.repeat(np.array([*numbers, -0.0, math.nan])[:, None], len(grids), axis=1)
+    start, size = np.zeros((2, *values.shape), np.int64)
+    text = print_values(values, grids, 7, start, size).tobytes()
+    for column, grid in enumerate(grids):
+        ordinals, _ = grid.ordinals(values[:, column])
+        for row, expected in enumerate(grid.texts(ordinals)):
+            first = start[row, column] - 7
+            found = text[first : first + size[row, column]]
+            assert found in (b"", expected)
+            likely = -100 < values[row, column] < 100 and digits < 13 and grid.is_text
+            easy = values[row, column] == 0 or abs(values[row, column]) > 1e-4
+            assert found or not (likely and easy and grid.kind != GridKind.TEXT64)

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
 from mcz.motion import Signal
-from mcz.numbers import Grid, GridKind, scan
+from mcz.numbers import Grid, GridKind, print_values, scan
 from mcz.types import Values
 
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
-Columns = Ints | slice
-
 BLOCK = 2**17  # cells that are printed at a time
 INTEGERS = Grid(GridKind.FIXED)
 SHORTEST = Grid(GridKind.TEXT64)
-SLOW = (
-    GridKind.TEXT32,
-    GridKind.TEXT64,
-    GridKind.PRINTED,
-)  # printed by Python, not by a compiled loop
 
 
 class Cells:
@@ -39,12 +33,16 @@ class Cells:
         self.size = np.zeros((n_rows, n_columns + 1), np.int64)
         self._pieces: list[Bytes] = []
         self._total = 0
-        for grid, rows, columns in _by_grid(signal):
-            self._print(grid, signal.values[rows, columns], rows, columns)
+        step = max(1, BLOCK // max(1, n_columns))
+        for first, last, grids in _by_rows(signal):
+            for row in range(first, last, step):
+                self._print_rows(signal.values, slice(row, min(row + step, last)), grids)
         self._print_exceptions(signal)
         if numbers is not None:
-            ordinals = numbers - (numbers < 0)  # -1 - |n| where n is negative
-            self._add(INTEGERS, ordinals, slice(None), slice(n_columns, None))
+            texts = INTEGERS.texts(numbers - (numbers < 0))  # -1 - |n| where n is negative
+            self.start[:, -1] = texts.offsets[:-1] + self._total
+            self.size[:, -1] = np.diff(texts.offsets)
+            self._append(texts.buffer)
 
     def texts(self) -> Bytes:
         texts = np.concatenate([*self._pieces, np.zeros(1, np.uint8)])
@@ -70,37 +68,33 @@ class Cells:
         self._pieces.append(buffer)
         self._total += len(buffer)
 
-    def _add(self, grid: Grid, ordinals: Ints, rows: slice, columns: Columns) -> None:
-        starts, sizes = self.start[rows], self.size[rows]
-        step = max(1, BLOCK // max(1, ordinals.shape[1] if ordinals.ndim > 1 else 1))
-        for first in range(0, len(ordinals), step):
-            block = slice(first, first + step)
-            part = ordinals[block]
-            inverse: Ints | slice = slice(None)
-            unique: Ints = part.ravel()
-            if grid.kind in SLOW:  # what is the same is printed once
-                unique, inverse = np.unique(part, return_inverse=True)
-            texts = grid.texts(unique)
-            shape = starts[block, columns].shape
-            starts[block, columns] = (texts.offsets[:-1] + self._total)[inverse].reshape(shape)
-            sizes[block, columns] = np.diff(texts.offsets)[inverse].reshape(shape)
-            self._append(texts.buffer)
+    def _print_rows(self, values: Values, rows: slice, grids: Sequence[Grid]) -> None:
+        """Print rows of one grid a column, those of decimal grids at once."""
+        values, size = values[rows], self.size[rows]
+        self._append(print_values(values, grids, self._total, self.start[rows], size))
+        for grid in dict.fromkeys(grids):
+            columns = np.array([c for c, known in enumerate(grids) if known == grid])
+            row, column = np.nonzero(size[:, columns] == 0)
+            if len(row):
+                column = columns[column]
+                self._print(grid, values[row, column], row + rows.start, column)
 
-    def _print(self, grid: Grid, values: Values, rows: slice, columns: Columns) -> None:
+    def _print(self, grid: Grid, values: Values, rows: Ints, columns: Ints) -> None:
         """Print values by the nearest number of their grid, by repr where they lie beyond it."""
         if not grid.is_text:
             grid = SHORTEST  # GRID-07
         values = values.astype(np.float64, copy=False)
-        ordinals, exact = grid.ordinals(values)
-        self._add(grid, ordinals, rows, columns)
-        if exact.all():
-            return
+        words, inverse = np.unique(values.view(np.int64), return_inverse=True)
+        unique = words.view(np.float64)  # what is the same is printed once
+        ordinals, exact = grid.ordinals(unique)
+        texts = grid.texts(ordinals)
+        self.start[rows, columns] = (texts.offsets[:-1] + self._total)[inverse]
+        self.size[rows, columns] = np.diff(texts.offsets)[inverse]
+        self._append(texts.buffer)
         edge = np.maximum(ordinals, -1 - ordinals) == grid.limit
-        off = np.nonzero(~exact & (edge | ~np.isfinite(values)))
-        if len(off[0]):
-            all_columns = np.arange(self.start.shape[1])[columns]
-            texts = [repr(value).encode() for value in values[off].tolist()]
-            self.set(off[0] + (rows.start or 0), all_columns[off[1]], texts)
+        off = np.flatnonzero((~exact & (edge | ~np.isfinite(unique)))[inverse])
+        if len(off):
+            self.set(rows[off], columns[off], [repr(v).encode() for v in values[off].tolist()])
 
     def _print_exceptions(self, signal: Signal) -> None:
         """Print exceptions as they were where the value still is that of their text."""
@@ -121,20 +115,13 @@ class Cells:
         self.set(rows[kept], columns[kept], [exceptions.texts[k] for k in kept])
 
 
-def _by_grid(signal: Signal) -> Iterator[tuple[Grid, slice, Columns]]:
-    """Every cell once: (grid, rows, columns), as few and large blocks as there are grids."""
+def _by_rows(signal: Signal) -> Iterator[tuple[int, int, list[Grid]]]:
+    """Runs of rows in which no column changes its grid, with the grid of each column."""
     changes: dict[int, list[tuple[int, Grid]]] = {}
     for row, column, grid in signal.grid_changes:
-        changes.setdefault(column, []).append((row, grid))
-    of_grid: dict[Grid, list[int]] = {}
-    for column, grid in enumerate(signal.grids):
-        if column not in changes:
-            of_grid.setdefault(grid, []).append(column)
-    for grid, columns in of_grid.items():
-        together = len(columns) == signal.n_channels
-        yield grid, slice(None), slice(0, len(columns)) if together else np.array(columns)
-    for column, steps in changes.items():
-        edges = [0, *(row for row, _ in steps), signal.n_rows]
-        grids = [signal.grids[column], *(grid for _, grid in steps)]
-        for grid, start, stop in zip(grids, edges, edges[1:], strict=False):
-            yield grid, slice(start, stop), np.array([column])
+        changes.setdefault(row, []).append((column, grid))
+    grids = list(signal.grids)
+    for first, last in pairwise(sorted({0, signal.n_rows, *changes})):
+        for column, grid in changes.get(first, ()):
+            grids[column] = grid
+        yield first, last, grids

@@ -44,9 +44,10 @@ def restore(motion: Motion, source: Source) -> bytes:
     rows = rows_text(
         signal, layout, notes, numbers_or_rows(motion.frame_numbers, signal.n_rows), limit
     )
+    header = layout.header[0]
     if len(layout.header) > 1:
-        return printed_count(layout, signal.n_rows).join(layout.header) + rows
-    return layout.header[0] + rows
+        header = printed_count(layout, signal.n_rows).join(layout.header)
+    return b"".join((header, rows))
 
 
 def printed_count(layout: Layout, n_rows: int) -> bytes:
@@ -67,7 +68,7 @@ def rows_text(
     numbers: Ints,
     limit: int,
     missing: bytes | None = None,
-) -> bytes:
+) -> memoryview:
     """All rows and what follows them; ``signal`` has the columns of the patterns.
 
     ``numbers`` are the frame numbers of the rows. ``missing``: what stands where the signal is
@@ -82,11 +83,7 @@ def rows_text(
         cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
     if missing is not None and signal.mask is not None:
         cells.set_same(~signal.mask, missing)  # TABLE-04
-    body = _body(cells, runs, limit)
-    if layout.ending is None:
-        return body
-    # AMC-06
-    return body[: len(body) - (len(runs[-1][0].tail) if runs else 0)] + layout.ending
+    return _body(cells, runs, limit, layout.ending)
 
 
 def any_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:
@@ -109,8 +106,13 @@ def pattern_runs(
     return [(layout.patterns[numbers[a]], a, b) for a, b in pairwise(edges)]
 
 
-def _body(cells: Cells, runs: list[tuple[Pattern, int, int]], limit: int) -> bytes:
-    """The text of all rows; its size is known before any of it is written."""
+def _body(
+    cells: Cells, runs: list[tuple[Pattern, int, int]], limit: int, ending: bytes | None
+) -> memoryview:
+    """The text of all rows; its size is known before any of it is written.
+
+    ``ending`` stands in place of the last tail, unless it is None.
+    """
     from mcz.formats import text_kernels
 
     texts = cells.texts()
@@ -122,10 +124,15 @@ def _body(cells: Cells, runs: list[tuple[Pattern, int, int]], limit: int) -> byt
         )
     if size > limit:  # AMC-07, LIMIT-12
         raise LimitError(f"source template: a text of {size} bytes, limit {limit}")
-    out = np.empty(size, np.uint8)
+    out = np.empty(size + len(ending or b""), np.uint8)
     at = 0
     for pattern, a, b in runs:
         at = text_kernels.fill_rows(
             out, at, arrays[id(pattern)], texts, cells.start[a:b], cells.size[a:b]
         )
-    return out.tobytes()
+    text = out.data
+    if ending is None:
+        return text
+    at -= len(runs[-1][0].tail) if runs else 0
+    text[at : at + len(ending)] = ending  # AMC-06
+    return text[: at + len(ending)]

@@ -39,7 +39,7 @@ def restore_table(motion: Motion) -> bytes:
     tables = [_columns(motion, section) for section in sections]
     limit = text_limit(source, [table.values.shape for table, _ in tables])
     names = [joint.name for joint in motion.skeleton.joints]
-    out = []
+    out: list[bytes | memoryview] = []
     for k, (section, (table, numbers)) in enumerate(zip(sections, tables, strict=True)):
         mine = notes.of(k, table.samples_per_frame, table.n_rows)
         rows = rows_text(table, section.rows, mine, numbers, limit, section.missing)

@@ -168,9 +168,9 @@ def measure_rows(items: Items, gap_size: int, texts: Bytes, start: Ints2, size: 
     """Bytes of rows of one pattern whose gaps and tail take ``gap_size``; see ``fill_rows``."""
     columns, widths = items.columns, items.widths
     total = gap_size * len(start)
-    for k in range(len(columns)):
-        column = columns[k] if columns[k] >= 0 else start.shape[1] - 1
-        for row in range(start.shape[0]):
+    for row in range(start.shape[0]):
+        for k in range(len(columns)):
+            column = columns[k] if columns[k] >= 0 else start.shape[1] - 1
             total += int(size[row, column])
             if widths[k]:
                 total += int(_pad(texts[start[row, column]], size[row, column], widths[k]))

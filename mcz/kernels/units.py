@@ -20,6 +20,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.formats.text_kernels",
         "mcz.numbers.kernels",
         "mcz.numbers.ordinal_kernels",
+        "mcz.numbers.print_kernels",
         "mcz.numbers.value_kernels",
     ),
     "curves": (

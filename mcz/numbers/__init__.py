@@ -14,7 +14,7 @@ from mcz.numbers.choose import bits_of, choose_grid, fit
 from mcz.numbers.grid import GRID, Grid, GridFields, printed_base
 from mcz.numbers.rules import GridFlag, GridKind
 from mcz.numbers.tokens import Texts, Tokens, scan, values_of_texts
-from mcz.numbers.values import ordinals_of, values_of
+from mcz.numbers.values import ordinals_of, print_values, values_of
 
 __all__ = [
     "GRID",
@@ -28,6 +28,7 @@ __all__ = [
     "choose_grid",
     "fit",
     "ordinals_of",
+    "print_values",
     "printed_base",
     "scan",
     "values_of",

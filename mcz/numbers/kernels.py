@@ -139,7 +139,7 @@ def match(
         else:
             good = _positional(mantissa, shape, places, decimals, trim, flags)
             if digits:
-                index = _length(mantissa) - 1 - places
+                index = length(mantissa) - 1 - places
                 good = good and (mantissa == 0 or low <= index < high)
                 magnitude = _general(mantissa, index, digits) if good else 0
             else:
@@ -155,11 +155,12 @@ def match(
     return misses
 
 
-def _length(mantissa: int) -> int:
+def length(mantissa: int) -> int:
     """Decimal digits of ``mantissa``, 0 for 0."""
     length = 0
-    while mantissa:
-        mantissa //= 10
+    bound = 1
+    while mantissa >= bound and length < 18:
+        bound *= 10
         length += 1
     return length
 
@@ -197,7 +198,7 @@ def _scientific(mantissa: int, power: int, shape: int, places: int, flags: int) 
     width = 3 if flags & _EXP3 or size >= 100 else 1 if flags & _EXP1 and size < 10 else 2
     return (
         shape & (NO_INTEGER | ZERO_INTEGER) == 0
-        and _length(mantissa) == places + 1
+        and length(mantissa) == places + 1
         and (places == 0 or mantissa % 10 != 0)
         and (shape & POINT != 0) == (places > 0)
         and shape & EXPONENT_SIGN != 0
@@ -240,58 +241,82 @@ def write(
     ``rule``: trimmed, low, high, flags. Trimming drops trailing zeros of the fraction; an
     exponent is printed below ``low`` and from ``high`` on.
     """
-    trim, low, high, flags = rule
     at = 0
     for i in range(len(mantissas)):
-        mantissa, fraction = mantissas[i], fractions[i]
-        if trim and mantissa == 0:
-            fraction = 0
-        while trim and mantissa != 0 and mantissa % 10 == 0:
-            mantissa //= 10
-            fraction -= 1
-        count = _length(mantissa)
-        power = count - 1 - fraction
-        scientific = mantissa != 0 and (power < low or power >= high)
-        if scientific:
-            fraction = count - 1
-        if negative[i] or flags & _PLUS:  # TEXT-01
-            out[at] = 45 if negative[i] else 43
-            at += 1
-        at = _digits(mantissa, count, fraction, flags, out, at)
-        if scientific:
-            at = _power(power, flags, out, at)
-        elif fraction <= 0:
-            if flags & (_POINT_ZERO | _POINT_ONLY):  # TEXT-01
-                out[at] = 46
-                at += 1
-            if flags & _POINT_ZERO:
-                out[at] = 48
-                at += 1
+        mantissa = mantissas[i]
+        at = put(negative[i], mantissa, length(mantissa), fractions[i], rule, out, at)
         offsets[i + 1] = at
 
 
-def _digits(mantissa: int, count: int, fraction: int, flags: int, out: Bytes, at: int) -> int:
-    """Print ``mantissa * 10^-fraction`` without sign or exponent; return where it ends."""
+def put(
+    negative: bool,
+    mantissa: int,
+    count: int,
+    fraction: int,
+    rule: tuple[int, int, int, int],
+    out: Bytes,
+    at: int,
+) -> int:
+    """Print ``mantissa * 10^-fraction`` at ``at``, by a rule as ``write`` has it; its end.
+
+    ``count``: the digits of the mantissa, 0 for 0.
+    """
+    trim, low, high, flags = rule
+    if trim and mantissa == 0:
+        fraction = 0
+    while trim and mantissa != 0 and mantissa % 10 == 0:
+        mantissa //= 10
+        fraction -= 1
+        count -= 1
+    power = count - 1 - fraction
+    scientific = mantissa != 0 and (power < low or power >= high)
+    if scientific:
+        fraction = count - 1
+    if negative or flags & _PLUS:  # TEXT-01
+        out[at] = 45 if negative else 43
+        at += 1
     integers = count - fraction
     if integers < 1:
         integers = 0 if flags & _NO_ZERO and fraction > 0 else 1  # TEXT-01
-    end = at + integers + (fraction + 1 if fraction > 0 else 0)
-    index = end - 1
-    for _ in range(fraction):
-        out[index] = 48 + mantissa % 10
-        mantissa //= 10
-        index -= 1
+    end = at + integers
     if fraction > 0:
-        out[index] = 46
-        index -= 1
-    while index >= at:
-        if end - 1 - index < -fraction:
+        out[end] = 46
+        mantissa = _digits(mantissa, fraction, out, end + 1)
+        _digits(mantissa, integers, out, at)
+        end += fraction + 1
+    else:
+        zeros = min(-fraction, integers)
+        _digits(mantissa, integers - zeros, out, at)
+        for index in range(end - zeros, end):
             out[index] = 48
-        else:
-            out[index] = 48 + mantissa % 10
-            mantissa //= 10
-        index -= 1
+    if scientific:
+        return _power(power, flags, out, end)
+    if fraction <= 0:
+        if flags & (_POINT_ZERO | _POINT_ONLY):  # TEXT-01
+            out[end] = 46
+            end += 1
+        if flags & _POINT_ZERO:
+            out[end] = 48
+            end += 1
     return end
+
+
+def _digits(mantissa: int, count: int, out: Bytes, at: int) -> int:
+    """Print the last ``count`` digits of ``mantissa`` at ``at``; returns those before them."""
+    index = at + count
+    while index > at + 1:
+        rest = mantissa // 100
+        two = mantissa - 100 * rest
+        ten = two * 103 >> 10
+        index -= 2
+        out[index] = 48 + ten
+        out[index + 1] = 48 + two - 10 * ten
+        mantissa = rest
+    if index > at:
+        rest = mantissa // 10
+        out[at] = 48 + mantissa - 10 * rest
+        mantissa = rest
+    return mantissa
 
 
 def _power(power: int, flags: int, out: Bytes, at: int) -> int:

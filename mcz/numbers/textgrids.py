@@ -10,11 +10,11 @@ from mcz.numbers.rules import FIXED_TEXT, GridKind, limit
 from mcz.numbers.tokens import Bools, Floats, Ints, Texts, Tokens, kernels, scan_texts
 
 _UNLIMITED = 1_000_000  # more decimals, and a larger exponent, than any number has
-_WIDEST = 48  # bytes of a number from ``write``; the longest has 17 digits after "-0.00000"
+WIDEST = 48  # bytes of a number from ``write``; the longest has 17 digits after "-0.00000"
 _JAVASCRIPT = 1  # digits of a TEXT64 grid
 
 
-def _exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
+def exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
     """(digits, low, high): exponents X < low and X >= high are printed; digits 0 for none."""
     match kind:
         case GridKind.FIXED | GridKind.TRIMMED:
@@ -32,7 +32,7 @@ def _exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
 
 def match(tokens: Tokens, kind: GridKind, digits: int, flags: int) -> tuple[Ints, Bools, int]:
     """(ordinals, printed, number not printed); of TEXT grids only the shape is checked."""
-    general, low, high = _exponents(kind, digits)
+    general, low, high = exponents(kind, digits)
     trim = kind != GridKind.FIXED and digits < FIXED_TEXT
     decimals = digits % FIXED_TEXT if general == 0 else _UNLIMITED
     text = kind in (GridKind.TEXT64, GridKind.TEXT32)
@@ -75,7 +75,7 @@ def token_ordinals32(tokens: Tokens) -> Ints:
 
 def texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
     """Print the numbers of these magnitudes; they have been checked against the limit."""
-    general, low, high = _exponents(kind, digits)
+    general, low, high = exponents(kind, digits)
     if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:  # TEXT-01
         return _joined(magnitudes.view(np.float64), negative, digits - FIXED_TEXT)
     if general == 0:
@@ -85,7 +85,7 @@ def texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: B
         fractions = -powers
     else:
         mantissas, fractions = float_digits(kind, digits, magnitudes)
-    out = np.empty(len(magnitudes) * _WIDEST, np.uint8)
+    out = np.empty(len(magnitudes) * WIDEST, np.uint8)
     offsets = np.zeros(len(magnitudes) + 1, np.int64)
     rule = int(kind != GridKind.FIXED), low, high, flags
     kernels().write(negative, np.ascontiguousarray(mantissas), fractions, rule, out, offsets)

@@ -8,14 +8,19 @@ from functools import lru_cache
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcz.kernels import lacks_compiled_kernels
+from mcz.numbers import textgrids
 from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.grid import Grid
 from mcz.numbers.magnitudes import POWERS
 from mcz.numbers.rules import MIN_POWER, GridKind
 from mcz.numbers.tokens import TENS, Bools, Floats, Ints
 from mcz.types import Values
+
+Bytes = NDArray[np.uint8]
+DECIMAL_KINDS = GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL
 
 
 def values_of(
@@ -54,6 +59,33 @@ def ordinals_of(values: Values, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
     for grid, columns in _left(left, grids):
         ordinals[:, columns], exact[:, columns] = grid.ordinals(values[:, columns])
     return ordinals, exact.view(np.bool_)
+
+
+def print_values(
+    values: Values, grids: Sequence[Grid], base: int, start: Ints, size: Ints
+) -> Bytes:
+    """The texts of the numbers nearest to values, (rows, channels), on their decimal grids.
+
+    ``start``, counted from ``base``, and ``size`` say where each lies, but not of other grids,
+    of values beyond their grid, and of those that no product or quotient of tens gives.
+    """
+    loops = _kernels("print")
+    rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
+    of_channels = np.array([rules[grid] for grid in grids], np.int64).reshape(-1, loops.RULE_SIZE)
+    out = np.empty(values.size * textgrids.WIDEST, np.uint8)
+    numbers = np.asarray(values, np.float64)
+    used = loops.fill(numbers, of_channels, TENS, POWERS, out, base, start, size)
+    return out[:used].copy()
+
+
+def _print_rule(grid: Grid) -> tuple[int, ...]:
+    """How the compiled loop prints numbers of a grid."""
+    loops = _kernels("value")
+    if grid.kind not in DECIMAL_KINDS:
+        return loops.OTHER, *[0] * 7
+    digits, *exponents = textgrids.exponents(grid.kind, grid.digits)
+    trim = int(grid.kind != GridKind.FIXED)
+    return digits, grid.digits, grid.limit, trim, *exponents, grid.flags, 0
 
 
 def _left(left: Ints, grids: Sequence[Grid]) -> Iterator[tuple[Grid, list[int]]]:
