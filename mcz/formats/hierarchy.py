@@ -197,10 +197,10 @@ def has_more_joints(data: bytes, most: int) -> bool:
 
 def _joint_line(data: bytes, number: int) -> int | None:
     """Where the line of a joint begins that so many others precede; None where there is none."""
-    line = next(islice(_JOINT_LINE.finditer(data), number, None), None)
-    if line is None or _MOTION_LINE.search(data, 0, line.start()) is not None:
-        return None
-    return line.start()
+    motion = _MOTION_LINE.search(data)
+    stop = len(data) if motion is None else motion.start()
+    line = next(islice(_JOINT_LINE.finditer(data, 0, stop), number, None), None)
+    return None if line is None else line.start()
 
 
 def write_hierarchy(skeleton: Skeleton) -> tuple[str, list[int]]:

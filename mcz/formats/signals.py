@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from mcz.errors import OptionError, SourceError
 from mcz.formats.rows import Rows, line_of
 from mcz.motion import Exceptions, Signal
-from mcz.numbers import Grid, GridFlag, Tokens, choose_grid, fit, scan
+from mcz.numbers import Grid, GridFlag, Tokens, fit, scan
 
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 CANDIDATES = 8  # grids of single columns that are tried on all of them
 BLOCK = 512  # rows that may have a grid of their own
@@ -33,28 +34,29 @@ def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
     dense = bool(mask.all())
     chosen = slice(None) if dense else np.flatnonzero(mask)
     tokens = scan(data, rows.start.ravel()[chosen], rows.stop.ravel()[chosen])
-    bad = np.flatnonzero(tokens.bad())
-    if len(bad):
-        at, token = int(tokens.start[bad[0]]), tokens.token(int(bad[0]))
-        text = token[:40]
+    try:
+        found = tokens.values()
+    except SourceError:
+        first = int(np.flatnonzero(tokens.bad())[0])
+        text = tokens.token(first)[:40]
         raise SourceError(
             f"{text!r} is not a number",
-            line=line_of(data, at),
+            line=line_of(data, int(tokens.start[first])),
             value=text.decode("latin-1"),
-        )
-    values = np.zeros(shape)
-    values.ravel()[chosen] = tokens.values()
+        ) from None
+    values = found.reshape(shape) if dense else np.zeros(shape)
     if not dense:
+        values[mask] = found
         _hold(values, mask)
-    of_token = np.nonzero(mask)
-    grids, changes, printed = _grids(tokens, of_token[1], of_token[0], shape[1], n_each)
+    grids, changes, printed = _grids(tokens, mask, n_each)
     odd = np.flatnonzero(~printed)
+    cells = np.arange(mask.size)[chosen][odd] if len(odd) else odd
     return Signal(
         values,
         grids,
         mask=None if dense else mask,
         exceptions=Exceptions(
-            of_token[0][odd], of_token[1][odd], tuple(tokens[odd].texts()) if len(odd) else ()
+            *divmod(cells, shape[1] or 1), tuple(tokens[odd].texts()) if len(odd) else ()
         ),
         samples_per_frame=n_each,
         grid_changes=changes,
@@ -68,31 +70,39 @@ def _hold(values: NDArray[np.float64], mask: Bools) -> None:
 
 
 def _grids(
-    tokens: Tokens,
-    column: NDArray[np.int64],
-    row: NDArray[np.int64],
-    n_columns: int,
-    n_each: int,
+    tokens: Tokens, mask: Bools, n_each: int
 ) -> tuple[tuple[Grid, ...], tuple[tuple[int, int, Grid], ...], Bools]:
-    """The grid of every column, its changes, and which tokens the grids print."""
-    common = choose_grid(tokens)
-    printed = common.ordinals_of_tokens(tokens)[1]
+    """The grid of every column, its changes, and which tokens the grids print.
+
+    ``mask``: which cells (rows, columns) have a token.
+    """
+    n_columns = mask.shape[1]
+    common, _, printed = fit(tokens)
     if printed.all():
         return (common,) * n_columns, (), printed
-    order = np.argsort(column, kind="stable")  # column by column, rows in order
-    edges = np.searchsorted(column[order], np.arange(n_columns + 1))
-    mine = [order[a:b] for a, b in pairwise(edges)]
-    own = {c: fit(tokens[at])[::2] for c, at in enumerate(mine) if not printed[at].all()}
+    places = _by_column(mask)
+    own = {c: fit(tokens[at])[::2] for c, (at, _) in enumerate(places) if not printed[at].all()}
     common, printed = _common_grid(tokens, [grid for grid, _ in own.values()], common, printed)
     grids, changes = [common] * n_columns, []
     for c, (grid, mine_printed) in own.items():
-        at = mine[c]
+        at, row = places[c]
         if np.count_nonzero(mine_printed) > np.count_nonzero(printed[at]):
             grids[c], printed[at] = grid, mine_printed
         if np.count_nonzero(~printed[at]) >= WORTH:
-            blocks, printed[at] = _by_blocks(tokens[at], row[at], grids[c], printed[at], n_each)
+            blocks, printed[at] = _by_blocks(tokens[at], row, grids[c], printed[at], n_each)
             changes += [(first, c, change) for first, change in blocks]
     return tuple(grids), tuple(sorted(changes, key=lambda change: change[:2])), printed
+
+
+def _by_column(mask: Bools) -> list[tuple[slice | Ints, Ints]]:
+    """The tokens of every column, rows in order, among those of all, and their rows."""
+    n_rows, n_columns = mask.shape
+    if mask.all():
+        rows = np.arange(n_rows)
+        return [(slice(c, None, n_columns), rows) for c in range(n_columns)]
+    number = np.cumsum(mask).reshape(mask.shape) - 1
+    found = [np.flatnonzero(mask[:, c]) for c in range(n_columns)]
+    return [(number[rows, c], rows) for c, rows in enumerate(found)]
 
 
 def _common_grid(
@@ -115,7 +125,7 @@ def _common_grid(
 
 
 def _by_blocks(
-    tokens: Tokens, row: NDArray[np.int64], grid: Grid, printed: Bools, n_each: int
+    tokens: Tokens, row: Ints, grid: Grid, printed: Bools, n_each: int
 ) -> tuple[list[tuple[int, Grid]], Bools]:
     """Changes (row, grid) of a column where another grid saves exceptions; what is printed then.
 

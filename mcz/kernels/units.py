@@ -21,6 +21,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.numbers.kernels",
         "mcz.numbers.ordinal_kernels",
         "mcz.numbers.print_kernels",
+        "mcz.numbers.survey_kernels",
         "mcz.numbers.value_kernels",
     ),
     "curves": (

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterator, Sequence
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mcz.numbers import printed, textgrids
 from mcz.numbers.grid import Grid
 from mcz.numbers.printed_choice import printed_bits, printed_candidates
-from mcz.numbers.rules import CHECKED_KINDS, FIXED_TEXT, GridFlag, GridKind
-from mcz.numbers.tokens import Bools, Ints, Tokens, kernels
+from mcz.numbers.rules import CHECKED_KINDS, DECIMAL_KINDS, FIXED_TEXT, GridFlag, GridKind
+from mcz.numbers.tokens import Bools, Ints, Tokens
 
+if TYPE_CHECKING:
+    from mcz.numbers.survey_kernels import Survey
+
+FEW = 2**14  # tokens of which all candidates are tried in order
 _SAMPLE = 4096  # tokens that are looked at for candidates; all of them are counted
+_STEP = 2_654_435_761  # from one of them to the next: a prime, so that all columns are seen
 _EXCEPTION_BITS = 200  # row, channel and text, a guess
 _DIGIT_BITS = 3.33
 _SIGN_AND_RANGE_BITS = 8.0
@@ -25,48 +33,55 @@ def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
     return bits * n_tokens + _EXCEPTION_BITS * n_exceptions
 
 
-def candidates(tokens: Tokens) -> Iterator[Candidate]:
-    """Grids worth a try."""
-    if len(tokens) > _SAMPLE:  # a prime step, so that every column of a table is seen
-        tokens = tokens[np.arange(_SAMPLE) * 2_654_435_761 % len(tokens)]
-    for bits, rule in _plain_candidates(tokens.fields):
-        yield bits, (*rule, 1.0, 0)
-    yield from printed_candidates(tokens)
+def _survey(tokens: Tokens, n_counted: int) -> Survey:
+    loops = _surveys()
+    sizes = loops.MOST_DECIMALS + 1, loops.MOST_DIGITS + 1, loops.N_STYLES
+    survey: Survey = loops.Survey(*(np.zeros(size, np.int64) for size in sizes))
+    loops.count(tokens.fields, _STEP, n_counted, survey)
+    return survey
 
 
-def _plain_candidates(fields: Ints) -> Iterator[tuple[float, tuple[GridKind, int, int]]]:
+def _candidates(tokens: Tokens, n_sample: int) -> list[Candidate]:
+    """Grids worth a try, by a sample of the tokens, from the fewest bits on."""
+    survey = _survey(tokens, n_sample)
+    found = [(bits, (*rule, 1.0, 0)) for bits, rule in _plain_candidates(survey)]
+    n_known, n_plain = int(survey.significant.sum()), int(survey.decimals.sum())
+    if 2 * (n_known - n_plain) > n_known or survey.significant[10:].any():
+        found += printed_candidates(_sampled(tokens, n_sample))
+    return sorted(found)
+
+
+def _sampled(tokens: Tokens, n_sample: int) -> Tokens:
+    return tokens[np.arange(n_sample) * _STEP % len(tokens)] if n_sample < len(tokens) else tokens
+
+
+def _plain_candidates(survey: Survey) -> Iterator[tuple[float, tuple[GridKind, int, int]]]:
     """All grids but PRINTED."""
-    loops = kernels()
-    mantissa, power, shape = fields.T
-    known = shape & (loops.BAD | loops.SPECIAL) == 0
-    if not known.any():
+    decimals, significant = survey.decimals, survey.significant
+    if not significant.any():
         yield 0.0, (GridKind.FIXED, 0, 0)
         return
-    shape, mantissa, power = shape[known], mantissa[known], power[known]
-    plain = shape & loops.EXPONENT == 0
-    decimals = np.minimum(shape >> loops.FRACTION_DIGITS, 63)
-    significant = shape >> loops.SIGNIFICANT & 31
-    sign, tail, exponent = _styles(mantissa, power, shape, decimals)
-
-    if plain.any():
-        fixed = int(np.bincount(decimals[plain]).argmax())
+    sign, tail, exponent = _styles(survey.styles.tolist())
+    fixed = int(decimals.argmax())
+    is_plain = bool(decimals.any())
+    if is_plain:
         point = GridFlag.POINT if fixed == 0 and tail == GridFlag.POINT else 0
         style = sign & ~GridFlag.NO_ZERO | point if fixed == 0 else sign
         if fixed <= 22:
             yield _bits(fixed), (GridKind.FIXED, fixed, style)
-        for digits in _ends(decimals[plain]):
+        for digits in _ends(decimals):
             if 1 <= digits <= 22:
                 yield _bits(digits) + 1, (GridKind.TRIMMED, digits, sign | tail)
     flags = sign | tail | exponent
     for digits in sorted({*_ends(significant), 6}):
         if 1 <= digits <= 15:
             yield _bits(digits) + 2, (GridKind.GENERAL, digits, flags)
-    if significant.max() > 6:
+    if significant[7:].any():
         yield 40.0, (GridKind.TEXT32, 0, flags)
-    if significant.max() > 9:
+    if significant[10:].any():
         for digits in (0, 1, 16, 17):
             yield 64.0, (GridKind.TEXT64, digits, flags)
-        if plain.any() and 10 <= fixed <= 40:
+        if is_plain and 10 <= fixed <= 40:
             yield 66.0, (GridKind.TEXT64, FIXED_TEXT + fixed, 0)
 
 
@@ -74,40 +89,42 @@ def _bits(digits: int) -> float:
     return _SIGN_AND_RANGE_BITS + _DIGIT_BITS * digits
 
 
-def _ends(counts: Ints) -> list[int]:
+def _ends(histogram: Ints) -> list[int]:
     """The largest count, and the one that 99 % do not exceed: a stray long token costs little."""
-    return sorted({int(counts.max()), int(np.sort(counts)[(len(counts) * 99 - 1) // 100])})
+    ranks = np.cumsum(histogram)
+    n = int(ranks[-1])
+    return sorted(
+        {int(np.searchsorted(ranks, rank, "right")) for rank in (n - 1, (n * 99 - 1) // 100)}
+    )
 
 
-def _styles(mantissa: Ints, power: Ints, shape: Ints, decimals: Ints) -> tuple[int, int, int]:
+def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
     """Flags of the sign and the leading zero, of integral numbers, of the exponent: majorities."""
-    loops = kernels()
-
-    def many(chosen: np.ndarray, other: np.ndarray) -> bool:
-        return int(np.count_nonzero(chosen)) > int(np.count_nonzero(other))
-
-    plain = shape & loops.EXPONENT == 0
-    sign = GridFlag.PLUS if many(shape & loops.PLUS, shape & (loops.PLUS | loops.MINUS) == 0) else 0
-    if many(plain & (shape & loops.NO_INTEGER != 0), shape & loops.ZERO_INTEGER):
+    loops = _surveys()
+    sign = GridFlag.PLUS if counts[loops.SIGNED] > counts[loops.UNSIGNED] else 0
+    if counts[loops.NO_ZERO] > counts[loops.BARE_INTEGER]:
         sign |= GridFlag.NO_ZERO
-    point = shape & loops.POINT != 0
-    bare = plain & (decimals == 0)
-    dot_zero = plain & (decimals == 1) & (mantissa % 10 == 0)
+    points, bare, zeros = (
+        counts[style] for style in (loops.POINT_ONLY, loops.NO_POINT, loops.POINT_ZERO)
+    )
     tail = 0
-    if many(bare & point, bare & ~point) and many(bare & point, dot_zero):
+    if points > bare and points > zeros:
         tail = int(GridFlag.POINT)
-    elif many(dot_zero, bare):
+    elif zeros > points + bare:
         tail = int(GridFlag.POINT_ZERO)
-    written = shape >> loops.EXPONENT_DIGITS & 255
-    short = ~plain & (np.abs(power) < 100)
     exponent = 0
-    if many(short & (written == 3), short & (written == 2)):
+    if counts[loops.THREE] > counts[loops.TWO]:
         exponent = int(GridFlag.EXPONENT3)
-    elif many(short & (written == 1), short & (written == 2) & (np.abs(power) < 10)):
+    elif counts[loops.ONE] > counts[loops.TWO_OF_ONE]:
         exponent = int(GridFlag.EXPONENT1)
-    if many(shape & loops.UPPER, ~plain & (shape & loops.UPPER == 0)):
+    if counts[loops.CAPITAL] > counts[loops.SMALL]:
         exponent |= GridFlag.UPPER
     return int(sign), tail, int(exponent)
+
+
+def _surveys() -> ModuleType:
+    """The compiled loops, imported on first use."""
+    return importlib.import_module("mcz.numbers.survey_kernels")
 
 
 def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
@@ -128,19 +145,49 @@ def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]
         wanted.append((grid, *grid.ordinals_of_tokens(tokens)))
         if wanted[-1][2].all():
             return wanted[-1]
-    least = float("inf")
-    for bits, rule in sorted(candidates(tokens)):
-        if cost(len(tokens), bits, 0) >= least:
+    n_sample = min(len(tokens), _SAMPLE)
+    ranked = _candidates(tokens, n_sample)
+    order: Sequence[int] = range(len(ranked))
+    if len(tokens) > FEW:
+        order = _likeliest_first(_sampled(tokens, n_sample), ranked)
+    least = float("inf"), len(ranked)  # the lowest price, and the first candidate that has it
+    for rank in order:
+        bits, rule = ranked[rank]
+        if (cost(len(tokens), bits, 0), rank) >= least:
             continue
-        if cost(len(tokens), bits, _fewest_misses(tokens, rule)) >= least:
-            continue
-        grid = Grid(*rule)
-        ordinals, known = grid.ordinals_of_tokens(tokens)
-        misses = len(tokens) - int(np.count_nonzero(known))
-        price = cost(len(tokens), bits, misses)
-        if price < least:
-            least, fewest, best = price, misses, (grid, ordinals, known)
+        tried = _tried(tokens, rule, least[0] - cost(len(tokens), bits, 0))
+        misses = len(tokens) if tried is None else len(tokens) - int(np.count_nonzero(tried[1]))
+        price = cost(len(tokens), bits, misses), rank
+        if tried is not None and price < least:
+            least, fewest, best = price, misses, (Grid(*rule), *tried)
     return next((fitted for fitted in wanted if np.count_nonzero(~fitted[2]) <= fewest), best)
+
+
+def _likeliest_first(sample: Tokens, ranked: Sequence[Candidate]) -> list[int]:
+    """The candidates, with that one first that all others are likely to lose against.
+
+    They are then given up early. Only grids that are quick to try come first.
+    """
+    prices = [
+        cost(len(sample), bits, _fewest_misses(sample, rule))
+        if rule[0] in DECIMAL_KINDS
+        else float("inf")
+        for bits, rule in ranked
+    ]
+    first = prices.index(min(prices))
+    return [first, *(rank for rank in range(len(ranked)) if rank != first)]
+
+
+def _tried(tokens: Tokens, rule: Rule, spare: float) -> tuple[Ints, Bools] | None:
+    """Ordinals and printed tokens; None where exceptions cost more than ``spare`` bits."""
+    kind, digits, flags, _, _ = rule
+    allowed = int(min(spare / _EXCEPTION_BITS, len(tokens))) + 1  # prices decide, not this
+    if kind in DECIMAL_KINDS:
+        ordinals, known, misses = textgrids.match(tokens, kind, digits, flags, allowed)
+        return (ordinals, known) if misses <= allowed else None
+    if _fewest_misses(tokens, rule) > allowed:
+        return None
+    return Grid(*rule).ordinals_of_tokens(tokens)
 
 
 def bits_of(grid: Grid) -> float:

@@ -12,7 +12,8 @@ Everything is int64, the one kind of integer that compiled loops have.
 from __future__ import annotations
 
 from mcz.kernels import kernel
-from mcz.kernels.types import Bytes, Flags, Ints, Ints2
+from mcz.kernels.types import Bytes, Flags, Floats, Ints, Ints2
+from mcz.numbers.value_kernels import EXACT_POWER, scaled
 
 HUGE = 1_000_000
 
@@ -40,8 +41,9 @@ def scan(
     start: Ints,
     stop: Ints,
     fields: Ints2,
-) -> None:
-    """Fill ``fields`` (n, 3) from the tokens ``text[start[i]:stop[i]]``."""
+) -> int:
+    """Fill ``fields`` (n, 3) from tokens ``text[start[i]:stop[i]]``; returns how many are bad."""
+    n_bad = 0
     for token in range(len(start)):
         at, end = start[token], stop[token]
         shape = 0
@@ -83,6 +85,28 @@ def scan(
             power, bits = _exponent(text, at, end)
             shape |= bits
         fields[token, 0], fields[token, 1], fields[token, 2] = mantissa, power, shape
+        n_bad += 1 if shape & BAD else 0
+    return n_bad
+
+
+@kernel
+def values(fields: Ints2, tens: Floats, out: Floats, slow: Flags) -> int:
+    """Fill ``out`` with the nearest binary64 of each token; returns how many are left.
+
+    ``slow`` is set for these, whose mantissa or power of ten no binary64 holds exactly.
+    """
+    n_slow = 0
+    for token in range(len(fields)):
+        mantissa, power, shape = fields[token, 0], fields[token, 1], fields[token, 2]
+        power -= shape >> FRACTION_DIGITS
+        hard = mantissa != 0 and (mantissa > 1 << 53 or abs(power) > EXACT_POWER)
+        if hard or shape & (LONG | SPECIAL | BAD):  # TEXT-03
+            slow[token] = True
+            n_slow += 1
+            continue
+        value = scaled(mantissa, power, tens) if mantissa else 0.0
+        out[token] = -value if shape & MINUS else value  # TEXT-03
+    return n_slow
 
 
 def _exponent(text: Bytes, at: int, end: int) -> tuple[int, int]:
@@ -113,8 +137,11 @@ def match(
     rule: tuple[int, int, int, int, int, int, int],
     ordinals: Ints,
     printed: Flags,
+    allowed: int,
 ) -> int:
     """Ordinals of the tokens that a decimal grid prints; returns how many it does not print.
+
+    It stops where these are more than ``allowed``.
 
     ``rule``: significant digits or 0, decimals, trimmed, low, high, flags, limit. With digits:
     ``%g``, with an exponent below ``low`` and from ``high`` on. Without: so many decimals,
@@ -150,6 +177,8 @@ def match(
             good = False
             magnitude = 0
             misses += 1
+            if misses > allowed:
+                break
         ordinals[token] = -1 - magnitude if good and shape & MINUS else magnitude
         printed[token] = good
     return misses

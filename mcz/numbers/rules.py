@@ -50,6 +50,7 @@ TEXT_KINDS = (
     *(GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL, GridKind.TEXT64, GridKind.TEXT32),
     GridKind.PRINTED,
 )
+DECIMAL_KINDS = (GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL)
 CHECKED_KINDS = (GridKind.TEXT64, GridKind.TEXT32)  # printed or not is more than shape
 _STYLE = int(sum(GridFlag))
 _TEXT64_DIGITS = (0, 1, 16, 17, *range(FIXED_TEXT + 10, FIXED_TEXT + 41))

@@ -30,8 +30,13 @@ def exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
     return (17, -6, 21) if digits == _JAVASCRIPT else (17, -4, 16)  # TEXT-01
 
 
-def match(tokens: Tokens, kind: GridKind, digits: int, flags: int) -> tuple[Ints, Bools, int]:
-    """(ordinals, printed, number not printed); of TEXT grids only the shape is checked."""
+def match(
+    tokens: Tokens, kind: GridKind, digits: int, flags: int, allowed: int | None = None
+) -> tuple[Ints, Bools, int]:
+    """(ordinals, printed, number not printed); of TEXT grids only the shape is checked.
+
+    Where more than ``allowed`` are not printed, what follows is not looked at.
+    """
     general, low, high = exponents(kind, digits)
     trim = kind != GridKind.FIXED and digits < FIXED_TEXT
     decimals = digits % FIXED_TEXT if general == 0 else _UNLIMITED
@@ -40,7 +45,8 @@ def match(tokens: Tokens, kind: GridKind, digits: int, flags: int) -> tuple[Ints
     rule = general, decimals, int(trim), low, high, flags, largest
     ordinals = np.empty(len(tokens), np.int64)
     printed = np.empty(len(tokens), np.bool_)
-    misses = kernels().match(tokens.fields, rule, ordinals, printed)
+    most = len(tokens) if allowed is None else allowed
+    misses = kernels().match(tokens.fields, rule, ordinals, printed, most)
     return ordinals, printed, misses
 
 

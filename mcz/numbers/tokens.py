@@ -122,22 +122,20 @@ class Tokens:
 
     def _values(self) -> Floats:
         loops = kernels()
-        mantissa, power, shape = self.fields.T
-        odd = shape & (loops.BAD | loops.SPECIAL | loops.LONG)
-        if (odd & loops.BAD).any():
-            first = int(np.flatnonzero(odd & loops.BAD)[0])
+        out, slow = np.empty(len(self)), np.zeros(len(self), np.bool_)
+        if not loops.values(self.fields, TENS, out, slow):
+            return out
+        odd = np.flatnonzero(slow)
+        hard = self[odd]
+        bad = np.flatnonzero(hard.bad())
+        if len(bad):
+            first = int(bad[0])
             raise SourceError(
-                f"{self.token(first)[:40]!r} is not a number", offset=self.start[first]
+                f"{hard.token(first)[:40]!r} is not a number", offset=hard.start[first]
             )
-        out, slow = scale(mantissa, power - (shape >> loops.FRACTION_DIGITS))
-        slow |= (odd & loops.LONG) != 0  # TEXT-03
-        np.negative(out, where=(shape & loops.MINUS) != 0, out=out)  # TEXT-03
-        special = (odd & loops.SPECIAL) != 0
-        if special.any():
-            out[special] = [_value(text) for text in self[special].texts().tolist()]
-            slow &= ~special
-        if slow.any():
-            out[slow] = [float(text) for text in self[slow].texts().tolist()]
+        special = hard.fields[:, 2] & loops.SPECIAL != 0
+        texts = zip(hard.texts().tolist(), special.tolist(), strict=True)
+        out[odd] = [_value(text) if is_special else float(text) for text, is_special in texts]
         return out
 
 
@@ -157,9 +155,9 @@ def scan(
         raise IndexError(f"tokens outside of a text of {len(whole)} bytes")
     loops = kernels()
     fields = np.empty((len(start), 3), np.int64)
-    loops.scan(whole, start, stop, fields)
+    n_bad = loops.scan(whole, start, stop, fields)
     tokens = Tokens(whole, start, stop, fields)
-    for index in np.flatnonzero(fields[:, 2] & loops.BAD).tolist():
+    for index in np.flatnonzero(fields[:, 2] & loops.BAD).tolist() if n_bad else ():
         if not np.isfinite(_value(tokens.token(index), fallback=0.0)):
             fields[index, 2] = loops.SPECIAL
     return tokens

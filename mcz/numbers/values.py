@@ -15,12 +15,11 @@ from mcz.numbers import textgrids
 from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.grid import Grid
 from mcz.numbers.magnitudes import POWERS
-from mcz.numbers.rules import MIN_POWER, GridKind
+from mcz.numbers.rules import DECIMAL_KINDS, MIN_POWER, GridKind
 from mcz.numbers.tokens import TENS, Bools, Floats, Ints
 from mcz.types import Values
 
 Bytes = NDArray[np.uint8]
-DECIMAL_KINDS = GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL
 
 
 def values_of(
