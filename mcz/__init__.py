@@ -55,6 +55,8 @@ if TYPE_CHECKING:
     )
     from mcz.formats.body_models import offsets_from_positions, offsets_of_model
     from mcz.formats.body_trees import body_skeleton
+    from mcz.formats.c3d_events import Event
+    from mcz.formats.c3d_recording import ForcePlatform, Recording
     from mcz.hints import Hint
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
@@ -85,7 +87,7 @@ if TYPE_CHECKING:
     from mcz.reading.post_filtering import post_filter
     from mcz.reading.read import read
     from mcz.reading.source_files import read_skeleton
-    from mcz.reading.source_info import Event, ForcePlatform, Recording, recording
+    from mcz.reading.source_info import recording
     from mcz.retargeting.joint_maps import joint_map
     from mcz.retargeting.mirroring import mirror
     from mcz.retargeting.offsets import with_offsets
@@ -146,7 +148,7 @@ _HOMES = {
     "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.reading.file": ("Attachment", "File", "open"),
     "mcz.reading.read": ("read",),
-    "mcz.reading.source_info": ("Event", "ForcePlatform", "Recording", "recording"),
+    "mcz.reading.source_info": ("recording",),
     "mcz.writing.file": ("encode", "to_npz", "write"),
     "mcz.reading.post_filtering": ("post_filter",),
     "mcz.kinematics.marker_motion": ("in_positions",),
@@ -173,6 +175,8 @@ _HOMES = {
     "mcz.kinematics.rest": ("rest_positions",),
     "mcz.formats.body_models": ("offsets_from_positions", "offsets_of_model"),
     "mcz.formats.body_trees": ("body_skeleton",),
+    "mcz.formats.c3d_events": ("Event",),
+    "mcz.formats.c3d_recording": ("ForcePlatform", "Recording"),
     "mcz.retargeting.joint_maps": ("joint_map",),
     "mcz.retargeting.mirroring": ("mirror",),
     "mcz.retargeting.offsets": ("with_offsets",),

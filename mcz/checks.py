@@ -152,7 +152,7 @@ def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
     """
 
     def form(value: object) -> Items:
-        if np.ma.is_masked(value):
+        if type(value) is not np.ndarray and np.ma.is_masked(value):  # imports numpy.ma
             raise ValueError
         array = np.asarray(value)
         if f"{array.dtype.kind}{array.dtype.itemsize}" not in kinds.split():

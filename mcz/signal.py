@@ -123,7 +123,7 @@ class Signal:
     __repr__ = brief.signal_text
 
     def __post_init__(self) -> None:
-        if isinstance(self.values, np.ma.MaskedArray):
+        if type(self.values) is not np.ndarray and isinstance(self.values, np.ma.MaskedArray):
             self._take_mask(self.values)
         check_fields(self, SIGNAL)
         if self.scaling is None or self.stored is None:

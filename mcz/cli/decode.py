@@ -223,15 +223,15 @@ def _check_plain(file: str, wanted: Wanted) -> None:
 
 def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made]:
     """The outputs of a clip as it is wanted, and what is to be said of how they were made."""
-    from mcz.conversion import left_out
-    from mcz.reading.source_files import SourceOptions
-
     target, made = wanted.target, Made()
     part = _part(clip, wanted)
     if target is None:
         outputs = [_source(clip, part)]
         made.notes = _rate_notes(clip, part, wanted)
     elif wanted.is_converted:
+        from mcz.conversion import left_out
+        from mcz.reading.source_files import SourceOptions
+
         motion = part.motion()
         if wanted.solve:
             motion, made.fit = _solved(clip, motion)

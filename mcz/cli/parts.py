@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mcz.clock import Timeline
     from mcz.motion import Motion
     from mcz.reading.clip import Clip
-    from mcz.reading.source_info import Event
+    from mcz.tables.events import Event
     from mcz.tables.files import Table
 
 Masked = tuple[Values, NDArray[np.bool_] | None]

@@ -56,7 +56,7 @@ def file_in(output: str, source: str, suffix: str = "") -> str:
 
 def target_of(suffix: str) -> str | None:
     """The target whose files have a suffix, None where there is none."""
-    from mcz.conversion import suffixes_of
+    from mcz.reading.file import suffixes_of
 
     return next((name for name in TARGETS if suffix in suffixes_of(name)), None)
 

@@ -27,7 +27,6 @@ __all__ = [
     "converted_files",
     "from_positions",
     "left_out",
-    "suffixes_of",
 ]
 
 TARGETS = {
@@ -38,11 +37,6 @@ TARGETS = {
     "sto": to_storage,
     "mot": to_storage,
 }
-
-
-def suffixes_of(target: str) -> tuple[str, ...]:
-    """The suffixes of files of a target: of a format, or of a scene."""
-    return FORMATS[target].suffixes if target in FORMATS else (f".{target}",)
 
 
 def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Motion:

@@ -9,12 +9,12 @@ import numpy as np
 from mcz.clock import TIMES
 from mcz.conversion.counted_times import COUNTING, first_number, lost_times
 from mcz.formats.c3d_plain import KNOWN
-from mcz.formats.c3d_recording import parameters_of
+from mcz.formats.c3d_recording import Recording, parameters_of
 from mcz.formats.table_signals import text_columns
 from mcz.kinematics import point_set
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion
-from mcz.reading.source_info import Recording, recording
+from mcz.reading.source_info import recording
 
 MOST_NAMES = 8
 POINTS = ("c3d", "trc")  # what becomes of joints are points

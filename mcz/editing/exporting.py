@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
 
-from mcz.conversion import TARGETS, converted_files, left_out, suffixes_of
+from mcz.conversion import TARGETS, converted_files, left_out
 from mcz.conversion.scenes import WRITERS, to_scene
 from mcz.editing.outcomes import Outcome, Report, failed
 from mcz.editing.safe_names import Folder, PortableNames
@@ -17,7 +17,7 @@ from mcz.jobs import limited
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
-from mcz.reading.file import File, open
+from mcz.reading.file import File, open, suffixes_of
 from mcz.reading.sharing import shared_out
 from mcz.reading.source_files import SourceOptions
 from mcz.tables.files import EXPORTS, table_of

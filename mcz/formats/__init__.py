@@ -15,8 +15,6 @@ from typing import Any
 
 from mcz.errors import FormatError, SourceError, UnsupportedError
 from mcz.formats.line_by_line import Arriving
-from mcz.formats.notes import join_notes
-from mcz.formats.table_notes import join_table_notes
 from mcz.motion import FrameNotes, Source
 from mcz.types import JsonObject
 
@@ -98,7 +96,7 @@ FORMATS: dict[str, Format] = {
             (".amc",),
             _of("amc", "read"),
             _of("amc", "write"),
-            join_notes,
+            _of("notes", "join_notes"),
             wants_skeleton=True,
             arrive=_of("amc", "arrive"),
             bones=_of("amc", "bones"),
@@ -109,7 +107,7 @@ FORMATS: dict[str, Format] = {
             (".bvh",),
             _of("bvh", "read"),
             _of("bvh", "write"),
-            join_notes,
+            _of("notes", "join_notes"),
             states_rate=True,
             arrive=_of("bvh", "arrive"),
             has_more_joints=_of("hierarchy", "has_more_joints"),
@@ -138,7 +136,7 @@ FORMATS: dict[str, Format] = {
                 (f".{name if kind else 'csv'}",),
                 _of(module, f"read{kind}"),
                 _of(module, f"write{kind}"),
-                join_table_notes,
+                _of("table_notes", "join_table_notes"),
                 states_rate=True,
                 is_table=True,
                 restate=_of("stated_rates", "restate_table"),

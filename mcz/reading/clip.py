@@ -6,12 +6,12 @@ import hashlib
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from mcz import poses
 from mcz.brief import shown
 from mcz.clock import (
     TIMES,
@@ -32,7 +32,7 @@ from mcz.displays import html_of
 from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.formats import FORMATS
 from mcz.hints import Hint
-from mcz.kinematics.contacts import RULE, ContactRule, Contacts, contacts
+from mcz.kinematics import point_names
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.reading.decimation import decimated, decimated_rows
 from mcz.reading.signal_info import SignalInfo, groups_of
@@ -47,16 +47,35 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+    from mcz import poses
+    from mcz.kinematics.contacts import ContactRule, Contacts
+
+
+class _OfPoses:
+    """A function of ``mcz.poses`` as a method of its name; both are imported on first use."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._owner, self._name = owner, name
+
+    def __get__(self, instance: object, owner: type) -> object:
+        function = getattr(import_module("mcz.poses"), self._name)
+        setattr(self._owner, self._name, function)
+        return function.__get__(instance, owner)
+
 
 class Clip(StoredClip):
     """One clip; nothing is decoded before it is asked for."""
 
     _repr_html_ = html_of
-    positions = poses.positions  # as of ``mcz``: only what they need is decoded
-    rotations = poses.rotations
-    root = poses.root
-    velocities = poses.velocities
-    accelerations = poses.accelerations
+    if TYPE_CHECKING:  # as of ``mcz``: only what they need is decoded
+        positions = poses.positions
+        rotations = poses.rotations
+        root = poses.root
+        velocities = poses.velocities
+        accelerations = poses.accelerations
+    else:
+        positions, rotations, root = _OfPoses(), _OfPoses(), _OfPoses()
+        velocities, accelerations = _OfPoses(), _OfPoses()
 
     def __reduce__(self) -> tuple[object, ...]:
         return _reopened, (self.container, self.name)
@@ -320,7 +339,7 @@ class Clip(StoredClip):
     @property
     def point_names(self) -> tuple[str, ...]:
         """The names of the points of ``positions``, in their order."""
-        return poses.point_names(self)
+        return point_names(self.skeleton)
 
     def to_xarray(
         self, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
@@ -345,6 +364,8 @@ class Clip(StoredClip):
 
     def contacts(self, joints: Joints = None, rule: ContactRule | None = None) -> Contacts:
         """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
+        from mcz.kinematics.contacts import RULE, contacts
+
         feet = None if joints is None else joint_list(joints)
         return contacts(self.motion(), feet, rule or RULE)
 

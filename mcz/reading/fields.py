@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
+from typing import TYPE_CHECKING, TypeAlias
 
 from mcz.brief import among
 from mcz.codecs import by_id
@@ -18,11 +19,13 @@ from mcz.container.metadata_keys import SAID, SPELLINGS
 from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.errors import OptionError, UnsupportedError
 from mcz.formats import format_by_id
-from mcz.queries import Query, Value
 from mcz.reading.clip import Clip
 
-Where = str | Query | Callable[[Clip], bool]
-Getter = Callable[[Clip], Value]
+if TYPE_CHECKING:
+    from mcz.queries import Query, Value
+
+Where: TypeAlias = "str | Query | Callable[[Clip], bool]"
+Getter: TypeAlias = "Callable[[Clip], Value]"
 # Short names of fields, among them those that listings have as headings.
 SHORT = {
     "clip": "name",
@@ -42,6 +45,8 @@ def taken(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> list[Cli
 
     Raises OptionError for a text that is no query, and for a name in it that no clip knows.
     """
+    from mcz.queries import Query
+
     if isinstance(where, str):
         where = Query(where)
     if isinstance(where, Query):

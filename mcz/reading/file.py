@@ -58,6 +58,11 @@ def is_source(path: str) -> bool:
     return path.lower().endswith(suffixes) and not is_mcz(path)
 
 
+def suffixes_of(target: str) -> tuple[str, ...]:
+    """The suffixes of files of a target: of a format, or of a scene."""
+    return FORMATS[target].suffixes if target in FORMATS else (f".{target}",)
+
+
 class StoredSkeleton(NamedTuple):
     """A skeleton of a file, and its id, by which clips name it."""
 

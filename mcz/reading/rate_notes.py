@@ -8,7 +8,6 @@ from typing import Any
 from mcz.clock import usual_step
 from mcz.errors import FormatError
 from mcz.formats import FORMATS, format_by_id
-from mcz.formats.times import rate_of_times
 from mcz.reading.clip import Clip
 from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.source_info import contradiction, is_one_of
@@ -77,6 +76,8 @@ def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
     column = clip.times_column()
     if column is None:
         return None
+    from mcz.formats.times import rate_of_times
+
     own, _ = rate_of_times(column.times, [column.rounding])
     step = usual_step(clip.frame_numbers)
     return own if own is not None and not is_one_of(own / rate, step) else None

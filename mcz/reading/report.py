@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mcz.clock import time_facts
 from mcz.codecs.basis_models import name_of
@@ -29,9 +29,12 @@ from mcz.reading.read import take
 from mcz.reading.signal_info import SignalInfo
 from mcz.reading.sizes import Sizes, clip_sizes, file_parts, file_ratio, models_used, ratios_of
 from mcz.reading.source_files import load, read_skeleton
-from mcz.reading.source_info import Recording, recording, source_facts
+from mcz.reading.source_info import recording, source_facts
 from mcz.schema import parse
 from mcz.types import JsonObject
+
+if TYPE_CHECKING:
+    from mcz.formats.c3d_recording import Recording
 
 
 def info(file: File, names: Sequence[str] | None = None, where: Where | None = None) -> JsonObject:

@@ -11,7 +11,6 @@ from typing import Any
 from mcz.errors import MczError, OptionError, SourceError, reason_of
 from mcz.formats import FORMATS, HEAD_BYTES, Format, format_of, has_known_suffix, likely_formats
 from mcz.formats.arrays.kinds import kinds_of, with_kinds
-from mcz.formats.arrays.shaped import with_model
 from mcz.motion import Motion, Skeleton
 from mcz.units import facing, in_unit, unit_cm_of
 
@@ -138,6 +137,8 @@ class SourceOptions:
         if self.arrays is not None:
             motion = with_kinds(motion, self.arrays)
         if self.model is not None:
+            from mcz.formats.arrays.shaped import with_model
+
             motion = with_model(motion, self.model)
         if self.rate is not None and (self.force_rate or motion.frame_rate is None):
             rate = checked_rate(self.rate)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,14 @@ from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.errors import FormatError, UnsupportedError
 from mcz.formats import FORMATS, Format, format_by_id, recording_of
-from mcz.formats.c3d_events import Event as Event
-from mcz.formats.c3d_recording import ForcePlatform as ForcePlatform
-from mcz.formats.c3d_recording import Recording as Recording
 from mcz.motion import FrameNotes, Motion, Skeleton, Source
 from mcz.numbers.scaling import Scaling
 from mcz.reading.decimation import picked_notes
 from mcz.reading.signal_info import SignalInfo
 from mcz.types import JsonObject
+
+if TYPE_CHECKING:
+    from mcz.formats.c3d_recording import Recording
 
 ANALOG = "analog"  # the role of signals whose stored numbers a source may have a meaning for
 

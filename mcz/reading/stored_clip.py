@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.time_base import numbers_of, whole_time_base
 from mcz.errors import FormatError, OptionError, UnsupportedError
-from mcz.formats.c3d_recording import Recording
 from mcz.kinematics import point_names
 from mcz.motion import Skeleton
 from mcz.numbers.scaling import Scaling
@@ -32,6 +32,9 @@ from mcz.reading.source_info import (
     sourced_skeleton,
 )
 from mcz.schema import parse
+
+if TYPE_CHECKING:
+    from mcz.formats.c3d_recording import Recording
 
 LISTS = ("cut-joints", "edit-joints")
 JOINTS = ("shell_max_joint", "slide_max_joint")
