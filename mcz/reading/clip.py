@@ -131,7 +131,7 @@ class Clip(StoredClip):
         info = self._info(self.find_signal(signal))
         start, stop = self.checked_range(frames)
         self._check_resolution(info, resolution)
-        groups, columns = self.groups_of(info, joints)
+        groups, columns = (None, []) if joints is None else self.groups_of(info, joints)
         reader = SignalReader(self.container, info, groups, resolution, self.name)
         values, mask = reader.read(start + info.skip, stop + info.skip)  # CLIP-18
         if joints is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
 
@@ -88,12 +88,22 @@ class SignalReader:
         if self.container.salvage:
             return self._salvage(self._prepare(start, stop), start, stop)
         self._check_size(start, stop)
+        near = ordinals is None and not self.container.reads_parts
+        return self._joined(self._near if near else self.blocks, start, stop, ordinals)
+
+    def _joined(
+        self,
+        blocks: Callable[[int, int, Values], Iterator[Block]],
+        start: int,
+        stop: int,
+        ordinals: NDArray[np.int64] | None = None,
+    ) -> tuple[Values, NDArray[np.bool_] | None]:
+        """Values and mask of all blocks of the range; see ``_read``."""
         per_frame = self.info.layout.samples_per_frame
         kind = np.int64 if self.info.is_integer else np.float64
         values: Values = np.empty(self._shape(start, stop), kind)
         mask: NDArray[np.bool_] | None = None
-        near = ordinals is None and not self.container.reads_parts
-        for block in (self._near if near else self.blocks)(start, stop, values):
+        for block in blocks(start, stop, values):
             rows = slice((block.start - start) * per_frame, (block.stop - start) * per_frame)
             if block.values.base is not values:
                 values[rows] = block.values
@@ -169,13 +179,11 @@ class SignalReader:
         held = self.container.runs.get(key)
         if held is None:
             try:
-                blocks = list(self.blocks(*run))
+                values, mask = self._joined(self.blocks, *run)
             except MczError:  # perhaps of a segment that these frames do not need
                 yield from self.blocks(start, stop)
                 return
-            masks = [block.mask for block in blocks]
-            mask = None if all(mask is None for mask in masks) else _joined(blocks)
-            held = Run(run[0], np.concatenate([block.values for block in blocks]), mask)
+            held = Run(run[0], values, mask)
             self.container.runs.put(key, held)
         per_frame = self.info.layout.samples_per_frame
         wanted = slice((start - run[0]) * per_frame, (stop - run[0]) * per_frame)
@@ -349,15 +357,18 @@ class SignalReader:
         Channels are numbered as in ``columns``, by default as in the signal.
         """
         layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
+        covering = self.info.covering(start, stop)
+        if not any(self.info.rows[index].header.flags & GROUP_NOTES for index in covering):
+            return Exceptions(), ()  # no notes, and the grids of the clip
         of_signal = range(layout.n_channels) if columns is None else columns
         column = {channel: number for number, channel in enumerate(of_signal)}
         noted = Noted([layout.grids[channel] for channel in column], (stop - start) * per_frame)
-        for index in self.info.covering(start, stop):
+        for index in covering:
             row = self.info.rows[index]
             shift = (row.header.first - start) * per_frame
             noted.begin(shift)
             if not row.header.flags & GROUP_NOTES:
-                continue  # it has no notes, and the grids of the clip
+                continue
             for group in self.groups:
                 notes = self._group_notes(index, group)
                 # NOTES-07
@@ -399,9 +410,3 @@ class SignalReader:
                     mask[rows, at : at + n] = bits[cut]
                 at += n
         return mask
-
-
-def _joined(blocks: Sequence[Block]) -> NDArray[np.bool_]:
-    """The mask of blocks, some of which may be valid as a whole."""
-    masks = [np.ones(b.values.shape, np.bool_) if b.mask is None else b.mask for b in blocks]
-    return np.concatenate(masks)
