@@ -145,6 +145,13 @@ def encode_counts() -> None:
     saved("fast", Motion(skeleton, (signal,)))
 
 
+def print_numbers() -> None:
+    """Print numbers by their grid, as those that the loop over a whole text leaves."""
+    grid = Grid(GridKind.GENERAL, 6)
+    ordinals, _ = grid.ordinals(np.array([0.0, -1.5e-40, 123456.0, 1e30]))
+    assert grid.texts(ordinals).tolist() == [b"0", b"-1.5e-40", b"123456", b"1e+30"]
+
+
 def encode_walk() -> None:
     """The sample as its codec for poses takes it, and the rest that kernels do with poses."""
     walk = bvh_walk().cut(0, 24)
@@ -196,6 +203,7 @@ def main() -> None:
     decode_vectors()
     encode_clips()
     encode_counts()
+    print_numbers()
     encode_walk()
     stream_frames()
     with tempfile.TemporaryDirectory() as folder:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import re
-import shutil
 import sys
 import unicodedata
 from typing import TYPE_CHECKING, BinaryIO, TextIO
@@ -34,6 +33,8 @@ class StatusLine:
 
     def show(self, text: str) -> None:
         """Show ``text``, as much of it as fits, in place of the line before."""
+        import shutil
+
         room, width, shown = shutil.get_terminal_size().columns - 1, 0, ""
         for letter in printable(text):
             width += columns_of(letter)

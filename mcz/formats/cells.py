@@ -72,12 +72,13 @@ class Cells:
         """Print rows of one grid a column, those of decimal grids at once."""
         values, size = values[rows], self.size[rows]
         self._append(print_values(values, grids, self._total, self.start[rows], size))
-        for grid in dict.fromkeys(grids):
-            columns = np.array([c for c, known in enumerate(grids) if known == grid])
-            row, column = np.nonzero(size[:, columns] == 0)
-            if len(row):
-                column = columns[column]
-                self._print(grid, values[row, column], row + rows.start, column)
+        if size[:, :-1].all():
+            return
+        row, column = np.nonzero(size[:, :-1] == 0)
+        for grid in dict.fromkeys(grids[c] for c in np.flatnonzero(np.bincount(column)).tolist()):
+            mine = np.array([known == grid for known in grids])[column]
+            own_row, own_column = row[mine], column[mine]
+            self._print(grid, values[own_row, own_column], own_row + rows.start, own_column)
 
     def _print(self, grid: Grid, values: Values, rows: Ints, columns: Ints) -> None:
         """Print values by the nearest number of their grid, by repr where they lie beyond it."""
