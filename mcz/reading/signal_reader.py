@@ -146,7 +146,8 @@ class SignalReader:
         if at < stop:
             run = self._run(stop - 1)
             if run is not None and stop < run[1]:
-                yield from self.blocks(at, run[0], out[(at - start) * per_frame :])
+                if at < run[0]:
+                    yield from self.blocks(at, run[0], out[(at - start) * per_frame :])
                 at = stop
                 yield from self._cut(run, run[0], stop)
         if at < stop or start == stop:
