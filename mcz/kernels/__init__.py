@@ -23,9 +23,12 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from threading import RLock
 from types import ModuleType
-from typing import ParamSpec, TypeVar, cast
+from typing import TYPE_CHECKING, ParamSpec, TypeVar, cast
 
 from mcz.kernels.units import UNIT_OF
+
+if TYPE_CHECKING:
+    from mcz.kernels.types import Bytes
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -153,6 +156,21 @@ def _warn(text: str) -> None:
 def bit_length(value: int) -> int:
     """Bits of ``value`` >= 0 without leading zeros."""
     return int(value).bit_length()
+
+
+def trailing_zeros(value: int) -> int:
+    """Zeros below the lowest bit that is set; of 0: 64."""
+    return (value & -value).bit_length() - 1 if value else 64
+
+
+def eight_bytes(data: Bytes, at: int) -> int:
+    """Eight bytes from ``at`` on, the lowest first; compiled, the highest bit is a sign."""
+    return int.from_bytes(data[at : at + 8].tobytes(), "little")
+
+
+def wrapped(value: int) -> int:
+    """The lowest 32 bits, with their sign."""
+    return ((value + (1 << 31)) & 0xFFFFFFFF) - (1 << 31)
 
 
 def truncated(value: float) -> int:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 Ints2 = NDArray[np.int64]
 Ints3 = NDArray[np.int64]
+Words = NDArray[np.int32]
+Words2 = NDArray[np.int32]
 IntColumn = NDArray[np.int64]
 IntColumns = NDArray[np.int64]  # two axes
 Floats = NDArray[np.float64]

@@ -44,6 +44,7 @@ class Array:
 
 ITEMS = {  # type in C, number that an item is
     "int64": ("long long", INT),
+    "int32": ("int", INT),
     "float64": ("double", FLOAT),
     "uint8": ("unsigned char", INT),
     "bool": ("unsigned char", BOOL),
@@ -80,8 +81,9 @@ class Record:
 
 Type = Scalar | Array | Tuple | Record
 SCALARS = {"int": INT, "float": FLOAT, "bool": BOOL, "None": NOTHING}
-PREFIXES = {"Int": "int64", "Float": "float64", "Byte": "uint8", "Flag": "bool"}
-NAME = re.compile(r"(Int|Float|Byte|Flag)(?:s([2-9]?)|(Columns?))")  # as mcz.kernels.types has them
+PREFIXES = {"Int": "int64", "Word": "int32", "Float": "float64", "Byte": "uint8", "Flag": "bool"}
+# As mcz.kernels.types has them.
+NAME = re.compile(r"(Int|Word|Float|Byte|Flag)(?:s([2-9]?)|(Columns?))")
 
 
 def array_type(name: str) -> Array | None:

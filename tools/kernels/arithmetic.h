@@ -1,6 +1,7 @@
 /* Arithmetic of kernels as SPEC.md has it: integers of 64 bits that wrap around. */
 
 #include <math.h>
+#include <string.h>
 
 /* Rounded down, and 0 by a divisor of 0; by -1 without the one quotient that traps. */
 static inline long long mcz_divide(long long a, long long b) {
@@ -39,6 +40,34 @@ static inline long long mcz_bit_length(long long a) {
 #else
   long long n = 0;
   for (unsigned long long rest = (unsigned long long)a; rest; rest >>= 1) n++;
+  return n;
+#endif
+}
+
+/* The lowest 32 bits, with their sign. */
+static inline long long mcz_wrapped(long long a) { return (int)a; }
+
+/* Little-endian; ``last`` is the last of the bytes, so that checked builds know they are all there. */
+static inline long long mcz_eight_bytes(const unsigned char *at, unsigned char last) {
+  (void)last;
+#if defined(__BYTE_ORDER__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+  long long value;
+  memcpy(&value, at, 8);
+  return value;
+#else
+  unsigned long long value = 0;
+  for (int n = 7; n >= 0; n--) value = value << 8 | at[n];
+  return (long long)value;
+#endif
+}
+
+/* Of 0: 64. */
+static inline long long mcz_trailing_zeros(long long a) {
+#if defined(__GNUC__)
+  return a == 0 ? 64 : __builtin_ctzll((unsigned long long)a);
+#else
+  long long n = 0;
+  while (n < 64 && !(a >> n & 1)) n++;
   return n;
 #endif
 }

@@ -342,6 +342,12 @@ class Expressions:
             if not isinstance(type_, Array):
                 raise self.error(node, f"{type_} has no length")
             return f"<long long>{text}.shape[0]", INT
+        if name == "eight_bytes":
+            text, type_ = self.expr(node.args[0])
+            if type_ != Array("uint8", 1):
+                raise self.error(node, f"{type_} has no bytes")
+            at = self.int_of(node.args[1])
+            return f"mcz_eight_bytes(&{text}[{at}], {text}[{at} + 7])", INT
         parts = [self.number(item) for item in node.args]
         (text, type_), *_ = parts
         if name in ("min", "max"):
@@ -355,6 +361,8 @@ class Expressions:
             return f"mcz_bit_length({text})", INT
         if name == "truncated":
             return f"mcz_truncated({text})", INT
+        if name in ("wrapped", "trailing_zeros"):
+            return f"mcz_{name}({text})", INT
         return (f"mcz_integer({text})" if type_ == FLOAT else f"(<long long>{text})"), INT
 
     def _call(self, node: ast.Call, where: Source, name: str) -> Typed:
@@ -403,4 +411,16 @@ def _widens(given: Scalar, wanted: Scalar) -> bool:
     return given == wanted or (known and RANKED.index(given) < RANKED.index(wanted))
 
 
-BUILTINS = {"min", "max", "abs", "len", "int", "float", "bit_length", "truncated"}
+BUILTINS = {
+    "min",
+    "max",
+    "abs",
+    "len",
+    "int",
+    "float",
+    "bit_length",
+    "eight_bytes",
+    "trailing_zeros",
+    "truncated",
+    "wrapped",
+}

@@ -20,7 +20,13 @@ from tools.kernels.annotations import (
 from tools.kernels.expressions import Expressions, Root
 from tools.kernels.source import Source, mangled
 
-DTYPES = {"np.int64": "int64", "np.float64": "float64", "np.uint8": "uint8", "np.bool_": "bool"}
+DTYPES = {
+    "np.int64": "int64",
+    "np.int32": "int32",
+    "np.float64": "float64",
+    "np.uint8": "uint8",
+    "np.bool_": "bool",
+}
 
 
 class Function(Expressions):
@@ -224,7 +230,7 @@ class Function(Expressions):
             name = self.temporary(type_, root)
             self.line(f"{name} = {text}")
             for place, one in enumerate(target.elts):
-                item = INT if type_.item in ("int64", "uint8") else FLOAT
+                item = FLOAT if type_.item == "float64" else INT
                 self._assign(one, f"{name}[{place}]", item, None)
         else:
             raise self.error(target, f"{type_} is not unpacked")

@@ -26,6 +26,9 @@ cdef extern from "arithmetic.h" nogil:
     long long mcz_bit_length(long long a)
     long long mcz_integer(double a)
     long long mcz_truncated(double a)
+    long long mcz_wrapped(long long a)
+    long long mcz_eight_bytes(const unsigned char* at, unsigned char last)
+    long long mcz_trailing_zeros(long long a)
     double INFINITY
     double mcz_square(double a)
     double mcz_power "pow"(double a, double b)
@@ -39,7 +42,7 @@ cdef extern from "arithmetic.h" nogil:
     double fabs(double a)
     double ldexp(double a, int n)
 
-cdef object int64_ = dtype("int64"), float64_ = dtype("float64")
+cdef object int64_ = dtype("int64"), int32_ = dtype("int32"), float64_ = dtype("float64")
 cdef object uint8_ = dtype("uint8"), bool_ = dtype("bool")
 """
 
