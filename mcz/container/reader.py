@@ -53,7 +53,7 @@ from mcz.container.segments import (
     mask_of,
     parse_table,
 )
-from mcz.container.skeletons import parse_skeleton
+from mcz.container.skeletons import read_skeleton
 from mcz.container.source import ByteSource, Overlay
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.motion import Skeleton
@@ -234,9 +234,8 @@ class Container:
         """Both; the last ones are kept, since the clips of a file share them."""
         found = self._skeletons.get(id_)
         if found is None:
-            payload = self._shared_payload(ChunkType.SKEL, id_)
-            fields = parse(payloads.Skel, *payload, self.profile.counts)
-            found = fields, parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
+            payload, label = self._shared_payload(ChunkType.SKEL, id_)
+            found = read_skeleton(payload, self.profile, label, f"SKEL {id_.hex()}")
             while len(self._skeletons) >= KEPT_SKELETONS:
                 self._skeletons.pop(next(iter(self._skeletons)), None)
             self._skeletons[id_] = found

@@ -8,10 +8,12 @@ from mcz.container import payloads
 from mcz.container.limits import Profile, check
 from mcz.errors import FormatError, MotionError
 from mcz.motion import CHANNEL_KINDS, ORIGIN, Channel, Joint, Skeleton
-from mcz.schema import build
+from mcz.schema import build, parse
 from mcz.skeleton import AXES, HANDS
 
 ANGLE_UNITS = ("", "deg", "rad")
+MOST_KNOWN, MOST_BYTES = 64, 1 << 16  # skeletons that are kept, and how long a payload may be
+_known: dict[tuple[bytes, int], tuple[payloads.Skel, Skeleton]] = {}  # by payload and profile
 AXIS_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
@@ -75,6 +77,25 @@ def parse_channels(rows: Sequence[payloads.Channel], where: str) -> tuple[Channe
         unknown = f"kind-{row.kind}" if row.kind and not known else ""
         channels.append(Channel(kind, row.name or unknown, row.unit or ""))
     return tuple(channels)
+
+
+def read_skeleton(
+    payload: bytes, profile: Profile, label: str, where: str
+) -> tuple[payloads.Skel, Skeleton]:
+    """The fields of SKEL and its Skeleton; raises FormatError or LimitError.
+
+    The last ones are kept, as the files of a data set often have one skeleton.
+    """
+    key = payload, profile.id
+    found = _known.get(key)
+    if found is None:
+        fields = parse(payloads.Skel, payload, label, profile.counts)
+        found = fields, parse_skeleton(fields, profile, where)
+        if len(payload) <= MOST_BYTES:
+            while len(_known) >= MOST_KNOWN:
+                _known.pop(next(iter(_known)), None)
+            _known[key] = found
+    return found
 
 
 def parse_skeleton(fields: payloads.Skel, profile: Profile, where: str) -> Skeleton:
