@@ -176,6 +176,11 @@ Cut = Callable[[bytes, Layout, int, int, tuple[int, ...]], bytes]
 Regroup = Callable[[bytes, Layout, int, Mapping[int, int]], bytes]
 
 
+# (layout, span, groups, fetch) -> the streams of some groups of a segment, ascending, coded without
+# the others; ``fetch`` counts this segment as 0.
+Subset = Callable[[Layout, Span, Sequence[int], "Fetch"], tuple[bytes, ...]]
+
+
 @dataclass(frozen=True, slots=True)
 class Recoding:
     """Groups of a coded signal that are coded anew, with the header that they have.
@@ -284,8 +289,9 @@ class Codec:
     resolutions that are left, MUST give the same values as before, and takes details that are
     not stored as those that a request leaves out. ``cut`` makes the header fit where it says
     something of frames or channels (None: it holds as it is); ``regroup`` a stream that names other
-    groups (None: none does). Both are given the layout before the cut, and raise FormatError for
-    bad bytes.
+    groups (None: none does). ``subset`` codes what is left of a segment anew, of a codec that codes
+    all groups together: it recodes all of them, too. All are given the layout before the cut, and
+    raise FormatError for bad bytes.
 
     ``positions``: it is made for positions of points; of a clip of channels it is given those of
     its points, unless its parameter ``domain`` says ``channels``. ``uses``: the models that a
@@ -315,6 +321,7 @@ class Codec:
     promise: Callable[[Params], Settings] | None = None
     cut: Cut | None = None
     regroup: Regroup | None = None
+    subset: Subset | None = None
     recode: Recode | None = None
     preview: Preview | None = None
     partition: Partition | None = None

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from mcz.clock import numbering_of, part_begins
+from mcz.codecs.contract import Span
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.limits import Profile
@@ -340,16 +341,28 @@ def cut_segment(
             flags |= flag
             kept += found
     left = _Numbers(part, name)
+    if not part.has_all_groups and part.info.codec.subset is not None:
+        span = Span(row.header.first, row.header.n_frames)
+
+        def fetch(_: int, resolution: int, group: int) -> bytes:
+            return streams[table.codec(resolution, group)]
+
+        kept += part.info.codec.subset(part.info.layout, span, part.groups, fetch)
+        return _cut_header(part, row, flags), kept, table.extension
     for resolution in range(part.info.counts.n_resolutions - part.dropped):
         for group in part.groups:
             stream = streams[table.codec(resolution, group)]
             if not part.has_all_groups and part.info.codec.regroup is not None:
                 stream = part.info.codec.regroup(stream, part.info.layout, group, left)
             kept.append(edit.coded(resolution, group, stream))
+    return _cut_header(part, row, flags), kept, table.extension
+
+
+def _cut_header(part: SignalCut, row: SegmentRow, flags: int) -> SegmentHeader:
+    header = row.header
     first = header.first - part.base
     lead = min(header.lead, first)
-    new = SegmentHeader(part.info.index, first, header.n_frames, lead, header.tail, flags)
-    return new, kept, table.extension
+    return SegmentHeader(part.info.index, first, header.n_frames, lead, header.tail, flags)
 
 
 def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int], profile: Profile) -> bytes:

@@ -67,8 +67,12 @@ def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool)
     signal = motion.signals[0]
     source = _source_of(clip, info, signal)
     reader = SignalReader(clip.container, info, tuple(range(len(info.layout.groups))), 0, clip.name)
-    dependents = _dependents(info, groups, reader)
-    streams = _streams(clip, info, source, groups, reader)
+    dependents: dict[int, list[int]] = {}
+    if info.codec.subset is None:
+        dependents = _dependents(info, groups, reader)
+        streams = _streams(clip, info, source, groups, reader)
+    else:
+        streams = _streams(clip, info, source, reader.groups, reader)
     for group, segments in dependents.items():
         streams |= _streams(clip, info, source, (group,), reader, segments)
     decoded = _decoded(info, signal, source, streams, (*groups, *dependents), reader)

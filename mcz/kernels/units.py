@@ -4,10 +4,13 @@ from __future__ import annotations
 
 UNITS: dict[str, tuple[str, ...]] = {
     "fast": (
-        "mcz.coding.quick.choice_kernels",
-        "mcz.coding.quick.head_kernels",
-        "mcz.coding.quick.record_kernels",
-        "mcz.coding.quick.stream_kernels",
+        "mcz.coding.fast.head_kernels",
+        "mcz.coding.fast.lane_kernels",
+        "mcz.coding.fast.parent_kernels",
+        "mcz.coding.fast.plan_kernels",
+        "mcz.coding.fast.residual_kernels",
+        "mcz.coding.fast.tail_kernels",
+        "mcz.coding.fast.write_kernels",
     ),
     "best": (
         "mcz.coding.mixing",

@@ -29,7 +29,7 @@ TABLES = {
     "online": ("online_start.json", BASES),
     "best": ("best_start.json", "lossless_start.json"),
     "posewave": ("posewave_start.json",),
-    "fast": ("fast_counts.json",),
+    "fast": (),
 }
 
 

@@ -15,9 +15,9 @@ from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless import best_streams
 from mcz.codecs.lossless.best_choices import choose_links
 from mcz.codecs.lossless.best_streams import LINKED, MAX_LINKS, Link
+from mcz.coding.fast import decoder, encoder
 from mcz.coding.ordinals import degrees
 from mcz.coding.ordinals.streams import build_stream, plan_stream
-from mcz.coding.quick import streams as fast_streams
 from mcz.numbers import Grid, GridKind
 
 GRIDS = (
@@ -59,7 +59,7 @@ class Coder:
         found: list[object] = []
         for lacking in (False, True) if self.name == "fast" else (False,):
             with ExitStack() as stack:
-                for module in (degrees, fast_streams) if lacking else ():
+                for module in (degrees, decoder) if lacking else ():
                     name = f"{module.__name__}.lacks_compiled_kernels"
                     stack.enter_context(mock.patch(name, return_value=True))
                 found.append(self.decoded(stream, n_rows, n_channels, grid).tolist())
@@ -83,7 +83,7 @@ def linked(
 LOSSLESS = Coder("lossless", lambda columns, own: build_stream(columns, own, 0, {}))
 FAST = Coder(
     "fast",
-    lambda columns, own: fast_streams.build_streams(columns, own, [range(len(own))], [0], True)[0],
+    lambda columns, own: encoder.build_streams(columns, own, [range(len(own))])[0],
 )
 BEST = Coder("best", linked)
 CODERS = (LOSSLESS, FAST, BEST)

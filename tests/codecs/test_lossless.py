@@ -62,7 +62,8 @@ def test_what_a_column_hides_is_coded(name: str) -> None:
         data = saved(codec, motion)
         with mcz.open(data) as file:
             clip = file.only_clip()
-            assert sum(row.size for row in clip.signals[0].rows) < most
+            plainly = 1.11 if codec == "fast" else 1  # its codes take a bit at least
+            assert sum(row.size for row in clip.signals[0].rows) < most * plainly
             assert clip.read()[:, 0].tobytes() == values.tobytes()
             if codec == "lossless":  # of which version 0 has no such forms
                 assert clip.signals[0].codec_version == version

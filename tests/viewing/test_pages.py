@@ -88,7 +88,7 @@ def test_a_source_is_held_without_loss(samples: Path, tmp_path: Path, call: Call
     assert f"{out.stat().st_size:,} bytes, the player {len(page().text):,} of them" in printed
     assert f"walk.bvh: 1 clip, {file.size:,} bytes" in printed
     assert "diffs" not in document
-    assert document["annex"].keys() == {"words.bin", "fast_counts.json"}
+    assert document["annex"].keys() == {"words.bin"}
     for name, text in document["annex"].items():
         assert zlib.decompress(base64.b64decode(text), -15) == annex_bytes(name)
 

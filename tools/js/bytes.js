@@ -102,6 +102,10 @@ export class ByteReader {
     return this.bytes[this.at++];
   }
 
+  i8() {
+    return this.view.getInt8(this.skip(1));
+  }
+
   u16() {
     return this.view.getUint16(this.skip(2), true);
   }

@@ -1,4 +1,5 @@
-// SPEC.md, "Codec 128: lossless": the heads of channels, which fast has, too.
+// SPEC.md, "Codec 128: lossless": the heads of channels. Fast has its own, with the same forms and
+// units.
 
 import {
   BINARY32,
@@ -23,8 +24,13 @@ export const COUNTS = 34; // nor is this
 const CLASSES_24 = 88;
 const CLASSES_53 = 117;
 
+/** What forms without a unit have in its place. */
+export const NO_UNIT = { unit: 1, shifts: 0, law: null };
+
+const MAX_TAPS = 8;
 const MAX_TAP = 511;
 const MAX_SCALE = 172;
+const MAX_DROP = 19; // of plain forms
 
 /** B^j for 0 <= j <= 63; the last ones stand for "too large", and all are exact. */
 export const POWERS_OF_2 = Float64Array.from({ length: 64 }, (_, j) => 2 ** Math.min(j, 62));
@@ -38,8 +44,7 @@ export const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) =>
  * @param {ByteReader} reader at the head
  * @param {object} grid of the channel in CLIP
  * @param {number} column the channel
- * @param {{maxTaps: number, hasDepth: boolean, hasProducts: boolean, hasCounts: boolean}} rules of
- *     the codec
+ * @param {{hasProducts: boolean, hasCounts: boolean}} rules of the codec
  * @throws {Refused}
  */
 export function readHead(reader, grid, column, rules) {
@@ -68,51 +73,59 @@ function readConstant(reader, kind) {
   return zigzag & 1n ? -(zigzag >> 1n) - 1n : zigzag >> 1n;
 }
 
-function readCoded(reader, kind, grid, rules) {
-  const { maxTaps, hasDepth, hasProducts, hasCounts } = rules;
+function readCoded(reader, kind, grid, { hasProducts, hasCounts }) {
   const nTaps = (kind >> 3) & 15;
-  if (nTaps > maxTaps) reader.refuse(`${nTaps} taps`);
+  if (nTaps > MAX_TAPS) reader.refuse(`${nTaps} taps`);
   const spelled = (kind & 128) !== 0;
   const form = spelled ? reader.u8() : formOf(grid);
   const drop = spelled ? reader.u8() : 0;
-  if (drop > greatestDrop(form)) reader.refuse(`form ${form} with a drop of ${drop}`);
+  if (drop > greatestDrop(form, MAX_DROP)) reader.refuse(`form ${form} with a drop of ${drop}`);
   if (form === PRODUCTS && !(hasProducts && grid.kind === GENERAL)) {
     reader.refuse(`form ${form} in this version, or on a grid of kind ${grid.kind}`);
   }
   if (form === COUNTS && !hasCounts) reader.refuse(`form ${form} in this version`);
-  let unit = 1;
-  let shifts = 0;
-  let law = null;
-  let top = 0;
-  let depth = 0;
-  if (form === MULTIPLES || form === PRODUCTS || form === COUNTS) {
-    unit = reader.f64();
-    if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
-    if (form === PRODUCTS) shifts = reader.u8();
-    if (form === PRODUCTS && !(shifts >= 1 && shifts <= 63)) reader.refuse(`${shifts} shifts`);
-    if (form === COUNTS) law = readLaw(reader);
-  } else if (form !== PLAIN) {
-    top = reader.varint();
-    if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
-    if (hasDepth) depth = reader.varint();
-    if (depth > top) reader.refuse(`depth ${depth} of ${top} classes`);
-  }
+  const units = hasUnit(form) ? readUnit(reader, form) : NO_UNIT;
+  const top = isClasses(form) ? reader.varint() : 0;
+  if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
   const q = reader.u8();
   if (q > MAX_SCALE) reader.refuse(`scale ${q}`);
-  const scale = Math.floor(((4 + (q % 4)) * 2 ** (q >> 2)) / 4);
+  const scale = scaleOf(q);
   const taps = new Float64Array(nTaps);
   for (let i = 0; i < nTaps; i++) {
     taps[i] = reader.zigzag();
     if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
   }
   const fromLast = (kind & 4) !== 0;
-  return { form, drop, unit, shifts, law, grid, top, depth, scale, taps, fromLast };
+  return { form, drop, ...units, grid, top, scale, taps, fromLast };
+}
+
+/** The scale that a byte stands for. */
+export function scaleOf(q) {
+  return Math.floor(((4 + (q % 4)) * 2 ** (q >> 2)) / 4);
+}
+
+/**
+ * The unit of forms 32 to 34, and what these have beside it. The rules are those of fast.
+ *
+ * @returns {{unit: number, shifts: number, law: object | null}}
+ */
+export function readUnit(reader, form) {
+  const unit = reader.f64();
+  if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`); // FAST-47
+  const shifts = form === PRODUCTS ? readShifts(reader) : 0;
+  return { unit, shifts, law: form === COUNTS ? readLaw(reader) : null };
+}
+
+function readShifts(reader) {
+  const shifts = reader.u8();
+  if (!(shifts >= 1 && shifts <= 63)) reader.refuse(`${shifts} shifts`); // FAST-50
+  return shifts;
 }
 
 /** What follows the unit of counts; null for a sum that is not made. `counted`: the last ordinal. */
 function readLaw(reader) {
   const parts = reader.u8();
-  if (parts > 7) reader.refuse(`parts ${parts}`);
+  if (parts > 7) reader.refuse(`parts ${parts}`); // FAST-52
   const offset = parts & 1 ? readTerm(reader) : null;
   const shift = parts & 2 ? readTerm(reader) : null;
   return { offset, shift, hasRests: (parts & 4) !== 0, counted: 0 };
@@ -120,7 +133,7 @@ function readLaw(reader) {
 
 function readTerm(reader) {
   const term = reader.f64();
-  if (!(Math.abs(term) <= 2 ** 80)) reader.refuse(`an offset or shift of ${term}`);
+  if (!(Math.abs(term) <= 2 ** 80)) reader.refuse(`an offset or shift of ${term}`); // FAST-53
   return term;
 }
 
@@ -128,15 +141,25 @@ function readTerm(reader) {
 export function withRests(heads) {
   const counts = heads.filter(({ law }) => law?.hasRests);
   const taps = new Float64Array(0);
-  const plain = { form: PLAIN, drop: 0, unit: 1, shifts: 0, law: null, top: 0, depth: 0 };
+  const plain = { form: PLAIN, drop: 0, ...NO_UNIT, top: 0 };
   const rests = counts.map(({ column, grid, law }) => {
     return { kind: CODED, column, grid, ...plain, scale: 1, taps, fromLast: false, restsOf: law };
   });
   return [...heads, ...rests];
 }
 
+/** Whether the numbers of a form are made of integers by a unit. */
+export function hasUnit(form) {
+  return form === MULTIPLES || form === PRODUCTS || form === COUNTS;
+}
+
+/** Whether the numbers of a form lie in classes. */
+export function isClasses(form) {
+  return form !== PLAIN && !hasUnit(form);
+}
+
 /** The form of a channel whose head does not tell. */
-function formOf(grid) {
+export function formOf(grid) {
   const { kind, digits } = baseOf(grid.kind, grid.digits);
   switch (kind) {
     case GENERAL:
@@ -153,16 +176,17 @@ function formOf(grid) {
   }
 }
 
-/** Greatest `drop` of a form; -1 where there is no such form. */
-function greatestDrop(form) {
-  if (form === PLAIN) return 19;
-  if (form <= 15 || [MULTIPLES, PRODUCTS, COUNTS].includes(form)) return 0;
+/** Greatest `drop` of a form, given that of plain ones; -1 where there is no such form. */
+export function greatestDrop(form, ofPlain) {
+  if (form === PLAIN) return ofPlain;
+  if (form <= 15 || hasUnit(form)) return 0;
   if (form === CLASSES_24) return 22;
   if (form === CLASSES_53) return 51;
   return -1;
 }
 
-function greatestTop(form) {
+/** Greatest `top` of a form in classes. */
+export function greatestTop(form) {
   return form === CLASSES_24 ? 255 : form === CLASSES_53 ? 2047 : 614;
 }
 

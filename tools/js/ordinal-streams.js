@@ -1,4 +1,4 @@
-// SPEC.md, "Codec 128: lossless": streams of groups, with constants and copies, as fast has them, too.
+// SPEC.md, "Codec 128: lossless": streams of groups, with constants and copies.
 
 import { ByteReader } from "./bytes.js";
 import { Refused } from "./errors.js";

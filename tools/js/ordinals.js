@@ -82,10 +82,13 @@ function integer(v) {
 function general(v, digits) {
   if (v === 0) return 0n;
   const least = EXACT_POWERS[digits - 1];
-  let X = floorLog10(v);
-  const s = digits - 1 - X;
-  let d = 0;
-  if (Math.abs(s) <= 22) d = rint(s < 0 ? v / EXACT_POWERS[-s] : v * EXACT_POWERS[s]);
+  let X = Math.floor(Math.log10(v));
+  let d = digitsOf(v, digits, X);
+  if (!(d > least && d < 10 * least - 1)) {
+    // Beside a power of ten that may have been the exponent of a neighbour.
+    X = floorLog10(v);
+    d = digitsOf(v, digits, X);
+  }
   if (!(d >= least && d < 10 * least)) {
     const decimal = rounded(v, digits);
     d = Number(decimal.digits);
@@ -93,6 +96,13 @@ function general(v, digits) {
   }
   if (X < -307) return 0n;
   return BigInt(X + 307) * 9n * BigInt(least) + BigInt(d - least + 1);
+}
+
+/** The digits of v by one exact operation, X being the exponent of the first; 0 without one. */
+function digitsOf(v, digits, X) {
+  const s = digits - 1 - X;
+  if (Math.abs(s) > 22) return 0;
+  return rint(s < 0 ? v / EXACT_POWERS[-s] : v * EXACT_POWERS[s]);
 }
 
 /** floor(log10(v)), exactly. */

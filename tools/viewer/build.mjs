@@ -57,7 +57,7 @@ function policy(script, style) {
   ].join("; ");
 }
 
-const TABLES = /(?:_start\.json|^fast_counts\.json|\.bin)$/; // of the annex, those that decoders read
+const TABLES = /(?:_start\.json|\.bin)$/; // of the annex, those that decoders read
 
 /** What the page has when it is opened by itself: no file, and the tables of all codecs. */
 function embedded() {

@@ -1,41 +1,69 @@
-"""Codec lossless, ``fast``: predicted ordinals in static distributions, made to be read.
+"""Codec fast: linear prediction and adaptive Rice codes, made to be read.
 
 SPEC.md, "Codec 1: fast", is normative.
 
-Exactness: lossless and bit-exact; integers only, in 64 bits. A stream holds one group of one
-segment and needs no other, but for channels that are copies of another group's.
+Exactness: lossless and bit-exact; integers only, in 32 bits but for ordinals. All streams of a
+segment are coded together, as a channel may follow one of another group.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Fetch, Layout, Request, Span, refuse_extras
-from mcz.codecs.lossless.segments import (
-    MAX_ROWS,
-    check_copy,
-    encode_groups,
-    recode_groups,
-    segment_frames,
+from mcz.codecs.contract import (
+    Codec,
+    Encoded,
+    Fetch,
+    Layout,
+    Recoding,
+    Request,
+    SignalSource,
+    Span,
+    refuse_extras,
 )
-from mcz.codecs.segments import Sizing
-from mcz.coding.quick.streams import (
-    Channels,
-    build_streams,
-    channels_of,
-    parse_streams,
-    renumbered,
-)
+from mcz.codecs.lossless.segments import segment_frames
+from mcz.codecs.segments import Sizing, guessing
+from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
+from mcz.coding.fast.encoder import build_streams
 from mcz.errors import FormatError
 from mcz.numbers import Grid
+from mcz.types import Params
 
 Ints = NDArray[np.int64]
 
-SIZING = Sizing(43_000, 50_000, value_bytes=2, most_rows=MAX_ROWS, spare=1)
+MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
+USUAL_ROWS = 1024
+SIZING = Sizing(60_000, 63_000, value_bytes=1.5, most_rows=USUAL_ROWS, spare=1)
+
+
+def encode(source: SignalSource, params: Params) -> Encoded:
+    """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
+    fixed: int = params["segment_frames"]
+    most = min(MOST_ROWS if fixed else USUAL_ROWS, MOST_VALUES // max(1, source.layout.n_channels))
+    groups = range(len(source.layout.groups))
+    prepare = partial(_prepare, source, groups)
+    return Encoded(b"", guessing(source, fixed, replace(SIZING, most_rows=most), prepare))
+
+
+def _prepare(
+    source: SignalSource, groups: Sequence[int], start: int, stop: int
+) -> Callable[[], tuple[bytes, ...]]:
+    """The making of the streams of a segment."""
+    layout = source.layout
+    grids = list(zip(source.grids(start), layout.grids, strict=True))
+    ordinals = source.ordinals(start, stop)
+    return lambda: tuple(build_streams(ordinals, grids, layout.groups))
+
+
+def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+    """The streams of all groups with new values."""
+    for span in asked.spans:
+        yield _prepare(asked.source, asked.groups, span.first, span.stop)()
 
 
 def decode(
@@ -45,71 +73,51 @@ def decode(
     refuse_extras("fast", header, layout)
     per_frame = layout.samples_per_frame
     n_channels = sum(len(layout.groups[group]) for group in request.groups)
-    channels = _channels(layout.grids, tuple(layout.groups[group] for group in request.groups))
     out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
+    shape = _shape(layout.grids, layout.groups)
+    segments, parts = [], []
     for index, span in enumerate(spans):
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
-        if start >= stop:
-            continue
-        target = out[(start - request.start) * per_frame : (stop - request.start) * per_frame]
-        n_rows = span.n_frames * per_frame
-        rows = target if len(target) == n_rows else np.empty((n_rows, n_channels), np.int64)
-        _read_segment(layout, request.groups, channels, partial(fetch, index, 0), rows)
-        if rows is not target:
-            first = (start - span.first) * per_frame
-            target[:] = rows[first : first + len(target)]
+        if start < stop:
+            n_rows = _rows(layout, span)
+            target = out[(start - request.start) * per_frame : (stop - request.start) * per_frame]
+            rows = target if len(target) == n_rows else np.empty((n_rows, n_channels), np.int64)
+            fetch_group = partial(fetch, index, 0)
+            segments.append(SegmentDecoder(shape, request.groups, fetch_group, rows))
+            if rows is not target:
+                first = (start - span.first) * per_frame
+                parts.append((target, rows[first : first + len(target)]))
+    read_segments(segments)
+    for target, rows in parts:
+        target[:] = rows
     return out
 
 
-def _read_segment(
-    layout: Layout,
-    groups: tuple[int, ...],
-    channels: Channels,
-    stream: partial[bytes],
-    rows: Ints,
-) -> None:
-    """Fill ``rows``, those of one segment, with the channels of the groups."""
-    copies = parse_streams(
-        [stream(group) for group in groups],
-        [len(layout.groups[group]) for group in groups],
-        channels,
-        rows,
-    )
-    if not copies:
-        return
-    first, columns = 0, {}
-    for group in groups:
-        columns[group] = first
-        first += len(layout.groups[group])
-    apart: dict[int, tuple[Ints, dict[int, tuple[int, int]]]] = {}  # groups not asked for
-    for column, (group, channel) in copies.items():
-        check_copy("fast", layout, group, channel)
-        source, known, at = rows, copies, columns.get(group, 0) + channel
-        if group not in columns:
-            if group not in apart:
-                other = np.empty((len(rows), len(layout.groups[group])), np.int64)
-                own = _channels(layout.grids, (layout.groups[group],))
-                apart[group] = other, parse_streams([stream(group)], [len(own.grids)], own, other)
-            source, known = apart[group]
-        if at in known:  # FAST-02, LOSS-11
-            raise FormatError(f"fast: a copy of a copy, channel {channel} of group {group}")
-        rows[:, column] = source[:, at]
+def _rows(layout: Layout, span: Span) -> int:
+    n_rows = span.n_frames * layout.samples_per_frame
+    if (n_rows > MOST_ROWS and span.n_frames > 1) or n_rows * layout.n_channels > MOST_VALUES:
+        raise FormatError(  # FAST-18
+            f"fast: a segment of {n_rows} rows and {layout.n_channels} channels"
+        )
+    return n_rows
 
 
 @lru_cache(maxsize=64)
-def _channels(grids: tuple[Grid, ...], groups: tuple[tuple[int, ...], ...]) -> Channels:
-    return channels_of(grids[c] for group in groups for c in group)
+def _shape(grids: tuple[Grid, ...], groups: tuple[tuple[int, ...], ...]) -> Shape:
+    return Shape(grids, groups)
 
 
-def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
-    """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
-    channels = _channels(layout.grids, (layout.groups[group],))
-
-    def number_of(other: int, channel: int) -> int:
-        check_copy("fast", layout, other, channel)
-        return numbers[other]
-
-    return renumbered(stream, channels, number_of)
+def subset(layout: Layout, span: Span, groups: Sequence[int], fetch: Fetch) -> tuple[bytes, ...]:
+    """The streams of some groups of a segment, coded without the others."""
+    shape = _shape(layout.grids, layout.groups)
+    stream = partial(fetch, 0, 0)
+    n_channels = sum(len(layout.groups[group]) for group in groups)
+    ordinals = np.empty((_rows(layout, span), n_channels), np.int64)
+    read_segments([SegmentDecoder(shape, tuple(groups), stream, ordinals)])
+    grids = [layout.grids[channel] for group in groups for channel in layout.groups[group]]
+    stops = np.cumsum([len(layout.groups[group]) for group in groups]).tolist()
+    left = [range(start, stop) for start, stop in zip([0, *stops], stops, strict=False)]
+    return tuple(build_streams(ordinals, list(zip(grids, grids, strict=True)), left))
 
 
 CODEC = Codec(
@@ -119,9 +127,9 @@ CODEC = Codec(
     domain="ordinals",
     lossless=True,
     hash_optional=True,
-    encode=partial(encode_groups, build_streams, SIZING),
+    encode=encode,
     decode=decode,
-    regroup=regroup,
-    recode=partial(recode_groups, build_streams),
-    parameters=(segment_frames("43,000"),),
+    subset=subset,
+    recode=recode,
+    parameters=(segment_frames("60,000", MOST_ROWS),),
 )

@@ -52,7 +52,7 @@ class Law:
 
 def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
     """The law whose ``parts`` stand at an offset, whether there are rests, the offset after it."""
-    if at >= len(stream) or stream[at] > OFFSET | SHIFT | RESTS:  # LOSS-35
+    if at >= len(stream) or stream[at] > OFFSET | SHIFT | RESTS:  # FAST-52, LOSS-35
         raise FormatError(f"lossless: parts {stream[at : at + 1].hex() or 'missing'} of a law")
     parts, at = stream[at], at + 1
     terms: list[float | None] = [None, None]
@@ -61,7 +61,7 @@ def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
             if at + 8 > len(stream):
                 raise FormatError(f"lossless: the stream ends at {len(stream)}, in a law")
             (term,) = struct.unpack_from("<d", stream, at)
-            if not -MOST <= term <= MOST:  # LOSS-36
+            if not -MOST <= term <= MOST:  # FAST-53, LOSS-36
                 raise FormatError(f"lossless: an offset or shift of {term!r}")
             terms[place], at = term, at + 8
     return Law(unit, *terms), bool(parts & RESTS), at

@@ -124,10 +124,10 @@ def parse_mapping(
     if form == COUNTS:
         law, rests, at = parse_law(stream, at, unit)
         return law.ordinals, rests, at
-    if grid.kind != GridKind.GENERAL:  # LOSS-32
+    if grid.kind != GridKind.GENERAL:  # FAST-49, LOSS-32
         raise FormatError(f"lossless: form {form} on the grid {grid.kind.name}")
     shifts, at = _byte(stream, at)
-    if not 1 <= shifts <= MAX_SHIFTS:  # LOSS-34
+    if not 1 <= shifts <= MAX_SHIFTS:  # FAST-50, LOSS-34
         raise FormatError(f"lossless: {shifts} shifts")
     return partial(of_products, unit=unit, shifts=shifts, grid=grid), False, at
 
@@ -141,7 +141,7 @@ def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
 
 
 def check_unit(codec: str, unit: float) -> None:
-    if not 2.0**-200 <= unit <= 2.0**80:  # LOSS-12
+    if not 2.0**-200 <= unit <= 2.0**80:  # FAST-47, LOSS-12
         raise FormatError(f"{codec}: a unit of {unit!r}")
 
 

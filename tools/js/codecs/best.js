@@ -33,7 +33,7 @@ const EIGHT_OR_NINE = 13107;
 
 const CODEC = {
   name,
-  rules: { maxTaps: 8, hasDepth: false, hasProducts: true, hasCounts: true },
+  rules: { hasProducts: true, hasCounts: true },
   decoder: (ordinals) => new BitDecoder(ordinals),
 };
 

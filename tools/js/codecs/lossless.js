@@ -47,7 +47,7 @@ const TWO_52 = 2 ** 52;
 /** The codec in each of its versions. */
 const VERSIONS = [false, true].map((hasForms) => ({
   name,
-  rules: { maxTaps: 8, hasDepth: false, hasProducts: hasForms, hasCounts: hasForms },
+  rules: { hasProducts: hasForms, hasCounts: hasForms },
   decoder: (ordinals) => new BitDecoder(ordinals),
 }));
 

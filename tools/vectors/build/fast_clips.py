@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.coding.fast import heads as fast_heads
+from mcz.coding.fast.encoder import CODE_BYTES
+from mcz.coding.fast.plan_kernels import TAP_UNIT, scale_of
+from mcz.coding.ordinals.choices import Lattice
 from mcz.coding.ordinals.counts import Law
-from mcz.coding.ordinals.heads import OWN_FORM, form_of_grid, scale_of
-from mcz.coding.ordinals.streams import constant_head
-from mcz.coding.quick import streams as quick
+from mcz.coding.ordinals.heads import form_of_grid
 from mcz.numbers import Grid
 from mcz.schema import varint
 from tools.vectors.build.lossless_clips import (
@@ -30,105 +32,195 @@ from tools.vectors.build.lossless_clips import (
 )
 
 Ints = NDArray[np.int64]
+ROUNDS = 100  # until residuals are found of which each may have another as its parent
 
 
 @dataclass(frozen=True, slots=True)
 class Coded:
-    """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top``, ``depth``
-    None: as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33; or
-    with a ``law`` and ``rests``: form 34. ``parts``: what form 34 says in their place."""
+    """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top``, ``tiny``,
+    ``first`` None: as the ordinals need. Nothing is checked, so that what is forbidden can be
+    written. ``parent``: group, channel, weight; ``exceptions``: row and ordinal of each.
+    ``numbers``: coded in place of the ordinals, as with exceptions; with ``unit`` and ``shifts``:
+    forms 32, 33; or with a ``law`` and ``rests``: form 34. ``parts``: what form 34 says in their
+    place."""
 
     form: int | None = None
     drop: int = 0
     top: int | None = None
-    depth: int | None = None
+    tiny: bool | None = None
+    first: int | None = None
     scale: int = 8
-    from_last: int = 1
+    predictor: int = 0
     taps: tuple[int, ...] = ()
+    parent: tuple[int, int, int] | None = None
+    exceptions: tuple[tuple[int, int], ...] = ()
+    numbers: tuple[int, ...] = ()
     unit: float | None = None
     shifts: int | None = None
-    multiples: tuple[int, ...] = ()
     law: Law | None = None
     rests: tuple[int, ...] = ()
+    rest_scale: int = 0
     parts: int | None = None
 
 
-Head = Coded | Constant | Copy
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """A channel as runs."""
+
+
+Head = Coded | Constant | Copy | Steps | bytes  # bytes: as they are written
 USUAL = Coded()
-REST = Coded(PLAIN, scale=0, from_last=0)
+
+
+@dataclass(slots=True)
+class _Lane:
+    """A coded channel: the numbers that are coded, its head as it is written, its lattice."""
+
+    coded: Coded
+    numbers: list[int]
+    head: fast_heads.CodedHead
+    lattice: list[int]
 
 
 def streams_of(layout: Any, ordinals: Ints, heads: Sequence[Head]) -> tuple[bytes, ...]:
+    """The streams of all groups; channels without a head have ``USUAL``."""
     every = [*heads, *[USUAL] * (layout.n_channels - len(heads))]
-    return tuple(
-        build_stream(
-            ordinals[:, list(group)],
-            [layout.grids[channel] for channel in group],
-            [every[channel] for channel in group],
-        )
-        for group in layout.groups
-    )
+    return build_streams(ordinals, layout.grids, layout.groups, every)
 
 
-def build_stream(ordinals: Any, grids: Sequence[Grid], heads: Sequence[Head]) -> bytes:
-    """The stream of a group: ``ordinals`` (rows, channels), the grids of the clip, the heads."""
+def build_streams(
+    ordinals: Any, grids: Sequence[Grid], groups: Sequence[Sequence[int]], heads: Sequence[Head]
+) -> tuple[bytes, ...]:
+    """The streams of ``groups``: ``ordinals`` (rows, channels), grids of the clip, heads."""
     table = np.array(ordinals, np.int64)
-    data, plans, columns, rests = b"", [], [], []
-    for place, head in enumerate(heads):
-        column = table[:, place]
-        if isinstance(head, Copy):
-            data += b"\2" + varint(head.group) + varint(head.channel)
-        elif isinstance(head, Constant):
-            data += constant_head(int(column[0]))
-        else:
-            plan = _plan(head, grids[place], column.tolist())
-            data += _head(head, plan)
-            plans.append(plan)
-            columns.append(head.multiples or column.tolist())
-            rests += [head.rests] if head.rests else []
-    plans += [_plan(REST, grids[0], ())] * len(rests)
-    columns += rests
-    return data + (values_of(np.array(columns, np.int64), np.stack(plans)) if plans else b"")
+    found = [
+        [_head_of(heads[channel], grids[channel], table[:, channel]) for channel in group]
+        for group in groups
+    ]
+    lanes = [head for own in found for head in own if isinstance(head, _Lane)]
+    if not lanes:
+        return tuple(b"".join(head for head in own if isinstance(head, bytes)) for own in found)
+    places = [
+        (group, place)
+        for group, own in enumerate(found)
+        for place, head in enumerate(own)
+        if isinstance(head, _Lane)
+    ]
+    residuals, lattices = _predicted(lanes, places)
+    scales = np.array([scale_of(lane.coded.scale) for lane in lanes])
+    streams, start = [], 0
+    for own in found:
+        stop = start + sum(isinstance(head, _Lane) for head in own)
+        data = b"".join(head.head.build() if isinstance(head, _Lane) else head for head in own)
+        if start < stop:
+            parts = _parts(lanes, residuals, scales, lattices, slice(start, stop))
+            data += varint(len(parts[0])) + b"".join(parts)
+        streams.append(data)
+        start = stop
+    return tuple(streams)
 
 
-def values_of(columns: Ints, plans: Ints) -> bytes:
-    """State, words and bits of coded channels, (channels, rows)."""
-    _, _, choice, record = quick.loops()
-    records = np.zeros((columns.size, record.RECORD_SIZE), np.int64)
-    choice.record_columns(columns, plans, quick.tables().powers, records)
-    (data,) = quick.write(records, np.array([len(records)], np.int64))
-    return data
+def _head_of(head: Head, grid: Grid, column: Ints) -> bytes | _Lane:
+    if isinstance(head, Coded):
+        return _lane(head, grid, list(head.numbers) or column.tolist())
+    if isinstance(head, Copy):
+        return fast_heads.copy_head(head.group, head.channel)
+    if isinstance(head, Steps):
+        return fast_heads.steps_head(column)
+    return head if isinstance(head, bytes) else fast_heads.constant_head(int(column[0]))
 
 
-def _plan(head: Coded, grid: Grid, column: Sequence[int]) -> Ints:
-    own = quick.loops()[0]
-    form = form_of_grid(grid) if head.form is None else head.form
-    plan: Ints = np.zeros(own.PLAN_SIZE, np.int64)
+def _lane(coded: Coded, grid: Grid, numbers: list[int]) -> _Lane:
+    from mcz.coding.fast import tail_kernels as tail
+
+    form = form_of_grid(grid) if coded.form is None else coded.form
+    base, digits, top = 0, 0, 0
     if form not in (PLAIN, MULTIPLES, PRODUCTS, COUNTS):
-        base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
-        sizes = sorted({(o if o >= 0 else -1 - o) >> head.drop for o in column} - {0} or {1})
-        per_class = (base - 1) * base ** (digits - 1)
-        least, greatest = ((size - (base == 10)) // per_class for size in (sizes[0], sizes[-1]))
-        plan[[own.BASE, own.DIGITS]] = base, digits
-        plan[own.TOP] = greatest if head.top is None else head.top
-        plan[own.DEPTH] = plan[own.TOP] - least if head.depth is None else head.depth
-    plan[own.DROP] = head.drop
-    plan[own.SCALE] = scale_of(head.scale)
-    plan[own.FROM_LAST] = head.from_last
-    taps = head.taps[: own.MAX_TAPS]
-    plan[own.TAPS : own.TAPS + len(taps)] = taps
-    return plan
+        base, digits = (10, form) if form < 64 else (2, form - 64 - coded.drop)
+        greatest = max(n if n >= 0 else -1 - n for n in numbers) >> coded.drop
+        top = max(0, greatest - (base == 10)) // ((base - 1) * base ** (digits - 1))
+        top = top if coded.top is None else coded.top
+    fields = struct.pack("<d", coded.unit) if coded.unit is not None else b""
+    fields += bytes((coded.shifts,)) if coded.shifts is not None else b""
+    fields += law_fields(coded, coded.law) if coded.law is not None else b""
+    fields += bytes((coded.rest_scale,)) if coded.rests else b""
+    lattice = [0] * tail.LATTICE_SIZE
+    lattice[tail.BASE], lattice[tail.DIGITS], lattice[tail.TOP] = base, digits, top
+    lattice[tail.DROP], lattice[tail.TINY] = coded.drop, int(bool(coded.tiny))
+    lattice[tail.REST] = scale_of(coded.rest_scale) if coded.rests else -1
+    head = fast_heads.CodedHead(
+        form,
+        Lattice(base, digits, coded.drop, top),
+        coded.form is not None,
+        fields,
+        scale=coded.scale,
+        predictor=coded.predictor,
+        taps=coded.taps,
+        parent=coded.parent,
+        exceptions=list(coded.exceptions),
+    )
+    return _Lane(coded, numbers, head, lattice)
 
 
-def _head(head: Coded, plan: Ints) -> bytes:
-    own = quick.loops()[0]
-    kind = head.from_last << 2 | len(head.taps) << 3 | OWN_FORM * (head.form is not None)
-    data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
-    data += struct.pack("<d", head.unit) if head.unit is not None else b""
-    data += bytes((head.shifts,)) if head.shifts is not None else b""
-    data += law_fields(head, head.law) if head.law is not None else b""
-    if plan[own.BASE]:
-        data += varint(int(plan[own.TOP])) + varint(int(plan[own.DEPTH]))
-    folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
-    return data + bytes((head.scale,)) + b"".join(map(varint, folded))
+def _predicted(lanes: Sequence[_Lane], places: Sequence[tuple[int, int]]) -> tuple[Any, Ints]:
+    """The residuals of lanes, (lanes, rows), and their lattices; heads have all fields then."""
+    from mcz.coding.fast import tail_kernels as tail
+    from mcz.coding.fast import write_kernels as write
+
+    columns = np.array([lane.numbers for lane in lanes], np.int64)
+    lattices = np.array([lane.lattice for lane in lanes], np.int64)
+    leads = np.zeros(columns.shape, np.int32)
+    write.find_leads(columns, lattices, leads)
+    own = np.zeros(columns.shape, np.int64)
+    for number, lane in enumerate(lanes):
+        lane.head.first = int(leads[number, 0]) if lane.coded.first is None else lane.coded.first
+        lane.head.is_tiny = bool(lattices[number, tail.TINY])
+        own[number] = _left(leads[number].astype(np.int64), _taps_of(lane.coded))
+    parents = [lane.coded.parent for lane in lanes]
+    lane_of = [places.index(p[:2]) if p and p[:2] in places else n for n, p in enumerate(parents)]
+    weights = np.array([[p[2] if p else 0] for p in parents], np.int64)
+    residuals = own
+    for _ in range(ROUNDS):
+        before, residuals = (
+            residuals,
+            _wrapped(own - (_wrapped(128 + weights * residuals[lane_of]) >> 8)),
+        )
+        residuals[:, 0] = 0
+        if (before == residuals).all():
+            return residuals.astype(np.int32), lattices
+    raise ValueError("parents in a ring leave no residuals")
+
+
+def _taps_of(coded: Coded) -> tuple[int, ...]:
+    predictors = ((), (TAP_UNIT,), (2 * TAP_UNIT, -TAP_UNIT), coded.taps)
+    return predictors[coded.predictor]
+
+
+def _wrapped(values: Ints) -> Ints:
+    return (values + 2**31) % 2**32 - 2**31
+
+
+def _left(leads: Ints, taps: Sequence[int]) -> Ints:
+    """What a predictor leaves of leads; 0 in the first row."""
+    steps = _wrapped(np.diff(leads, prepend=leads[0]))
+    total = np.full(len(leads), 16, np.int64)
+    for place, tap in enumerate(taps, 1):
+        total[place:] += tap * steps[:-place]
+    return _wrapped(steps - (_wrapped(total) >> 5)) * (np.arange(len(leads)) > 0)
+
+
+def _parts(
+    lanes: Sequence[_Lane], residuals: Any, scales: Ints, lattices: Ints, own: slice
+) -> list[bytes]:
+    """Residuals and tails of some lanes."""
+    from mcz.coding.fast import write_kernels as write
+
+    columns = np.array([lane.numbers for lane in lanes], np.int64)
+    nothing = [0] * columns.shape[1]
+    rests = np.array([list(lane.coded.rests) or nothing for lane in lanes], np.int64)
+    room = np.zeros((2, (columns[own].size + 1) * CODE_BYTES), np.uint8)
+    sizes = (
+        write.write_residuals(residuals, scales, own.start, own.stop, room[0]),
+        write.write_tails(columns, rests, lattices, own.start, own.stop, room[1]),
+    )
+    return [row[:size].tobytes() for row, size in zip(room, sizes, strict=True)]

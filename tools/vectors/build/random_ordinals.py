@@ -283,9 +283,10 @@ def _heads(
 def _fast_streams(
     chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
 ) -> tuple[bytes, ...]:
-    """The same of fast; numbers of too many classes are plain."""
+    """The same of fast, with any taps and parents; long ordinals of 64 bits are plain or not."""
     place = {c: (g, k) for g, group in enumerate(layout.groups) for k, c in enumerate(group)}
     heads: list[fast_clips.Head] = []
+    own = Chance(block.tobytes())  # of what other codecs have not
     for c in range(layout.n_channels):
         column, twin, form = block[:, c], copies.get(c), form_of_grid(grids[c])
         if twin is not None and (column == block[:, twin]).all() and chance.random() < 0.8:
@@ -294,17 +295,49 @@ def _fast_streams(
             heads.append(lossless_clips.Constant())
         else:
             made = _coded(chance, form if form != form_of_grid(layout.grids[c]) else None)
-            wide = form == lossless_clips.BINARY64 or abs(column >> 44).max() > 1
-            heads.append(
-                fast_clips.Coded(
-                    lossless_clips.PLAIN if wide else made.form,
-                    drop=19 if wide else 0,
-                    scale=made.scale,
-                    from_last=made.from_last,
-                    taps=made.taps[:4],
-                )
-            )
-    return fast_clips.streams_of(layout, block, heads)
+            is_steps = own.random() < 0.1
+            heads.append(fast_clips.Steps() if is_steps else _lane(own, made, column, form))
+    return fast_clips.streams_of(layout, block, _with_parents(own, layout, place, heads))
+
+
+def _lane(own: Chance, made: lossless_clips.Coded, column: Ints, form: int) -> fast_clips.Coded:
+    """A coded channel of fast, with perhaps an exception."""
+    numbers, row = column.tolist(), own.randrange(len(column))
+    exceptions: tuple[tuple[int, int], ...] = ()
+    if own.random() < 0.2:
+        exceptions = ((row, numbers[row]),)
+        numbers[row] = numbers[row - 1]
+    longest = max((o if o >= 0 else -1 - o).bit_length() for o in numbers)
+    wide = form == lossless_clips.PLAIN or (longest > 44 and own.random() < 0.3)
+    drop = max(0, longest - 31) if wide else 0
+    return fast_clips.Coded(
+        lossless_clips.PLAIN if wide and (drop or form) else made.form,
+        drop,
+        scale=min(made.scale, 120),
+        predictor=own.randrange(4),
+        taps=tuple(max(-128, min(127, tap)) for tap in (*made.taps, 0, 0, 0, 0)[:4]),
+        exceptions=exceptions,
+        numbers=tuple(numbers),
+    )
+
+
+def _with_parents(
+    own: Chance, layout: Any, place: dict[int, tuple[int, int]], heads: list[fast_clips.Head]
+) -> list[fast_clips.Head]:
+    """Some heads with parents, each a channel without one: of their groups or of two others."""
+    found = list(heads)
+    coded = [c for c, head in enumerate(heads) if isinstance(head, fast_clips.Coded)]
+    roots = [c for c in coded if own.random() < 0.4]
+    for group in range(len(layout.groups)):
+        others = own.sample(range(len(layout.groups)), min(2, len(layout.groups)))
+        near = [c for c in roots if place[c][0] in (group, *others)]
+        for c in coded:
+            head = heads[c]
+            if place[c][0] == group and c not in roots and near and own.random() < 0.7:
+                parent = (*place[own.choice(near)], own.choice((256, -3, 999, -32768, 32767)))
+                assert isinstance(head, fast_clips.Coded)
+                found[c] = replace(head, parent=parent)
+    return found
 
 
 def _coded(chance: Chance, form: int | None) -> lossless_clips.Coded:

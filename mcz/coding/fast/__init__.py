@@ -1,0 +1,4 @@
+"""Streams of the codec ``fast``: linear prediction and adaptive Rice codes, integers alone.
+
+SPEC.md, "Codec 1: fast", is normative. A lane is a coded channel: its leads follow one another.
+"""

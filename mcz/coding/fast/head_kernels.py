@@ -1,0 +1,254 @@
+"""Compiled: read the heads of channels.
+
+SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+from mcz.coding.fast.plan_kernels import FITTED, LEAST_TAP, N_TAPS, TAP_UNIT, scale_of
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
+
+# Columns of plans, one row a channel. REST: the scale of rests, or -1. GROUP and PLACE: those of a
+# parent or of a source, or -1; LINK: its number. FIELDS: the offset of a unit, of the ordinal of a
+# constant or of runs. EXCEPTIONS: their offset, or -1.
+KIND, FORM, BASE, DIGITS, DROP, TOP, TINY, REST, SCALE, FIRST, TAPS = range(11)
+GROUP, PLACE, WEIGHT, FIELDS, EXCEPTIONS, LINK = range(TAPS + 4, TAPS + 10)
+PLAN_SIZE = TAPS + 10
+CODED, CONSTANT, COPY, STEPS = range(4)
+TINY_BIT, PARENT_BIT, EXCEPTIONS_BIT, OWN_FORM = 16, 32, 64, 128
+
+MULTIPLES, PRODUCTS, COUNTS = 32, 33, 34
+UNIT_SIZE, WITH_RESTS, MOST_PARTS = 8, 4, 7
+MOST_DROP, MOST_SCALE, MOST_WEIGHT = 32, 120, 32768
+MOST_TOP_10, MOST_TOP_24, MOST_TOP_53 = 614, 255, 2047
+
+# What is wrong: a place in ``FAULTS`` of decoder.py.
+ENDS, BAD_KIND, BAD_ORDINAL, BAD_RUNS, BAD_FORM, BAD_TOP, BAD_FIRST, BAD_SCALE = range(8)
+BAD_WEIGHT, BAD_EXCEPTION, BEHIND_HEADS, BAD_LINK, BAD_PARENT, BAD_SOURCE = range(8, 14)
+FAR_PARENTS = 14
+
+
+def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
+    """A varint and the offset behind it; -1 where there is none."""
+    value = shift = 0
+    while at < end and shift < 56:
+        byte = int(data[at])
+        at += 1
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            if (byte == 0 and shift > 7) or value >> 53:
+                return 0, -1
+            return value, at
+    return 0, -1
+
+
+def zigzag(data: Bytes, at: int, end: int) -> tuple[int, int]:
+    folded, at = varint(data, at, end)
+    return folded >> 1 ^ -(folded & 1), at
+
+
+def skip_ordinal(data: Bytes, at: int, end: int, size: int) -> int:
+    """The offset behind a short ordinal of so many bytes; -1 where there is none."""
+    if size > 8 or at + size > end or (size and data[at + size - 1] == 0):  # FAST-21
+        return -1
+    return at + size
+
+
+def skip_runs(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
+    """The offset behind the runs of steps, or -1; and the fault."""
+    n_runs, at = varint(data, at, end)
+    left = n_rows
+    while n_runs > 0 and at >= 0:
+        n_runs -= 1
+        rows, at = varint(data, at, end)
+        if at < 0 or at >= end:
+            return -1, ENDS
+        if rows < 1 or rows > left:  # FAST-25
+            return -1, BAD_RUNS
+        left -= rows
+        at = skip_ordinal(data, at + 1, end, int(data[at]))
+        if at < 0:
+            return -1, BAD_ORDINAL
+    return (-1 if left else at), BAD_RUNS  # FAST-25
+
+
+def skip_exceptions(data: Bytes, at: int, end: int, n_rows: int) -> tuple[int, int]:
+    """The offset behind exceptions, or -1; and the fault."""
+    n_exceptions, at = varint(data, at, end)
+    row = -1
+    while n_exceptions > 0 and at >= 0:
+        n_exceptions -= 1
+        gap, at = varint(data, at, end)
+        if at < 0 or at >= end:
+            return -1, ENDS
+        row += gap + 1
+        if row >= n_rows:  # FAST-37
+            return -1, BAD_EXCEPTION
+        at = skip_ordinal(data, at + 1, end, int(data[at]))
+        if at < 0:
+            return -1, BAD_ORDINAL
+    return at, ENDS
+
+
+def set_form(plan: Ints, form: int, drop: int) -> bool:
+    """Note base and digits of a form; False for one that there is not."""
+    plan[FORM], plan[DROP] = form, drop
+    if (form == 0 and drop <= MOST_DROP) or (MULTIPLES <= form <= COUNTS and drop == 0):
+        plan[BASE] = plan[DIGITS] = 0
+    elif 1 <= form <= 15 and drop == 0:
+        plan[BASE], plan[DIGITS] = 10, form
+    elif (form == 88 or form == 117) and drop <= form - 66:  # FAST-29, FAST-30
+        plan[BASE], plan[DIGITS] = 2, form - 64 - drop
+    else:
+        return False
+    return True
+
+
+def most_classes(form: int) -> int:
+    return MOST_TOP_10 if form < 16 else MOST_TOP_24 if form == 88 else MOST_TOP_53
+
+
+def set_scale(plan: Ints, column: int, byte: int) -> bool:
+    """Note the scale that a byte stands for; False for one that is too large."""
+    if byte > MOST_SCALE:  # FAST-33
+        return False
+    plan[column] = scale_of(byte)
+    return True
+
+
+def read_form(data: Bytes, at: int, end: int, kind: int, form: int, plan: Ints) -> tuple[int, int]:
+    """Note the form of a coded channel: the offset behind its fields, or -1; and the fault."""
+    drop = 0
+    if kind & OWN_FORM:
+        if at + 2 > end:
+            return -1, ENDS
+        form, drop = int(data[at]), int(data[at + 1])
+        at += 2
+    if not set_form(plan, form, drop):
+        return -1, BAD_FORM
+    plan[FIELDS], plan[REST] = at, -1
+    if plan[BASE] == 0 and form:
+        at += UNIT_SIZE + (1 if form > MULTIPLES else 0)
+        if at > end:
+            return -1, ENDS
+        parts = int(data[at - 1])
+        if form == COUNTS:
+            if parts > MOST_PARTS:  # FAST-52
+                return -1, BAD_FORM
+            at += UNIT_SIZE * ((parts & 1) + (parts >> 1 & 1))
+            if parts & WITH_RESTS:
+                if at >= end:
+                    return -1, ENDS
+                if not set_scale(plan, REST, int(data[at])):
+                    return -1, BAD_SCALE
+                at += 1
+    plan[TOP], plan[TINY] = 0, kind >> 4 & 1
+    if plan[BASE]:
+        plan[TOP], at = varint(data, at, end)
+        if at < 0:
+            return -1, ENDS
+        if plan[TOP] > most_classes(form):  # FAST-31
+            return -1, BAD_TOP
+    elif plan[TINY]:  # FAST-22
+        return -1, BAD_KIND
+    return (at, 0) if at <= end else (-1, ENDS)
+
+
+def read_predictor(data: Bytes, at: int, end: int, kind: int, plan: Ints) -> tuple[int, int]:
+    """Note first lead, scale and taps: the offset behind them, or -1; and the fault."""
+    plan[FIRST], at = zigzag(data, at, end)
+    if at < 0 or at >= end:
+        return -1, ENDS
+    if plan[FIRST] >> 31 != plan[FIRST] >> 63:  # FAST-32
+        return -1, BAD_FIRST
+    if not set_scale(plan, SCALE, int(data[at])):
+        return -1, BAD_SCALE
+    at += 1
+    predictor = kind >> 2 & 3
+    for tap in range(N_TAPS):
+        plan[TAPS + tap] = 0
+    if predictor == FITTED:
+        if at + N_TAPS > end:
+            return -1, ENDS
+        for tap in range(N_TAPS):
+            plan[TAPS + tap] = (int(data[at + tap]) ^ 128) + LEAST_TAP
+        at += N_TAPS
+    elif predictor:
+        plan[TAPS] = predictor * TAP_UNIT
+        plan[TAPS + 1] = -TAP_UNIT * (predictor - 1)
+    return at, 0
+
+
+def read_coded(
+    data: Bytes, at: int, end: int, kind: int, n_rows: int, form: int, plan: Ints
+) -> tuple[int, int]:
+    """Note the head of a coded channel: the offset behind it, or -1; and the fault."""
+    at, fault = read_form(data, at, end, kind, form, plan)
+    if at >= 0:
+        at, fault = read_predictor(data, at, end, kind, plan)
+    if at >= 0 and kind & PARENT_BIT:
+        fault = ENDS
+        plan[GROUP], at = varint(data, at, end)
+        if at >= 0:
+            plan[PLACE], at = varint(data, at, end)
+        if at >= 0:
+            plan[WEIGHT], at = zigzag(data, at, end)
+        if at >= 0 and not -MOST_WEIGHT <= plan[WEIGHT] < MOST_WEIGHT:  # FAST-35
+            return -1, BAD_WEIGHT
+    if at >= 0 and kind & EXCEPTIONS_BIT:
+        plan[EXCEPTIONS] = at
+        at, fault = skip_exceptions(data, at, end, n_rows)
+    return at, fault
+
+
+def read_head(
+    data: Bytes, at: int, end: int, n_rows: int, form: int, plan: Ints
+) -> tuple[int, int]:
+    """Note the head of a channel: the offset behind it, or -1; and the fault."""
+    if at >= end:
+        return -1, ENDS
+    kind = int(data[at])
+    at += 1
+    plan[KIND], plan[FIELDS], plan[GROUP], plan[EXCEPTIONS] = kind & 3, at, -1, -1
+    if kind & 3 == CODED:
+        return read_coded(data, at, end, kind, n_rows, form, plan)
+    if kind & 3 == CONSTANT:
+        return skip_ordinal(data, at, end, kind >> 2), BAD_ORDINAL
+    if kind >> 2:  # FAST-22
+        return -1, BAD_KIND
+    if kind == STEPS:
+        return skip_runs(data, at, end, n_rows)
+    plan[GROUP], at = varint(data, at, end)
+    if at >= 0:
+        plan[PLACE], at = varint(data, at, end)
+    return at, ENDS
+
+
+@kernel
+def read_heads(
+    data: Bytes, bounds: Ints, firsts: Ints, n_rows: int, forms: Ints, plans: Ints2, parts: Ints2
+) -> tuple[int, int]:
+    """Note the heads of streams, and in ``parts`` where residuals and tails of each begin.
+
+    ``bounds``: where streams begin in ``data``, and the end of the last; ``firsts``: the first
+    channel of each, and the number of all. Returns a channel and its fault, or -1.
+    """
+    for group in range(len(bounds) - 1):
+        at, end = bounds[group], bounds[group + 1]
+        n_coded = 0
+        for n in range(firsts[group], firsts[group + 1]):
+            at, fault = read_head(data, at, end, n_rows, forms[n], plans[n])
+            if at < 0:
+                return n, fault
+            n_coded += 1 if plans[n, KIND] == CODED else 0
+        size = 0
+        if n_coded:
+            size, at = varint(data, at, end)
+            if at < 0 or size > end - at:
+                return firsts[group + 1] - 1, ENDS
+        elif at < end:  # FAST-19
+            return firsts[group + 1] - 1, BEHIND_HEADS
+        parts[group, 0], parts[group, 1] = at, at + size
+    return -1, 0

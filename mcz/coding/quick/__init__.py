@@ -1,1 +1,0 @@
-"""Ordinals coded to be read quickly: columns one after the other, one table look-up a value."""
