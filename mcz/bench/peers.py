@@ -7,8 +7,11 @@ matrix: text, skeleton and spelling would come on top.
 from __future__ import annotations
 
 import gzip
+import io
 import lzma
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from time import process_time
@@ -19,6 +22,7 @@ from numpy.typing import NDArray
 import mcz
 from mcz.angles import unwrap
 from mcz.bench.cases import Loaded
+from mcz.bench.measure import cpu_seconds
 from mcz.types import JsonObject
 
 Record = JsonObject
@@ -26,6 +30,7 @@ Matrix = NDArray[np.float32]
 Pack = Callable[[bytes], bytes]
 
 TEXT, MATRIX = "source file", "float32 matrix"
+DOUBLES, ORDINALS = "float64 matrix", "ordinals"
 TOLERANCES = tuple(2.0**k for k in range(-8, 4))  # of zfp, in units of the channels
 MODULES = {"zstd": "zstandard", "brotli": "brotli", "pcodec": "pcodec", "blosc2": "blosc2"} | {
     "fpzip": "fpzip",
@@ -50,15 +55,21 @@ def measure(loaded: Loaded) -> list[Record]:
     if motion.signals[0].has_poses:
         values = unwrap(values, motion.skeleton)
     matrix = np.ascontiguousarray(np.nan_to_num(values), np.float32)
-    records = []
-    for name, what, pack in _packers(matrix):
-        start = process_time()
-        size = len(pack(loaded.data if what == TEXT else matrix.tobytes()))
-        took = max(process_time() - start, 1e-9)
-        records.append(_record(loaded, name, what, size) | {"encode_fps": motion.n_frames / took})
+    source = Source(loaded.data, values, matrix, motion.signals[0].to_ordinals()[0])
+    records = [_measured(loaded, peer) for peer in _peers(source)]
     if "zfp" in installed():
         records += _bounded(loaded, matrix)
     return records
+
+
+def _measured(loaded: Loaded, peer: Peer) -> Record:
+    start = process_time()
+    packed = peer.pack()
+    took = max(process_time() - start, 1e-9)
+    seconds = cpu_seconds(lambda: peer.unpack(packed))
+    size = 8 * loaded.motion.signals[0].values.size
+    rates = {"encode_fps": loaded.motion.n_frames / took, "decode_gbs": size / seconds / 1e9}
+    return _record(loaded, peer.name, peer.what, len(packed)) | rates
 
 
 def _record(loaded: Loaded, name: str, what: str, size: int) -> Record:
@@ -73,45 +84,89 @@ def _record(loaded: Loaded, name: str, what: str, size: int) -> Record:
     }
 
 
-def _packers(matrix: Matrix) -> Iterator[tuple[str, str, Pack]]:
-    """Name, what is coded, and a function of its bytes."""
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One clip as peers take it: its file, its values, and these as points of their grids."""
+
+    text: bytes
+    values: NDArray[np.float64]
+    matrix: Matrix  # of the same values
+    ordinals: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """A compressor, and what of the clip it codes."""
+
+    name: str
+    what: str
+    pack: Callable[[], bytes]
+    unpack: Callable[[bytes], object]
+
+
+def _peers(source: Source) -> Iterator[Peer]:
     have = installed()
-    general: dict[str, Pack] = {
-        "gzip -9": lambda data: gzip.compress(data, 9, mtime=0),
-        "xz -9e": lambda data: lzma.compress(data, preset=9 | lzma.PRESET_EXTREME),
+    general: dict[str, tuple[Pack, Pack]] = {
+        "gzip -9": (lambda data: gzip.compress(data, 9, mtime=0), gzip.decompress),
+        "xz -9e": (partial(lzma.compress, preset=9 | lzma.PRESET_EXTREME), lzma.decompress),
     }
     if "zstd" in have:
         zstandard = import_module("zstandard")
-        general["zstd -19"] = lambda data: zstandard.ZstdCompressor(level=19).compress(data)
+        packer, unpacker = zstandard.ZstdCompressor(level=19), zstandard.ZstdDecompressor()
+        general["zstd -19"] = packer.compress, unpacker.decompress
     if "brotli" in have:
         brotli = import_module("brotli")
-        general["brotli 11"] = lambda data: brotli.compress(data, quality=11)
-    for what in (TEXT, MATRIX):
-        for name, pack in general.items():
-            yield name, what, pack
+        general["brotli 11"] = lambda data: brotli.compress(data, quality=11), brotli.decompress
+    for what, data in ((TEXT, source.text), (MATRIX, source.matrix.tobytes())):
+        for name, (pack, unpack) in general.items():
+            yield Peer(name, what, partial(pack, data), unpack)
+    npy = partial(_npy, source.values)
+    yield Peer("npy", DOUBLES, npy, lambda data: np.load(io.BytesIO(data)))
     if "pcodec" in have:
-        yield "pcodec, channel by channel", MATRIX, lambda data: _pcodec(matrix)
+        for what, columns in ((ORDINALS, source.ordinals.T), (MATRIX, source.matrix.T)):
+            yield Peer("pcodec 8, a column each", what, partial(_pcodec, columns), _unpcodec)
     if "blosc2" in have:
-        yield "blosc2, zstd 9, shuffle", MATRIX, lambda data: _blosc2(matrix)
+        blosc2 = import_module("blosc2")
+        for what, matrix in ((DOUBLES, source.values), (MATRIX, source.matrix)):
+            pack = partial(_blosc2, np.ascontiguousarray(matrix))
+            yield Peer("blosc2, zstd 9, shuffle", what, pack, blosc2.decompress2)
     if "fpzip" in have:
         fpzip = import_module("fpzip")
-        yield "fpzip", MATRIX, lambda data: bytes(fpzip.compress(matrix, precision=0, order="C"))
+        pack = partial(fpzip.compress, source.matrix, precision=0, order="C")
+        yield Peer("fpzip", MATRIX, pack, partial(fpzip.decompress, order="C"))
     if "zfp" in have:
         zfpy = import_module("zfpy")
-        yield "zfp, reversible", MATRIX, lambda data: bytes(zfpy.compress_numpy(matrix))
+        pack = partial(zfpy.compress_numpy, source.matrix)
+        yield Peer("zfp, reversible", MATRIX, pack, zfpy.decompress_numpy)
 
 
-def _pcodec(matrix: Matrix) -> bytes:
-    pcodec = import_module("pcodec")
-    columns = np.ascontiguousarray(matrix.T)
-    config = pcodec.ChunkConfig()
-    return b"".join(pcodec.standalone.simple_compress(column, config) for column in columns)
+def _npy(matrix: NDArray[np.float64]) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, matrix)
+    return stream.getvalue()
 
 
-def _blosc2(matrix: Matrix) -> bytes:
+def _pcodec(columns: NDArray[np.generic]) -> bytes:
+    """Streams of columns, each behind its size of four bytes."""
+    standalone = import_module("pcodec").standalone
+    config = import_module("pcodec").ChunkConfig(compression_level=8)
+    columns = np.ascontiguousarray(columns)
+    packed = [standalone.simple_compress(column, config) for column in columns]
+    return b"".join(len(data).to_bytes(4, "little") + data for data in packed)
+
+
+def _unpcodec(data: bytes) -> None:
+    standalone, at = import_module("pcodec").standalone, 0
+    while at < len(data):
+        size = int.from_bytes(data[at : at + 4], "little")
+        standalone.simple_decompress(data[at + 4 : at + 4 + size])
+        at += 4 + size
+
+
+def _blosc2(matrix: NDArray[np.generic]) -> bytes:
     blosc2 = import_module("blosc2")
     options = {"codec": blosc2.Codec.ZSTD, "clevel": 9, "filters": [blosc2.Filter.SHUFFLE]}
-    return bytes(blosc2.compress2(matrix, typesize=4, **options))
+    return bytes(blosc2.compress2(matrix, typesize=matrix.itemsize, **options))
 
 
 def _bounded(loaded: Loaded, matrix: Matrix) -> Iterator[Record]:
