@@ -13,6 +13,9 @@ from mcz.kernels.types import Floats, Floats2, Ints, Ints2, Words, Words2
 
 N_TAPS, TAP_UNIT, LEAST_TAP, MOST_TAP = 4, 32, -128, 127
 FITTED = 3  # the predictor whose taps stand in the head
+# That of the differences of order 0 to 3; the last, and what is fitted, stand in the head.
+KNOWN_TAPS = (0, 0, 0, 0, 32, 0, 0, 0, 64, -32, 0, 0, 96, -96, 32, 0, 0, 0, 0, 0)
+N_KNOWN = 4
 TAPS_COST = 32  # bits
 TRIED_ROWS = 256  # that predictors are compared on
 FIT_ROWS = 384
@@ -142,7 +145,7 @@ def weigh(steps: Floats, spread: float, normal: Floats2, taps: Floats) -> float:
             normal[i, k] = normal[k, i]
         trace += normal[i, i]
     for i in range(N_TAPS):
-        normal[i, i] += 1e-7 * trace + 1e-30
+        normal[i, i] += 1e-14 * trace + 1e-30
     return off / (len(steps) - N_TAPS)
 
 
@@ -186,18 +189,20 @@ def choose_predictors(
         scales[lane] = first_scale(own)
         scale = scale_of(scales[lane])
         best = 1 << 62
-        for predictor in range(FITTED + 1 if fit(own, steps, normal, fitted) else FITTED):
-            tap0, tap1 = predictor * TAP_UNIT, -TAP_UNIT if predictor == 2 else 0
-            tap2 = tap3 = 0
-            cost = 0
-            if predictor == FITTED:
+        n_tried = N_KNOWN + (1 if fit(own, steps, normal, fitted) else 0)
+        for candidate in range(n_tried):
+            predictor, cost = candidate, 0
+            if candidate >= FITTED:
+                predictor, cost = FITTED, TAPS_COST
+            tap0, tap1 = KNOWN_TAPS[candidate * N_TAPS], KNOWN_TAPS[candidate * N_TAPS + 1]
+            tap2, tap3 = KNOWN_TAPS[candidate * N_TAPS + 2], 0
+            if candidate == N_KNOWN:
                 tap0, tap1, tap2, tap3 = (
                     int(fitted[0]),
                     int(fitted[1]),
                     int(fitted[2]),
                     int(fitted[3]),
                 )
-                cost = TAPS_COST
             find_residuals(own, start, stop, tap0, tap1, tap2, tap3, tried)
             cost += cost_of(tried, scale)
             if cost < best:
