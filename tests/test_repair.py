@@ -20,7 +20,7 @@ from tests.commands import run
 from tests.formats.c3d_files import made
 from tests.formats.test_c3d_recording import integers, reals, with_analog
 from tests.kinds import Values, body_of, chunks_of, kept, values_of
-from tests.repair import flipped, joined, parts_of, replaced
+from tests.repair import flipped, joined, memory_below, parts_of, replaced
 
 
 @pytest.fixture(scope="module")
@@ -287,6 +287,25 @@ def test_a_lost_skeleton_costs_names_alone(tmp_path: Path) -> None:
     assert any("its skeleton is lost" in line for line in found.lost)
     with mcz.open(repaired_data) as file:
         assert file.clips["t"].source is None
+
+
+# A file that lost its skeleton, and whose clip says that it has 2^31 channels and more.
+MANY_CHANNELS = bytes.fromhex(
+    "894d435a0d0a1a0a4845414400002e2d05000000000000000063006300e1c7eec0534b454c000089902100000000"
+    "005a0000046469616c010001000000000001046469616c000100020100026e300100026e311af07abe434c495000"
+    "00c42e540000000000000000630477617665005891850bf691288598c6ce963e904efb090001000001066d6f7469"
+    "6f6e000101000001818080800809000014010017080800ff00ff00000300f03f0203010000050201020000030301"
+    "0203013ecced11444154410000eadf1100000000000000000009000001010558219e2abb140000a2b24010764345"
+    "4e4400007aeb2400000000000000090000010ef7f0152209dbd7dbcb9dc575075bbed8e3e2ade788fec66a9712c1"
+    "602efb54e90be15d494e4458010006e94b0000000000000000586365480642c6606f579f8889addcdf266ab4ce38"
+    "766e9add04bfdf8a8a0c0c0c8ce8a28c2ce58965a90c9c0c8c8c61218c2c2a0c8c8d0d0d0d1c8c0c0c228c0c8c02"
+    "8240190620070049b9989c00000000345ab3e51b010000000000005f00000000000000895a434d0d0a1a0a"
+)
+
+
+def test_channels_without_a_skeleton_take_no_memory() -> None:
+    with memory_below(2**22), mcz.open(MANY_CHANNELS, salvage=True) as file:
+        assert file.damage
 
 
 SHARED = [HealthCheck.function_scoped_fixture]

@@ -18,6 +18,7 @@ import numpy as np
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
+from mcz.container.limits import check, check_decoded
 from mcz.container.packed import chunk_id, pack_skeleton
 from mcz.container.reader import Container
 from mcz.container.skeletons import build_skeleton
@@ -68,7 +69,7 @@ def _without_joints(container: Container, row: ClipRow) -> None:
     Codecs of channels need no more of a skeleton than which of them belong together.
     """
     fields = container.clip(row)
-    motion = _of_zeros(fields, row, None)
+    motion = _of_zeros(container, fields, row, None)
     for sizes in _joint_sizes(motion.skeleton.n_channels, fields.signals[0].groups.kind):
         names = iter(motion.skeleton.joints[0].channels)
         joints = [Joint("", channels=tuple(islice(names, size))) for size in sizes]
@@ -158,7 +159,8 @@ def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
     for source in [fields.source] if fields.source else []:
         form = format_by_id(source.format)
         template = container.template(bytes(source.template), source.format)
-        text = form.write(_of_zeros(fields, row, Source(form.name, template, bytes(source.detail))))
+        stored = Source(form.name, template, bytes(source.detail))
+        text = form.write(_of_zeros(container, fields, row, stored))
         for base in _bases(container) if form.wants_skeleton else (None,):
             arguments = () if not form.wants_skeleton else (base,)
             skeleton: Skeleton = form.read(text, row.name, *arguments).skeleton
@@ -168,13 +170,23 @@ def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
                     yield from _payloads(other, None)
 
 
-def _of_zeros(fields: payloads.Clip, row: ClipRow, source: Source | None) -> Motion:
-    """A motion like that of a clip, all of whose values are zero, on a joint of plain channels."""
+def _of_zeros(
+    container: Container, fields: payloads.Clip, row: ClipRow, source: Source | None
+) -> Motion:
+    """A motion like that of a clip, all of whose values are zero, on a joint of plain channels.
+
+    Raises LimitError for one that no file so long may have.
+    """
     signals = []
     for index, own in enumerate(fields.signals):
+        where = f"clip {row.name!r}: signal {index}"
+        n_rows = row.n_frames * own.samples_per_frame
+        n_channels = sum(run.n_channels for run in own.grids)
+        check(f"{where}: channels", n_channels, container.profile.channels)
+        check_decoded(f"{where}: values", 8 * n_rows * max(1, n_channels), container.max_decoded)
         grids = tuple(run.grid for run in own.grids for _ in range(run.n_channels))
         is_integer = bool(grids) and all(grid.kind == GridKind.INTEGER for grid in grids)
-        shape = row.n_frames * own.samples_per_frame, len(grids)
+        shape = n_rows, n_channels
         values: Values = np.zeros(shape, np.int64 if is_integer else np.float64)
         plain = tuple(Channel("", f"{column}") for column in range(len(grids)))
         signal = Signal(values, grids, own.name, own.samples_per_frame)
