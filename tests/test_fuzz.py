@@ -35,6 +35,7 @@ ODD = (  # vectors that this package reads but would write otherwise, or cannot 
     "appended-nothing",
     "end-not-fresh",
     "/extensions/",
+    "private-codec",
 )
 EVERY = 23  # vectors between two that are looked at
 

@@ -66,10 +66,9 @@ def test_constants_and_copies_cost_almost_nothing(coder: Coder) -> None:
 
 def test_each_is_smaller_than_the_one_before() -> None:
     sizes = []
-    for codec in ("raw", "fast", "lossless", "best"):
+    for codec in ("raw", "fast", "best"):
         out = io.BytesIO()
         mcz.write(smooth(600), out, codec=codec)
         sizes.append(len(out.getvalue()))
     assert sizes[1] < 0.65 * sizes[0]
-    assert sizes[2] < sizes[1]
-    assert sizes[3] < 0.97 * sizes[2]
+    assert sizes[2] < 0.97 * sizes[1]
