@@ -34,7 +34,7 @@ N_STYLES = 13
 
 
 class Survey(NamedTuple):
-    """How many numbers have so many decimals, of those without an exponent, and so many digits.
+    """Counts of numbers by decimals, of those without an exponent, and by digits.
 
     ``styles``: how many are written in each of the ways above.
     """

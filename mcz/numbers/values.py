@@ -78,7 +78,7 @@ def print_values(
 
 
 def _print_rule(grid: Grid) -> tuple[int, ...]:
-    """How the compiled loop prints numbers of a grid."""
+    """The rules by which the compiled loop prints numbers of a grid."""
     loops = _kernels("value")
     if grid.kind not in DECIMAL_KINDS:
         return loops.OTHER, *[0] * 7

@@ -144,7 +144,7 @@ def _shifted(words: Words, n: Ints) -> Words:
 
 
 def _read_long(streams: Streams, at: int, word: int, k: int) -> tuple[int, int]:
-    """What a code of more zeros says, and its bits."""
+    """The number that a code of more zeros stands for, and the bits of the code."""
     zeros = (word & -word).bit_length() - 1 if word else 64
     more = k + zeros - residual.PLAIN
     if more > residual.MOST_BITS:  # FAST-40

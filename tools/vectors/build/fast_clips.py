@@ -201,7 +201,7 @@ def _wrapped(values: Ints) -> Ints:
 
 
 def _left(leads: Ints, taps: Sequence[int]) -> Ints:
-    """What a predictor leaves of leads; 0 in the first row."""
+    """The residuals of a predictor of leads; 0 in the first row."""
     steps = _wrapped(np.diff(leads, prepend=leads[0]))
     total = np.full(len(leads), 16, np.int64)
     for place, tap in enumerate(taps, 1):
