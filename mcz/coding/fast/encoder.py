@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from types import ModuleType
 
 import numpy as np
@@ -51,41 +52,76 @@ class Lane:
     rests: Ints | None = None
 
 
-def build_streams(
-    ordinals: Ints,
-    grids: Sequence[Own],
-    groups: Sequence[Sequence[int]],
-) -> list[bytes]:
-    """The streams of all groups, whose channels ``groups`` are columns of ``ordinals``.
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A segment as its encoder sees it: the heads of each group, and its lanes, one after another.
 
-    ``grids``: those in force and of the clip, of each channel.
+    ``starts``: the first lane of each group, and the number of all. The arrays are (lanes, rows).
+    """
+
+    heads: list[list[Lane | bytes]]
+    lanes: list[Lane]
+    starts: Ints
+    ordinals: Ints
+    rests: Ints
+    lattices: Ints
+    leads: Words
+
+    @property
+    def n_rows(self) -> int:
+        return int(self.ordinals.shape[1])
+
+    def head(self, group: int) -> bytes:
+        """All heads of a group."""
+        own = self.heads[group]
+        return b"".join(head.head.build() if isinstance(head, Lane) else head for head in own)
+
+    def room(self, n_lanes: int) -> NDArray[np.uint8]:
+        """Zeros for the codes of so many lanes."""
+        return np.zeros((self.n_rows * n_lanes + 1) * CODE_BYTES, np.uint8)
+
+
+def plan_segment(
+    ordinals: Ints, grids: Sequence[Own], groups: Sequence[Sequence[int]]
+) -> tuple[Plan, Words]:
+    """The plan of a segment, whose heads have predictors, and its residuals, (lanes, rows).
+
+    ``groups``: their channels, columns of ``ordinals``; ``grids``: those in force and of the clip,
+    of each channel.
     """
     heads = _heads(np.ascontiguousarray(ordinals.T), grids, groups)
     coded = [[head for head in own if isinstance(head, Lane)] for own in heads]
     lanes = [lane for own in coded for lane in own]
-    if not lanes:
-        return [b"".join(head for head in own if isinstance(head, bytes)) for own in heads]
-    plan, _, _, write = kernels()
     starts = np.cumsum([0, *map(len, coded)])
-    columns = np.stack([lane.ordinals for lane in lanes])
-    rests = np.zeros((len(lanes), columns.shape[1] * any(lane.rests is not None for lane in lanes)))
-    rests = rests.astype(np.int64)
+    columns = np.array([lane.ordinals for lane in lanes], np.int64).reshape(-1, len(ordinals))
+    rests = np.zeros(columns.shape, np.int64)
     for row, lane in zip(rests, lanes, strict=True):
         row[:] = 0 if lane.rests is None else lane.rests
-    lattices = _lattices(lanes)
-    residuals = _predict(lanes, columns, lattices)
-    scales = np.array([plan.scale_of(lane.head.scale) for lane in lanes])
-    if len(lanes) > 1 and columns.shape[1] >= FEWEST_ROWS:
-        _choose_parents(lanes, residuals, scales, starts)
+    lattices, leads = _lattices(lanes), np.zeros(columns.shape, np.int32)
+    if lanes:
+        kernels()[3].find_leads(columns, lattices, leads)
+    plan = Plan(heads, lanes, starts, columns, rests, lattices, leads)
+    return plan, _predict(plan)
+
+
+def build_streams(
+    ordinals: Ints, grids: Sequence[Own], groups: Sequence[Sequence[int]]
+) -> list[bytes]:
+    """The streams of all groups; ``plan_segment`` says what the arguments are."""
+    plan, residuals = plan_segment(ordinals, grids, groups)
+    choice, _, _, write = kernels()
+    scales = np.array([choice.scale_of(lane.head.scale) for lane in plan.lanes], np.int64)
+    if len(plan.lanes) > 1 and plan.n_rows >= FEWEST_ROWS:
+        _choose_parents(plan.lanes, residuals, scales, plan.starts)
     streams = []
-    for own, start, stop in zip(heads, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
-        parts = [head.head.build() if isinstance(head, Lane) else head for head in own]
+    for group, (start, stop) in enumerate(pairwise(plan.starts.tolist())):
+        parts = [plan.head(group)]
         if start < stop:
-            room = np.zeros(columns.shape[1] * (stop - start) * CODE_BYTES + CODE_BYTES, np.uint8)
+            room = plan.room(stop - start)
             size = write.write_residuals(residuals, scales, start, stop, room)
             parts += [varint(size), room[:size].tobytes()]
             room[:] = 0
-            size = write.write_tails(columns, rests, lattices, start, stop, room)
+            size = write.write_tails(plan.ordinals, plan.rests, plan.lattices, start, stop, room)
             parts.append(room[:size].tobytes())
         streams.append(b"".join(parts))
     return streams
@@ -195,18 +231,18 @@ def _lattices(lanes: Sequence[Lane]) -> Ints:
     return lattices
 
 
-def _predict(lanes: Sequence[Lane], columns: Ints, lattices: Ints) -> Words:
+def _predict(plan: Plan) -> Words:
     """The residuals of lanes, (lanes, rows); their heads say the predictors then."""
-    plan, _, tail, write = kernels()
-    leads = np.zeros(columns.shape, np.int32)
-    write.find_leads(columns, lattices, leads)
+    choice, _, tail, _ = kernels()
+    lanes, leads = plan.lanes, plan.leads
     predictors, scales = np.zeros((2, len(lanes)), np.int64)
-    taps = np.zeros((len(lanes), plan.N_TAPS), np.int64)
-    residuals = np.zeros(columns.shape, np.int32)
-    plan.choose_predictors(leads, predictors, taps, scales, residuals)
+    taps = np.zeros((len(lanes), choice.N_TAPS), np.int64)
+    residuals = np.zeros(leads.shape, np.int32)
+    if lanes:
+        choice.choose_predictors(leads, predictors, taps, scales, residuals)
     for number, lane in enumerate(lanes):
         lane.head.first = int(leads[number, 0])
-        lane.head.is_tiny = bool(lattices[number, tail.TINY])
+        lane.head.is_tiny = bool(plan.lattices[number, tail.TINY])
         lane.head.predictor = int(predictors[number])
         lane.head.scale = int(scales[number])
         lane.head.taps = tuple(taps[number].tolist())

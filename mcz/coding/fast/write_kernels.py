@@ -123,6 +123,37 @@ def write_residuals(residuals: Words2, scales: Ints, start: int, stop: int, out:
     return (bit + 7) >> 3
 
 
+def put_tail_of(out: Bytes, bit: int, ordinal: int, rest: int, lattice: Ints) -> int:
+    """Write what the lead of an ordinal leaves out, or a rest; returns the bit behind it."""
+    base = lattice[BASE]
+    if lattice[REST] >= 0:
+        bit = put_code(out, bit, rest, lattice[REST])
+        lattice[REST] = grown(lattice[REST], rest)
+        return bit
+    if base == 0:
+        return put(out, bit, ordinal & (1 << lattice[DROP]) - 1, lattice[DROP])
+    number, mantissa = split((ordinal ^ (ordinal >> 63)) >> lattice[DROP], lattice)
+    below = lattice[TOP] - number
+    if number >= 0 and below < lattice[LEADING]:
+        n = below + lattice[DIGITS] - lattice[LEADING]
+        unit = power(base, n)
+        return put_tail(out, bit, mantissa - mantissa // unit * unit, n, base)
+    return put_tiny(out, bit, number, mantissa, lattice) if lattice[TINY] else bit
+
+
+def put_tiny(out: Bytes, bit: int, number: int, mantissa: int, lattice: Ints) -> int:
+    """Write the class and the mantissa of an ordinal whose lead is 0."""
+    if number < 0:
+        return put_decimal(out, bit, 0, 1)
+    below = lattice[TOP] - number - (lattice[LEADING] - 1)
+    bit = put_decimal(out, bit, min(below, NEAR), 1)
+    if below >= NEAR:
+        bit = put_decimal(out, bit, below - NEAR, FAR_DIGITS)
+    if lattice[BASE] == 10:
+        return put_decimal(out, bit, mantissa, lattice[DIGITS])
+    return put(out, bit, mantissa - lattice[LOW], lattice[DIGITS] - 1)
+
+
 @kernel
 def write_tails(
     ordinals: Ints2, rests: Ints2, lattices: Ints2, start: int, stop: int, out: Bytes
@@ -134,32 +165,5 @@ def write_tails(
     bit = 0
     for row in range(ordinals.shape[1]):
         for lane in range(start, stop):
-            lattice = lattices[lane]
-            ordinal, base = ordinals[lane, row], lattice[BASE]
-            if lattice[REST] >= 0:
-                rest = rests[lane, row]
-                bit = put_code(out, bit, rest, lattice[REST])
-                lattice[REST] = grown(lattice[REST], rest)
-                continue
-            if base == 0:
-                bit = put(out, bit, ordinal & (1 << lattice[DROP]) - 1, lattice[DROP])
-                continue
-            number, mantissa = split((ordinal ^ (ordinal >> 63)) >> lattice[DROP], lattice)
-            below = lattice[TOP] - number
-            if number >= 0 and below < lattice[LEADING]:
-                n = below + lattice[DIGITS] - lattice[LEADING]
-                unit = power(base, n)
-                bit = put_tail(out, bit, mantissa - mantissa // unit * unit, n, base)
-            elif lattice[TINY]:
-                if number < 0:
-                    bit = put_decimal(out, bit, 0, 1)
-                    continue
-                below -= lattice[LEADING] - 1
-                bit = put_decimal(out, bit, min(below, NEAR), 1)
-                if below >= NEAR:
-                    bit = put_decimal(out, bit, below - NEAR, FAR_DIGITS)
-                if base == 10:
-                    bit = put_decimal(out, bit, mantissa, lattice[DIGITS])
-                else:
-                    bit = put(out, bit, mantissa - lattice[LOW], lattice[DIGITS] - 1)
+            bit = put_tail_of(out, bit, ordinals[lane, row], rests[lane, row], lattices[lane])
     return (bit + 7) >> 3
