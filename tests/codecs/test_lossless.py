@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.coding.ordinals.counts import Law
-from mcz.coding.ordinals.degrees import DEGREE, of_products
-from mcz.coding.ordinals.units import of_multiples
+from mcz.coding.forms.counts import Law
+from mcz.coding.forms.multiples import of_multiples
+from mcz.coding.forms.products import DEGREE, of_products
 from mcz.formats import FORMATS
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.fast.heads import CodedHead, constant_head, copy_head, steps_head
-from mcz.coding.ordinals.choices import Lattice, base_and_digits, max_top
-from mcz.coding.ordinals.heads import form_of, form_of_grid
-from mcz.coding.ordinals.streams import in_units
+from mcz.coding.forms.lattice import Lattice, base_and_digits, form_of, form_of_grid, max_top
+from mcz.coding.forms.units import find_units
 from mcz.numbers import Grid
 from mcz.schema import varint
 
@@ -164,13 +163,13 @@ def _steps(column: Ints, lane: Lane) -> bytes | None:
 
 def _coded(column: Ints, grid: Grid, clip_grid: Grid, group: int, place: int) -> Lane:
     """A channel as a lane, whose head has no predictor yet."""
-    form, fields, leads, rests = in_units(column, grid, int(grid == clip_grid))
+    units = find_units(column, grid, every=grid == clip_grid)
     exceptions: list[tuple[int, int]] = []
-    if form is not None:
-        shape = Lattice(0, 0, max(0, _greatest(leads).bit_length() - LEAD_BITS))
-        if shape.drop:
-            form, fields, leads, rests = None, b"", column, None
-    if form is None:
+    if units is not None and _greatest(units.integers).bit_length() <= LEAD_BITS:
+        form, fields, leads, rests = units.form, units.fields, units.integers, units.rests
+        shape = Lattice(0, 0)
+    else:
+        fields, leads, rests = b"", column, None
         shape, is_apart = _shape(leads, grid)
         if is_apart.any():
             rows = np.flatnonzero(is_apart)

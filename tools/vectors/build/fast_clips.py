@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from mcz.coding.fast import heads as fast_heads
 from mcz.coding.fast.encoder import CODE_BYTES
 from mcz.coding.fast.plan_kernels import TAP_UNIT, scale_of
-from mcz.coding.ordinals.choices import Lattice
-from mcz.coding.ordinals.counts import Law
-from mcz.coding.ordinals.heads import form_of_grid
+from mcz.coding.forms.counts import Law
+from mcz.coding.forms.lattice import Lattice, form_of_grid
 from mcz.numbers import Grid
 from mcz.schema import varint
 from tools.vectors.build.lossless_clips import (

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.coding.forms.counts import Law
+from mcz.coding.forms.lattice import Lattice, form_of_grid
 from mcz.coding.ordinals import heads as lossless_heads
 from mcz.coding.ordinals import streams as ordinal_streams
-from mcz.coding.ordinals.choices import Lattice
-from mcz.coding.ordinals.counts import Law
 from mcz.coding.start import start_states
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
@@ -116,7 +116,7 @@ def heads_of(
 
 
 def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
-    form = lossless_heads.form_of_grid(grid) if head.form is None else head.form
+    form = form_of_grid(grid) if head.form is None else head.form
     if form in (PLAIN, MULTIPLES, PRODUCTS, COUNTS):
         return Lattice(0, 0, head.drop)
     base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded, Segment
 from mcz.codecs.lossless.best_streams import Link
-from mcz.coding.ordinals.heads import form_of_grid
+from mcz.coding.forms.lattice import form_of_grid
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
 from tools.vectors.build import (
