@@ -4,7 +4,7 @@ import { ByteReader } from "../bytes.js";
 import { Refused } from "../errors.js";
 import { STEPS, readFastHead } from "../fast-heads.js";
 import { numbersOf } from "../fast-numbers.js";
-import { CODED, CONSTANT, COPY } from "../heads.js";
+import { CODED, CONSTANT, COPY } from "../forms.js";
 import { halvesOf, setHalves } from "../int64.js";
 import { RiceReader, nextScale } from "../rice.js";
 

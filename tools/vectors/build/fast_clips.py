@@ -20,17 +20,10 @@ from mcz.coding.forms.counts import Law
 from mcz.coding.forms.lattice import Lattice, form_of_grid
 from mcz.numbers import Grid
 from mcz.schema import varint
-from tools.vectors.build.lossless_clips import (
-    COUNTS,
-    MULTIPLES,
-    PLAIN,
-    PRODUCTS,
-    Constant,
-    Copy,
-    law_fields,
-)
 
 Ints = NDArray[np.int64]
+# Forms; 1 to 15: digits of base 10.
+PLAIN, MULTIPLES, PRODUCTS, COUNTS = 0, 32, 33, 34
 ROUNDS = 100  # until residuals are found of which each may have another as its parent
 
 
@@ -60,6 +53,19 @@ class Coded:
     rests: tuple[int, ...] = ()
     rest_scale: int = 0
     parts: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A constant channel, of its first ordinal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Copy:
+    """A channel that repeats this one."""
+
+    group: int
+    channel: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,3 +229,9 @@ def _parts(
         write.write_tails(columns, rests, lattices, own.start, own.stop, room[1]),
     )
     return [row[:size].tobytes() for row, size in zip(room, sizes, strict=True)]
+
+
+def law_fields(head: Any, law: Law) -> bytes:
+    """The fields of form 34 in the head of a channel, of this codec or another."""
+    fields = law.fields(rests=bool(head.rests))
+    return fields if head.parts is None else fields[:8] + bytes((head.parts,)) + fields[9:]

@@ -267,9 +267,9 @@ def _heads(
         column = block[:, c]
         twin = copies.get(c)
         if twin is not None and (column == block[:, twin]).all() and chance.random() < 0.8:
-            heads.append(lossless_clips.Copy(*place[twin]))
+            heads.append(fast_clips.Copy(*place[twin]))
         elif (column == column[0]).all() and chance.random() < 0.7:
-            heads.append(lossless_clips.Constant())
+            heads.append(fast_clips.Constant())
         else:
             form = form_of_grid(grids[c])
             own = form != form_of_grid(layout.grids[c]) or chance.random() < 0.1
@@ -296,9 +296,9 @@ def _fast_streams(
     for c in range(layout.n_channels):
         column, twin, form = block[:, c], copies.get(c), form_of_grid(grids[c])
         if twin is not None and (column == block[:, twin]).all() and chance.random() < 0.8:
-            heads.append(lossless_clips.Copy(*place[twin]))
+            heads.append(fast_clips.Copy(*place[twin]))
         elif (column == column[0]).all() and chance.random() < 0.7:
-            heads.append(lossless_clips.Constant())
+            heads.append(fast_clips.Constant())
         else:
             spelled = form != form_of_grid(layout.grids[c]) or (more and chance.random() < 0.1)
             made = _coded(chance, form if spelled else None)
@@ -315,10 +315,10 @@ def _lane(own: Chance, made: lossless_clips.Coded, column: Ints, form: int) -> f
         exceptions = ((row, numbers[row]),)
         numbers[row] = numbers[row - 1]
     longest = max((o if o >= 0 else -1 - o).bit_length() for o in numbers)
-    wide = form == lossless_clips.PLAIN or (longest > 44 and own.random() < 0.3)
+    wide = form == fast_clips.PLAIN or (longest > 44 and own.random() < 0.3)
     drop = max(0, longest - 31) if wide else 0
     return fast_clips.Coded(
-        lossless_clips.PLAIN if wide and (drop or form) else made.form,
+        fast_clips.PLAIN if wide and (drop or form) else made.form,
         drop,
         scale=min(made.scale, 120),
         predictor=own.randrange(4),
