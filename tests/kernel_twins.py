@@ -25,7 +25,8 @@ import numpy as np
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton, kernels
 from mcz.codecs import CODECS
-from mcz.coding.forms.counts import BINARY32, Law
+from mcz.coding.ordinals.counts import BINARY32, Law
+from mcz.coding.ordinals.degrees import DEGREE, of_products
 from mcz.formats import bvh
 from mcz.numbers import Grid, GridKind
 from mcz.sample import bvh_walk
@@ -140,9 +141,19 @@ def encode_counts() -> None:
     counts = 32768 + np.random.default_rng(3).integers(-40, 41, 300).cumsum()
     ordinals = Law(10 / 65535, -0.31).ordinals(counts)
     ordinals[::7] += 1
-    signal = Signal(BINARY32.values(ordinals)[:, None], (BINARY32,))
+    save_channel(BINARY32.values(ordinals), BINARY32)
+
+
+def encode_noise() -> None:
+    """Encode angles of a few units in the last place, as printed in degrees."""
+    units = np.random.default_rng(4).integers(-40, 41, 100)
+    grid = Grid(GridKind.GENERAL, 6)
+    save_channel(grid.values(of_products(units, DEGREE * 2.0**-60, 1, grid)), grid)
+
+
+def save_channel(values: Any, grid: Grid) -> None:
     skeleton = Skeleton((Joint("plate", channels=(Channel("", "force", "V"),)),))
-    saved("fast", Motion(skeleton, (signal,)))
+    saved("fast", Motion(skeleton, (Signal(values[:, None], (grid,)),)))
 
 
 def print_numbers() -> None:
@@ -203,6 +214,7 @@ def main() -> None:
     decode_vectors()
     encode_clips()
     encode_counts()
+    encode_noise()
     print_numbers()
     encode_walk()
     stream_frames()

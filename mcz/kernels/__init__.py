@@ -160,12 +160,17 @@ def bit_length(value: int) -> int:
 
 def trailing_zeros(value: int) -> int:
     """Zeros below the lowest bit that is set; of 0: 64."""
-    return (value & -value).bit_length() - 1 if value else 64
+    return bit_length(value & -value) - 1 if value else 64
 
 
 def eight_bytes(data: Bytes, at: int) -> int:
     """Eight bytes from ``at`` on, the lowest first; compiled, the highest bit is a sign."""
     return int.from_bytes(data[at : at + 8].tobytes(), "little")
+
+
+def put_eight_bytes(data: Bytes, at: int, value: int) -> None:
+    """Write the lowest 64 bits as eight bytes from ``at`` on, the lowest first."""
+    struct.pack_into("<Q", data.data, at, int(value) & (1 << 64) - 1)
 
 
 def wrapped(value: int) -> int:

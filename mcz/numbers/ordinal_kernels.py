@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kernels import kernel
+from mcz.kernels import kernel, truncated
 from mcz.kernels.types import Bytes2, Floats, Floats2, Ints, Ints2
 from mcz.numbers.rules import MIN_POWER
 from mcz.numbers.value_kernels import (
@@ -15,22 +15,30 @@ from mcz.numbers.value_kernels import (
     OTHER,
     POWER,
     ROWS,
-    scaled,
 )
 
 LEAST_POWER, GREATEST_POWER = -324, 308  # of ten, in the table of powers
+
+
+def power_of(value: float, power: int, powers: Floats) -> int:
+    """The power of ten of the first digit of a value above 0.
+
+    The search begins at ``power``; ``powers`` are all of them, from ``LEAST_POWER`` on.
+    """
+    while value < powers[power - LEAST_POWER]:
+        power -= 1
+    while power < GREATEST_POWER and value >= powers[power + 1 - LEAST_POWER]:
+        power += 1
+    return power
 
 
 def decimal(value: float, power: int, digits: int, tens: Floats, powers: Floats) -> tuple[int, int]:
     """The mantissa of so many digits nearest to a value above 0, and the power of its first digit.
 
     A mantissa of 0: no product or quotient with a power of ten is exact enough. The search for the
-    power begins at ``power``; ``powers`` are all of them, from ``LEAST_POWER`` on.
+    power begins at ``power``.
     """
-    while value < powers[power - LEAST_POWER]:
-        power -= 1
-    while power < GREATEST_POWER and value >= powers[power + 1 - LEAST_POWER]:
-        power += 1
+    power = power_of(value, power, powers)
     shift = digits - 1 - power
     mantissa = 0
     if 0 <= shift and shift <= EXACT_POWER:
@@ -61,23 +69,32 @@ def general_column(
     exact: Bytes2,
 ) -> bool:
     """Numbers of so many significant digits; False where one is to be looked at more closely."""
-    power = 0
+    low, high = tens[digits - 1], tens[digits]
+    power = shift = since = 0  # since: what magnitudes exceed mantissas by
+    ten = 1.0
+    least = above = 0.0  # sizes of that power of ten, of the number before
     for t in range(start, stop):
         value = values[t, c]
         size = abs(value)
-        if size == 0.0:
-            ordinals[t, c] = -1 if 1.0 / value < 0.0 else 0
-            exact[t, c] = 1
-            continue
-        if not size < powers[GREATEST_POWER - LEAST_POWER]:  # nor is that NaN
+        if not least <= size < above:
+            if size == 0.0:
+                ordinals[t, c] = -1 if 1.0 / value < 0.0 else 0
+                exact[t, c] = 1
+                continue
+            if not size < powers[GREATEST_POWER - LEAST_POWER]:  # nor is that NaN
+                return False
+            power = power_of(size, power, powers)
+            least, above = powers[power - LEAST_POWER], powers[power + 1 - LEAST_POWER]
+            shift = digits - 1 - power
+            if abs(shift) > EXACT_POWER:
+                return False
+            ten, since = tens[abs(shift)], magnitude_of(0, power, digits, tens)
+        mantissa = np.rint(size * ten) if shift >= 0 else np.rint(size / ten)
+        if mantissa < low or mantissa >= high:
             return False
-        mantissa, power = decimal(size, power, digits, tens, powers)
-        first = power - digits + 1
-        if mantissa == 0 or abs(first) > EXACT_POWER:
-            return False
-        magnitude = magnitude_of(mantissa, power, digits, tens)
+        magnitude = since + truncated(mantissa)
         ordinals[t, c] = -1 - magnitude if value < 0.0 else magnitude
-        exact[t, c] = 1 if scaled(mantissa, first, tens) == size else 0
+        exact[t, c] = 1 if (mantissa / ten if shift >= 0 else mantissa * ten) == size else 0
     return True
 
 

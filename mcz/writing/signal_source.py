@@ -68,7 +68,8 @@ class MemorySource:
         self._settled: dict[tuple[int, int], Block] = {}  # the last blocks
 
     def grids(self, frame: int) -> tuple[Grid, ...]:
-        return self.signal.cut(frame, frame).grids
+        signal = self.signal
+        return signal.cut(frame, frame).grids if signal.grid_changes else signal.grids
 
     def values(self, start: int, stop: int) -> NDArray[np.float64]:
         return self.signal.cut(start, stop).values.astype(np.float64, copy=False)
@@ -87,7 +88,8 @@ class MemorySource:
         if (start, stop) not in self._settled:
             signal = self.signal.cut(start, stop)
             ordinals, settled = settle(signal if self.is_lossless else _freed(signal, self.exact))
-            signal = replace(signal, exceptions=settled.exceptions)
+            if settled.exceptions is not signal.exceptions:
+                signal = replace(signal, exceptions=settled.exceptions)
             self._settled[start, stop] = ordinals, signal
             while len(self._settled) > KEPT_BLOCKS:
                 self._settled.pop(next(iter(self._settled)))
@@ -185,7 +187,8 @@ def settle(signal: Signal) -> Block:
         if not inside.all():
             raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
         return signal.values.astype(np.int64, copy=False), signal
-    signal = replace(signal, exceptions=_holding(signal))
+    if len(signal.exceptions):
+        signal = replace(signal, exceptions=_holding(signal))
     ordinals, exact = signal.to_ordinals()
     exact[signal.exceptions.rows, signal.exceptions.channels] = True
     if not exact.all():
@@ -199,8 +202,6 @@ def settle(signal: Signal) -> Block:
 def _holding(signal: Signal) -> Exceptions:
     """The exceptions that still spell the value at their row and channel."""
     old = signal.exceptions
-    if not len(old):
-        return old
     meant, bad = values_of_texts(old.texts)
     held = signal.values[old.rows, old.channels]
     same = (meant.view(np.int64) == held.view(np.int64)) | (np.isnan(meant) & np.isnan(held))
