@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.kernels import bit_length, truncated
+from mcz.kernels import bit_length, eight_bytes, put_eight_bytes, trailing_zeros, truncated
 from mcz.kernels.types import Bytes, Bytes2, Flags, FloatColumn, Floats2, Ints, Ints2
 
 WEIGHTS = (3, -1, 4, 1 << 40)
@@ -65,6 +65,13 @@ def extremes(a: int, b: int, c: int) -> tuple[int, int, int]:
 @kernel
 def length_of(a: int) -> int:
     return bit_length(a)
+
+
+@kernel
+def move_bytes(data: Bytes, at: int, to: int) -> int:
+    found = eight_bytes(data, at)
+    put_eight_bytes(data, to, found)
+    return trailing_zeros(found)
 
 
 @kernel

@@ -94,6 +94,11 @@ def test_least_and_greatest(a: int, b: int, c: int) -> None:
     agree("length_of", max(a, 0))
 
 
+@given(st.binary(min_size=24, max_size=24), st.integers(0, 16), st.integers(0, 16))
+def test_eight_bytes(data: bytes, at: int, to: int) -> None:
+    agree("move_bytes", np.frombuffer(data, np.uint8), at, to)
+
+
 @given(LONGS | SMALL, LONGS | SMALL, LONGS | SMALL)
 def test_comparisons(a: int, b: int, c: int) -> None:
     agree("compare", a, b, c)

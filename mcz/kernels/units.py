@@ -9,6 +9,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.coding.fast.parent_kernels",
         "mcz.coding.fast.plan_kernels",
         "mcz.coding.fast.residual_kernels",
+        "mcz.coding.fast.survey_kernels",
         "mcz.coding.fast.tail_kernels",
         "mcz.coding.fast.write_kernels",
     ),
@@ -19,7 +20,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.lossless.best_kernels",
     ),
     "numbers": (
-        "mcz.coding.forms.product_kernels",
+        "mcz.coding.ordinals.product_kernels",
         "mcz.formats.text_kernels",
         "mcz.numbers.kernels",
         "mcz.numbers.ordinal_kernels",

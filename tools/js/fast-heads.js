@@ -1,5 +1,6 @@
 // SPEC.md, "Codec 1: fast": the heads of channels.
 
+import { GENERAL } from "./grids.js";
 import {
   CODED,
   CONSTANT,
@@ -13,8 +14,7 @@ import {
   isClasses,
   readUnit,
   scaleOf,
-} from "./forms.js";
-import { GENERAL } from "./grids.js";
+} from "./heads.js";
 
 export const STEPS = 3;
 

@@ -61,6 +61,17 @@ static inline long long mcz_eight_bytes(const unsigned char *at, unsigned char l
 #endif
 }
 
+/* Little-endian; ``last`` as above. */
+static inline long long mcz_put_eight_bytes(unsigned char *at, unsigned char last, long long value) {
+  (void)last;
+#if defined(__BYTE_ORDER__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+  memcpy(at, &value, 8);
+#else
+  for (int n = 0; n < 8; n++) at[n] = (unsigned char)((unsigned long long)value >> 8 * n);
+#endif
+  return 0;
+}
+
 /* Of 0: 64. */
 static inline long long mcz_trailing_zeros(long long a) {
 #if defined(__GNUC__)

@@ -342,12 +342,8 @@ class Expressions:
             if not isinstance(type_, Array):
                 raise self.error(node, f"{type_} has no length")
             return f"<long long>{text}.shape[0]", INT
-        if name == "eight_bytes":
-            text, type_ = self.expr(node.args[0])
-            if type_ != Array("uint8", 1):
-                raise self.error(node, f"{type_} has no bytes")
-            at = self.int_of(node.args[1])
-            return f"mcz_eight_bytes(&{text}[{at}], {text}[{at} + 7])", INT
+        if name in ("eight_bytes", "put_eight_bytes"):
+            return self._eight_bytes(node, name)
         parts = [self.number(item) for item in node.args]
         (text, type_), *_ = parts
         if name in ("min", "max"):
@@ -364,6 +360,17 @@ class Expressions:
         if name in ("wrapped", "trailing_zeros"):
             return f"mcz_{name}({text})", INT
         return (f"mcz_integer({text})" if type_ == FLOAT else f"(<long long>{text})"), INT
+
+    def _eight_bytes(self, node: ast.Call, name: str) -> Typed:
+        text, type_ = self.expr(node.args[0])
+        if type_ != Array("uint8", 1):
+            raise self.error(node, f"{type_} has no bytes")
+        at = self.int_of(node.args[1])
+        parts = [f"&{text}[{at}]", f"{text}[{at} + 7]", *map(self.int_of, node.args[2:])]
+        root = self.root(node.args[0])
+        if name == "put_eight_bytes" and root is not None:
+            self.effects.written.add(root)
+        return f"mcz_{name}({', '.join(parts)})", INT
 
     def _call(self, node: ast.Call, where: Source, name: str) -> Typed:
         called = where.functions[name]
@@ -420,6 +427,7 @@ BUILTINS = {
     "float",
     "bit_length",
     "eight_bytes",
+    "put_eight_bytes",
     "trailing_zeros",
     "truncated",
     "wrapped",

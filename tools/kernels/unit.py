@@ -28,6 +28,7 @@ cdef extern from "arithmetic.h" nogil:
     long long mcz_truncated(double a)
     long long mcz_wrapped(long long a)
     long long mcz_eight_bytes(const unsigned char* at, unsigned char last)
+    long long mcz_put_eight_bytes(unsigned char* at, unsigned char last, long long value)
     long long mcz_trailing_zeros(long long a)
     double INFINITY
     double mcz_square(double a)

@@ -28,20 +28,15 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.lossless.segments import segment_frames
 from mcz.codecs.segments import Sizing, guessing
-from mcz.coding.fast.decoder import (
-    MOST_ROWS,
-    MOST_VALUES,
-    SegmentDecoder,
-    Shape,
-    check_size,
-    read_segments,
-)
-from mcz.coding.fast.encoder import build_streams
+from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
+from mcz.coding.fast.encoder import StreamBuilder
+from mcz.errors import FormatError
 from mcz.numbers import Grid
 from mcz.types import Params
 
 Ints = NDArray[np.int64]
 
+MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
 USUAL_ROWS = 1024
 SIZING = Sizing(60_000, 63_000, value_bytes=1.5, most_rows=USUAL_ROWS, spare=1)
 
@@ -50,25 +45,27 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
     fixed: int = params["segment_frames"]
     most = min(MOST_ROWS if fixed else USUAL_ROWS, MOST_VALUES // max(1, source.layout.n_channels))
-    groups = range(len(source.layout.groups))
-    prepare = partial(_prepare, source, groups)
+    prepare = partial(_prepare, source, _builder(source.layout))
     return Encoded(b"", guessing(source, fixed, replace(SIZING, most_rows=most), prepare))
 
 
+def _builder(layout: Layout) -> StreamBuilder:
+    return StreamBuilder(layout.grids, layout.groups)
+
+
 def _prepare(
-    source: SignalSource, groups: Sequence[int], start: int, stop: int
+    source: SignalSource, builder: StreamBuilder, start: int, stop: int
 ) -> Callable[[], tuple[bytes, ...]]:
     """The making of the streams of a segment."""
-    layout = source.layout
-    grids = list(zip(source.grids(start), layout.grids, strict=True))
-    ordinals = source.ordinals(start, stop)
-    return lambda: tuple(build_streams(ordinals, grids, layout.groups))
+    grids, ordinals = source.grids(start), source.ordinals(start, stop)
+    return lambda: builder.build(ordinals, grids)
 
 
 def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
     """The streams of all groups with new values."""
+    builder = _builder(asked.source.layout)
     for span in asked.spans:
-        yield _prepare(asked.source, asked.groups, span.first, span.stop)()
+        yield _prepare(asked.source, builder, span.first, span.stop)()
 
 
 def decode(
@@ -100,7 +97,10 @@ def decode(
 
 def _rows(layout: Layout, span: Span) -> int:
     n_rows = span.n_frames * layout.samples_per_frame
-    check_size(n_rows, layout.n_channels, span.n_frames)
+    if (n_rows > MOST_ROWS and span.n_frames > 1) or n_rows * layout.n_channels > MOST_VALUES:
+        raise FormatError(  # FAST-18
+            f"fast: a segment of {n_rows} rows and {layout.n_channels} channels"
+        )
     return n_rows
 
 
@@ -116,10 +116,10 @@ def subset(layout: Layout, span: Span, groups: Sequence[int], fetch: Fetch) -> t
     n_channels = sum(len(layout.groups[group]) for group in groups)
     ordinals = np.empty((_rows(layout, span), n_channels), np.int64)
     read_segments([SegmentDecoder(shape, tuple(groups), stream, ordinals)])
-    grids = [layout.grids[channel] for group in groups for channel in layout.groups[group]]
+    grids = tuple(layout.grids[c] for group in groups for c in layout.groups[group])
     stops = np.cumsum([len(layout.groups[group]) for group in groups]).tolist()
     left = [range(start, stop) for start, stop in zip([0, *stops], stops, strict=False)]
-    return tuple(build_streams(ordinals, list(zip(grids, grids, strict=True)), left))
+    return StreamBuilder(grids, left).build(ordinals, grids)
 
 
 CODEC = Codec(

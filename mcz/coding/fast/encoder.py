@@ -6,251 +6,153 @@ SPEC.md, "Codec 1: fast", is normative for the bytes; the choice of a plan is no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.fast.heads import CodedHead, constant_head, copy_head, steps_head
-from mcz.coding.forms.lattice import Lattice, base_and_digits, form_of, form_of_grid, max_top
-from mcz.coding.forms.units import find_units
+from mcz.coding.ordinals.choices import has_binary32
+from mcz.coding.ordinals.degrees import tiny_limit
+from mcz.coding.ordinals.heads import form_of_grid
+from mcz.coding.ordinals.streams import in_units
 from mcz.numbers import Grid
-from mcz.schema import varint
+
+if TYPE_CHECKING:
+    from mcz.coding.fast.survey_kernels import Channels, CodedLanes
 
 Ints = NDArray[np.int64]
-Words = NDArray[np.int32]
-Own = tuple[Grid, Grid]  # the grid in force and that of the clip
 
-LEAD_BITS = 31  # of a lead without its sign
-FEW = 64  # one row in so many may be an exception
 FEWEST_ROWS = 32  # for which parents are looked for
-HEAD_BITS = 80  # of a coded channel, about
-FALL = 0.415  # bits that a code shrinks by in each row after a jump
-CODE_BYTES = 10  # of a residual, a rest or a tail, at most
+VALUE_BYTES = 20  # of a residual and a tail, of a run or of an exception, at most
+HEAD_BYTES = 128  # beside runs and exceptions, at most, and of the size of residuals
+SPARE = 16  # bytes behind the last that are written to
+ANY = 2**62  # above all magnitudes
 
 
 @cache
-def kernels() -> tuple[ModuleType, ModuleType, ModuleType, ModuleType]:
-    """The compiled loops, imported on first use: of plans, parents, tails and bits."""
-    from mcz.coding.fast import parent_kernels, plan_kernels, tail_kernels, write_kernels
+def kernels() -> tuple[ModuleType, ...]:
+    """The compiled loops, imported on first use: heads, tails, survey, plans, parents, streams."""
+    from mcz.coding.fast import (
+        head_kernels,
+        parent_kernels,
+        plan_kernels,
+        survey_kernels,
+        tail_kernels,
+        write_kernels,
+    )
 
-    return plan_kernels, parent_kernels, tail_kernels, write_kernels
-
-
-@dataclass(slots=True)
-class Lane:
-    """A coded channel: its group and its place there, what is coded of it, and its head."""
-
-    group: int
-    place: int
-    ordinals: Ints
-    head: CodedHead
-    rests: Ints | None = None
+    choice = survey_kernels, plan_kernels, parent_kernels
+    return head_kernels, tail_kernels, *choice, write_kernels
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """A segment as its encoder sees it: the heads of each group, and its lanes, one after another.
+class StreamBuilder:
+    """Builds the streams of all groups of segments of one signal."""
 
-    ``starts``: the first lane of each group, and the number of all. The arrays are (lanes, rows).
-    """
+    def __init__(self, clip_grids: Sequence[Grid], groups: Sequence[Sequence[int]]) -> None:
+        """``clip_grids``: those in CLIP, of each channel of the signal."""
+        sizes = list(map(len, groups))
+        self.numbers = np.array([number for group in groups for number in group], np.int64)
+        self.firsts = np.cumsum([0, *sizes])
+        self.groups = np.repeat(np.arange(len(groups)), sizes)
+        self.clip_grids = tuple(clip_grids[number] for number in self.numbers.tolist())
+        self.clip_forms = _forms(self.clip_grids)
+        self._set_grids(tuple(clip_grids))
 
-    heads: list[list[Lane | bytes]]
-    lanes: list[Lane]
-    starts: Ints
-    ordinals: Ints
-    rests: Ints
-    lattices: Ints
-    leads: Words
+    def _set_grids(self, signal_grids: tuple[Grid, ...]) -> None:
+        """Note the grids in force, of each channel of the signal."""
+        self._signal_grids = signal_grids
+        self.grids = tuple(signal_grids[number] for number in self.numbers.tolist())
+        self.forms = _forms(self.grids)
+        pairs = list(zip(self.grids, self.clip_grids, strict=True))
+        limits = {pair: _unit_limit(*pair) for pair in dict.fromkeys(pairs)}
+        self.unit_limits = np.array([limits[pair] for pair in pairs], np.int64)
 
-    @property
-    def n_rows(self) -> int:
-        return int(self.ordinals.shape[1])
+    def build(self, ordinals: Ints, grids: tuple[Grid, ...]) -> tuple[bytes, ...]:
+        """The streams of a segment, ``ordinals`` (rows, channels); ``grids``: those in force."""
+        if grids != self._signal_grids:
+            self._set_grids(grids)
+        _, _, survey, plan, parent, write = kernels()
+        channels = self._channels(ordinals)
+        survey.survey(channels)
+        rests, fields = self._find_units(channels)
+        survey.choose_steps(channels)
+        lanes = self._find_leads(channels)
+        for n, column in rests.items():
+            channels.columns[n] = column  # in the place of tails
+        plan.choose_predictors(lanes, channels.plans)
+        if len(lanes.numbers) > 1 and len(ordinals) >= FEWEST_ROWS:
+            parent.choose_parents(lanes, channels.plans)
+        size = ordinals.size * VALUE_BYTES + len(self.numbers) * HEAD_BYTES + SPARE
+        rooms = np.empty((3, size), np.uint8)
+        ends = np.empty(len(self.firsts) - 1, np.int64)
+        write.write_streams(channels, lanes, np.frombuffer(fields, np.uint8), rooms, ends)
+        stops = ends.tolist()
+        starts = [0, *stops[:-1]]
+        return tuple(rooms[0, a:b].tobytes() for a, b in zip(starts, stops, strict=False))
 
-    def head(self, group: int) -> bytes:
-        """All heads of a group."""
-        own = self.heads[group]
-        return b"".join(head.head.build() if isinstance(head, Lane) else head for head in own)
+    def _channels(self, ordinals: Ints) -> Channels:
+        """Room for what is noted of the channels of a segment."""
+        survey = kernels()[2]
+        columns = np.empty((len(self.numbers), len(ordinals)), np.int64)
+        plans = np.zeros((len(self.numbers), survey.PLAN_SIZE), np.int64)
+        numbers, firsts, groups = self.numbers, self.firsts, self.groups
+        forms = self.forms, self.clip_forms
+        given = ordinals, numbers, firsts, groups, *forms
+        channels: Channels = survey.Channels(*given, columns, plans)
+        return channels
 
-    def room(self, n_lanes: int) -> NDArray[np.uint8]:
-        """Zeros for the codes of so many lanes."""
-        return np.zeros((self.n_rows * n_lanes + 1) * CODE_BYTES, np.uint8)
+    def _find_units(self, channels: Channels) -> tuple[dict[int, Ints], bytes]:
+        """Code channels in units where they can be; their rests, and the fields of all units."""
+        head, _, survey, plan, _, _ = kernels()
+        plans = channels.plans
+        tried = (plans[:, head.KIND] == head.CODED) & (plans[:, survey.MOST] < self.unit_limits)
+        rests: dict[int, Ints] = {}
+        fields = b""
+        for n in np.flatnonzero(tried).tolist():
+            column = np.ascontiguousarray(channels.ordinals[:, self.numbers[n]])
+            version = int(self.grids[n] == self.clip_grids[n])
+            form, own, leads, rest = in_units(column, self.grids[n], version)
+            if form is None or int((leads ^ (leads >> 63)).max()) >> survey.LEAD_BITS:
+                continue
+            channels.columns[n] = leads
+            rest_scale = -1
+            if rest is not None:
+                rests[n] = rest
+                quarters = plan.byte_of(16 * float(np.abs(rest).mean()))
+                rest_scale, own = head.scale_of(quarters), own + bytes((quarters,))
+            plans[n, [head.FORM, head.REST, survey.LIMIT]] = form, rest_scale, -1
+            plans[n, [head.BASE, head.DIGITS, head.DROP, head.TOP]] = 0
+            plans[n, [head.FIELDS, survey.FIELDS_END]] = len(fields), len(fields) + len(own)
+            fields += own
+        return rests, fields
 
-
-def plan_segment(
-    ordinals: Ints, grids: Sequence[Own], groups: Sequence[Sequence[int]]
-) -> tuple[Plan, Words]:
-    """The plan of a segment, whose heads have predictors, and its residuals, (lanes, rows).
-
-    ``groups``: their channels, columns of ``ordinals``; ``grids``: those in force and of the clip,
-    of each channel.
-    """
-    heads = _heads(np.ascontiguousarray(ordinals.T), grids, groups)
-    coded = [[head for head in own if isinstance(head, Lane)] for own in heads]
-    lanes = [lane for own in coded for lane in own]
-    starts = np.cumsum([0, *map(len, coded)])
-    columns = np.array([lane.ordinals for lane in lanes], np.int64).reshape(-1, len(ordinals))
-    rests = np.zeros(columns.shape, np.int64)
-    for row, lane in zip(rests, lanes, strict=True):
-        row[:] = 0 if lane.rests is None else lane.rests
-    lattices, leads = _lattices(lanes), np.zeros(columns.shape, np.int32)
-    if lanes:
-        kernels()[3].find_leads(columns, lattices, leads)
-    plan = Plan(heads, lanes, starts, columns, rests, lattices, leads)
-    return plan, _predict(plan)
-
-
-def build_streams(
-    ordinals: Ints, grids: Sequence[Own], groups: Sequence[Sequence[int]]
-) -> list[bytes]:
-    """The streams of all groups; ``plan_segment`` says what the arguments are."""
-    plan, residuals = plan_segment(ordinals, grids, groups)
-    choice, _, _, write = kernels()
-    scales = np.array([choice.scale_of(lane.head.scale) for lane in plan.lanes], np.int64)
-    if len(plan.lanes) > 1 and plan.n_rows >= FEWEST_ROWS:
-        _choose_parents(plan.lanes, residuals, scales, plan.starts)
-    streams = []
-    for group, (start, stop) in enumerate(pairwise(plan.starts.tolist())):
-        parts = [plan.head(group)]
-        if start < stop:
-            room = plan.room(stop - start)
-            size = write.write_residuals(residuals, scales, start, stop, room)
-            parts += [varint(size), room[:size].tobytes()]
-            room[:] = 0
-            size = write.write_tails(plan.ordinals, plan.rests, plan.lattices, start, stop, room)
-            parts.append(room[:size].tobytes())
-        streams.append(b"".join(parts))
-    return streams
-
-
-def _heads(
-    columns: Ints, grids: Sequence[Own], groups: Sequence[Sequence[int]]
-) -> list[list[Lane | bytes]]:
-    """Of each group the heads of its channels; those that are coded as lanes."""
-    copies: dict[bytes, bytes] = {}
-    heads: list[list[Lane | bytes]] = []
-    for number, group in enumerate(groups):
-        heads.append([])
-        for place, channel in enumerate(group):
-            column = columns[channel]
-            key = column.tobytes()
-            if (column == column[0]).all():
-                heads[-1].append(constant_head(int(column[0])))
-            elif key in copies:
-                heads[-1].append(copies[key])
-            else:
-                copies[key] = copy_head(number, place)
-                lane = _coded(column, *grids[channel], number, place)
-                heads[-1].append(_steps(column, lane) or lane)
-    return heads
-
-
-def _steps(column: Ints, lane: Lane) -> bytes | None:
-    """The head of a channel that seldom changes, where codes would cost more."""
-    changes = np.flatnonzero(np.diff(column))
-    if 2 * len(changes) > len(column):
-        return None
-    leads = lane.ordinals.astype(np.float64)
-    jumps = np.log2(1.0 + np.abs(leads[changes + 1] - leads[changes]))
-    rows = np.diff(np.append(changes, len(column) - 1))
-    coded = HEAD_BITS + len(column) + np.minimum(jumps * jumps / (2 * FALL), jumps * rows).sum()
-    head = steps_head(column)
-    return head if 8 * len(head) < coded else None
+    def _find_leads(self, channels: Channels) -> CodedLanes:
+        """The coded channels, split into leads and tails; these take the place of their columns."""
+        head, tail, survey, _, _, write = kernels()
+        plans = channels.plans
+        numbers = np.flatnonzero(plans[:, head.KIND] == head.CODED)
+        starts = np.searchsorted(numbers, self.firsts)
+        lattices = np.zeros((len(numbers), tail.LATTICE_SIZE), np.int64)
+        lattices[:, : head.SCALE - head.BASE] = plans[numbers, head.BASE : head.SCALE]
+        leads, residuals = np.empty((2, len(numbers), len(channels.ordinals)), np.int32)
+        costs, scales = np.zeros((2, len(numbers)), np.int64)
+        lanes: CodedLanes = survey.CodedLanes(
+            numbers, starts, lattices, leads, residuals, costs, scales
+        )
+        write.find_leads(lanes, channels.columns)
+        plans[numbers, head.TINY] = lattices[:, head.TINY - head.BASE]
+        return lanes
 
 
-def _coded(column: Ints, grid: Grid, clip_grid: Grid, group: int, place: int) -> Lane:
-    """A channel as a lane, whose head has no predictor yet."""
-    units = find_units(column, grid, every=grid == clip_grid)
-    exceptions: list[tuple[int, int]] = []
-    if units is not None and _greatest(units.integers).bit_length() <= LEAD_BITS:
-        form, fields, leads, rests = units.form, units.fields, units.integers, units.rests
-        shape = Lattice(0, 0)
-    else:
-        fields, leads, rests = b"", column, None
-        shape, is_apart = _shape(leads, grid)
-        if is_apart.any():
-            rows = np.flatnonzero(is_apart)
-            exceptions = list(zip(rows.tolist(), column[rows].tolist(), strict=True))
-            kept = np.where(is_apart, -1, np.arange(len(column)))
-            leads = column[np.maximum(np.maximum.accumulate(kept), np.argmin(is_apart))]
-            leads[: np.argmin(is_apart)] = column[np.argmin(is_apart)]
-        form = form_of(shape)
-    if rests is not None:
-        scale = kernels()[0].byte_of(16 * float(np.abs(rests).mean()))
-        fields += bytes((scale,))
-    is_own = shape.drop > 0 or form != form_of_grid(clip_grid)
-    head = CodedHead(form, shape, is_own, fields, exceptions=exceptions)
-    return Lane(group, place, leads, head, rests)
+def _forms(grids: Sequence[Grid]) -> Ints:
+    forms = {grid: form_of_grid(grid) for grid in dict.fromkeys(grids)}
+    return np.array([forms[grid] for grid in grids], np.int64)
 
 
-def _greatest(ordinals: Ints) -> int:
-    return int((ordinals ^ (ordinals >> 63)).max())
-
-
-def _shape(ordinals: Ints, grid: Grid) -> tuple[Lattice, NDArray[np.bool_]]:
-    """The lattice of ordinals, and those that are exceptions to it."""
-    base, digits = base_and_digits(grid)
-    magnitudes = ordinals ^ (ordinals >> 63)
-    drop = 0
-    if base == 2:
-        used = int(np.bitwise_or.reduce(magnitudes))
-        drop = min((used & -used).bit_length() - 1 if used else 0, digits - 2)
-        digits -= drop
-    if base:
-        per_class = (base - 1) * base ** (digits - 1)
-        classes = np.maximum((magnitudes >> drop) - (base == 10), 0) // per_class
-        is_apart = _outliers(classes, min(digits, 9 if base == 10 else 30) // 2)
-        shape = Lattice(base, digits, drop, int(classes[~is_apart].max()))
-        if shape.top <= max_top(shape):
-            return shape, is_apart
-    sizes = np.frexp(magnitudes.astype(np.float64))[1]
-    is_apart = _outliers(sizes, 8)
-    greatest = int(magnitudes[~is_apart].max())
-    return Lattice(0, 0, max(0, greatest.bit_length() - LEAD_BITS)), is_apart
-
-
-def _outliers(sizes: Ints, margin: int) -> NDArray[np.bool_]:
-    """Few rows whose sizes exceed those of all others by more than ``margin``."""
-    usual = np.partition(sizes, -1 - len(sizes) // FEW)[-1 - len(sizes) // FEW]
-    return np.asarray(sizes > usual + margin)
-
-
-def _lattices(lanes: Sequence[Lane]) -> Ints:
-    tail = kernels()[2]
-    lattices = np.zeros((len(lanes), tail.LATTICE_SIZE), np.int64)
-    for lattice, lane in zip(lattices, lanes, strict=True):
-        shape, rest = lane.head.shape, -1
-        if lane.rests is not None:
-            rest = kernels()[0].scale_of(lane.head.fields[-1])
-        fields = tail.BASE, tail.DIGITS, tail.TOP, tail.DROP, tail.REST
-        lattice[list(fields)] = shape.base, shape.digits, shape.top, shape.drop, rest
-    return lattices
-
-
-def _predict(plan: Plan) -> Words:
-    """The residuals of lanes, (lanes, rows); their heads say the predictors then."""
-    choice, _, tail, _ = kernels()
-    lanes, leads = plan.lanes, plan.leads
-    predictors, scales = np.zeros((2, len(lanes)), np.int64)
-    taps = np.zeros((len(lanes), choice.N_TAPS), np.int64)
-    residuals = np.zeros(leads.shape, np.int32)
-    if lanes:
-        choice.choose_predictors(leads, predictors, taps, scales, residuals)
-    for number, lane in enumerate(lanes):
-        lane.head.first = int(leads[number, 0])
-        lane.head.is_tiny = bool(plan.lattices[number, tail.TINY])
-        lane.head.predictor = int(predictors[number])
-        lane.head.scale = int(scales[number])
-        lane.head.taps = tuple(taps[number].tolist())
-    return residuals
-
-
-def _choose_parents(lanes: Sequence[Lane], residuals: Words, scales: Ints, starts: Ints) -> None:
-    parents, weights = np.zeros((2, len(lanes)), np.int64)
-    kernels()[1].choose_parents(residuals, scales, starts, parents, weights)
-    for number in np.flatnonzero(parents >= 0).tolist():
-        parent = lanes[int(parents[number])]
-        lanes[number].head.parent = parent.group, parent.place, int(weights[number])
+def _unit_limit(grid: Grid, clip_grid: Grid) -> int:
+    """The magnitude below which ``in_units`` may find a unit."""
+    if has_binary32(grid):
+        return ANY
+    return tiny_limit(grid) if grid == clip_grid else 0

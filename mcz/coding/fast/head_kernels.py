@@ -5,7 +5,6 @@ SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.coding.fast.plan_kernels import FITTED, LEAST_TAP, N_TAPS, TAP_UNIT, scale_of
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Ints, Ints2
 
@@ -16,7 +15,9 @@ KIND, FORM, BASE, DIGITS, DROP, TOP, TINY, REST, SCALE, FIRST, TAPS = range(11)
 GROUP, PLACE, WEIGHT, FIELDS, EXCEPTIONS, LINK = range(TAPS + 4, TAPS + 10)
 PLAN_SIZE = TAPS + 10
 CODED, CONSTANT, COPY, STEPS = range(4)
-PARENT_BIT, EXCEPTIONS_BIT, OWN_FORM = 32, 64, 128
+TINY_BIT, PARENT_BIT, EXCEPTIONS_BIT, OWN_FORM = 16, 32, 64, 128
+FITTED = 3  # the predictor whose taps stand in the head
+N_TAPS, TAP_UNIT, LEAST_TAP, MOST_TAP = 4, 32, -128, 127
 
 MULTIPLES, PRODUCTS, COUNTS = 32, 33, 34
 UNIT_SIZE, WITH_RESTS, MOST_PARTS = 8, 4, 7
@@ -27,6 +28,11 @@ MOST_TOP_10, MOST_TOP_24, MOST_TOP_53 = 614, 255, 2047
 ENDS, BAD_KIND, BAD_ORDINAL, BAD_RUNS, BAD_FORM, BAD_TOP, BAD_FIRST, BAD_SCALE = range(8)
 BAD_WEIGHT, BAD_EXCEPTION, BEHIND_HEADS, BAD_LINK, BAD_PARENT, BAD_SOURCE = range(8, 14)
 FAR_PARENTS = 14
+
+
+def scale_of(quarters: int) -> int:
+    """The scale, in sixteenths, that the byte of a head stands for."""
+    return (4 + (quarters & 3) << (quarters >> 2)) >> 2
 
 
 def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:

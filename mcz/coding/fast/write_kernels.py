@@ -1,19 +1,24 @@
-"""Compiled: split ordinals into leads and tails, and write residuals and tails as bits.
+"""Compiled: split ordinals into leads and tails, and write the streams of groups.
 
 SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
 """
 
 from __future__ import annotations
 
+from mcz.coding.fast.head_write_kernels import put_head, put_varint
 from mcz.coding.fast.plan_kernels import grown
 from mcz.coding.fast.residual_kernels import PLAIN
+from mcz.coding.fast.survey_kernels import Channels, CodedLanes
 from mcz.coding.fast.tail_kernels import (
     BASE,
     DIGITS,
     DROP,
     FAR_DIGITS,
+    FEWEST_BITS,
     FIRST,
+    FIRST_LONG,
     LEADING,
+    LONGER,
     LOW,
     NEAR,
     PER_CLASS,
@@ -23,24 +28,103 @@ from mcz.coding.fast.tail_kernels import (
     TOP,
     settle,
 )
-from mcz.kernels import bit_length, kernel, wrapped
-from mcz.kernels.types import Bytes, Ints, Ints2, Words2
+from mcz.kernels import bit_length, kernel, put_eight_bytes, truncated, wrapped
+from mcz.kernels.types import Bytes, Bytes2, Ints, Ints2, Words
+
+SIZE_BITS = 6  # of a packed tail
 
 
-def put(out: Bytes, bit: int, value: int, n: int) -> int:
+def pack(code: int, n_bits: int) -> int:
+    """A tail as one number."""
+    return code << SIZE_BITS | n_bits
+
+
+def pack_decimal_9(value: int, n: int) -> int:
+    n_bits = FEWEST_BITS[n]
+    is_long = 1 if value >= FIRST_LONG[n] else 0  # no branch: nobody can guess it
+    high = value >> n_bits  # 1 or 0
+    return pack(value - high * LONGER[n] | high << n_bits, n_bits + is_long)
+
+
+def pack_decimal(value: int, n: int) -> int:
+    """The code of a number below 10^n, n < 16."""
+    if n <= 9:
+        return pack_decimal_9(value, n)
+    high = pack_decimal_9(value // POWERS[9], n - 9)
+    low = pack_decimal_9(value % POWERS[9], 9)
+    n_high = high & (1 << SIZE_BITS) - 1
+    code = high >> SIZE_BITS | low >> SIZE_BITS << n_high
+    return pack(code, n_high + (low & (1 << SIZE_BITS) - 1))
+
+
+def split_plain(column: Ints, drop: int, leads: Words) -> None:
+    for row in range(len(column)):
+        leads[row] = wrapped(column[row] >> drop)
+        column[row] = pack(column[row] & (1 << drop) - 1, drop)
+
+
+def split_mantissa(mantissa: int, n: int, base: int) -> tuple[int, int]:
+    """A lead and its tail of ``n`` digits, packed."""
+    if n == 0:
+        return mantissa, 0
+    if base == 2:
+        return mantissa >> n, pack(mantissa & (1 << n) - 1, n)
+    lead = truncated(float(mantissa) / POWERS[n])  # exact below 2^53
+    return lead, pack_decimal(mantissa - lead * POWERS[n], n)
+
+
+def split_classes(column: Ints, lattice: Ints, leads: Words) -> None:
+    """Split a column of classes; what leads have no digit of stays, and is noted as tiny."""
+    base, digits, drop = lattice[BASE], lattice[DIGITS], lattice[DROP]
+    first, low, per_class = lattice[FIRST], lattice[LOW], lattice[PER_CLASS]
+    n = -1  # digits of the tail
+    start = 0  # the first magnitude of a class
+    for row in range(len(column)):
+        minus = column[row] >> 63
+        magnitude = (column[row] ^ minus) >> drop
+        lead = tail = 0
+        if magnitude:
+            if n < 0 or not start <= magnitude < start + per_class:  # not that of the row before
+                number = (magnitude - first) // per_class
+                start = first + number * per_class
+                n = lattice[TOP] - number + digits - lattice[LEADING]
+            if n < digits:
+                lead, tail = split_mantissa(magnitude - start + low, n, base)
+            else:
+                lattice[TINY], tail = 1, column[row]
+        leads[row], column[row] = wrapped(lead ^ minus), tail
+
+
+@kernel
+def find_leads(lanes: CodedLanes, columns: Ints2) -> None:
+    """Split the columns of lanes into leads and tails, which are packed and take their place.
+
+    Note in lattices which lanes have tiny values.
+    """
+    for lane in range(len(lanes.numbers)):
+        column, lattice = columns[lanes.numbers[lane]], lanes.lattices[lane]
+        settle(lanes.lattices, lane)
+        if lattice[BASE]:
+            split_classes(column, lattice, lanes.leads[lane])
+        else:
+            split_plain(column, lattice[DROP], lanes.leads[lane])
+
+
+def put(out: Bytes, bit: int, code: int, n: int) -> int:
     """Write ``n`` bits, at most 56, the lowest first; returns the bit behind them."""
     at = bit >> 3
-    value = value << (int(bit) & 7) | int(out[at])
-    n_bytes = ((bit & 7) + n + 7) >> 3
-    for place in range(n_bytes):
-        out[at + place] = value >> (8 * place) & 255
+    put_eight_bytes(out, at, code << (bit & 7) | int(out[at]))
     return bit + n
+
+
+def put_packed(out: Bytes, bit: int, tail: int) -> int:
+    return put(out, bit, tail >> SIZE_BITS, tail & (1 << SIZE_BITS) - 1)
 
 
 def put_code(out: Bytes, bit: int, residual: int, scale: int) -> int:
     """Write a residual; returns the bit behind its code."""
     k = bit_length(scale >> 4)
-    folded = 2 * residual if residual >= 0 else -2 * residual - 1
+    folded = residual << 1 ^ residual >> 63
     high = folded >> k
     if high <= PLAIN:
         return put(out, bit, 1 << high | (folded & (1 << k) - 1) << (high + 1), high + 1 + k)
@@ -49,121 +133,79 @@ def put_code(out: Bytes, bit: int, residual: int, scale: int) -> int:
     return put(out, bit, folded - (6 + (1 << more) << k), k + more)
 
 
-def put_decimal_9(out: Bytes, bit: int, value: int, n: int) -> int:
-    limit = POWERS[n]
-    n_bits = bit_length(limit) - 1
-    cut = (2 << n_bits) - limit
-    if value < cut:
-        return put(out, bit, value, n_bits)
-    if value < 1 << n_bits:
-        return put(out, bit, value, n_bits + 1)
-    return put(out, bit, value - (limit - (1 << n_bits)) | 1 << n_bits, n_bits + 1)
-
-
-def put_decimal(out: Bytes, bit: int, value: int, n: int) -> int:
-    """Write a number below 10^n; returns the bit behind it."""
-    if n > 9:
-        bit = put_decimal_9(out, bit, value // POWERS[9], n - 9)
-        value = value % POWERS[9]
-        n = 9
-    return put_decimal_9(out, bit, value, n)
-
-
-def put_tail(out: Bytes, bit: int, value: int, n: int, base: int) -> int:
-    return put_decimal(out, bit, value, n) if base == 10 else put(out, bit, value, n)
-
-
-def power(base: int, n: int) -> int:
-    return POWERS[n] if base == 10 else 1 << n
-
-
-def split(magnitude: int, lattice: Ints) -> tuple[int, int]:
-    """The class of a magnitude, -1 of zero, and its mantissa."""
+def put_tiny(out: Bytes, bit: int, ordinal: int, lattice: Ints) -> int:
+    """Write the tail of a lead without digits; returns the bit behind it."""
+    magnitude = (ordinal ^ ordinal >> 63) >> lattice[DROP]
     if magnitude == 0:
-        return -1, 0
-    magnitude -= lattice[FIRST]
-    number = magnitude // lattice[PER_CLASS]
-    return number, magnitude - number * lattice[PER_CLASS] + lattice[LOW]
-
-
-@kernel
-def find_leads(ordinals: Ints2, lattices: Ints2, leads: Words2) -> None:
-    """Fill ``leads`` from ``ordinals``, both (lanes, rows); note lanes with tiny values."""
-    for lane in range(len(lattices)):
-        lattice = lattices[lane]
-        settle(lattices, lane)
-        for row in range(ordinals.shape[1]):
-            ordinal = ordinals[lane, row]
-            if lattice[BASE] == 0:
-                leads[lane, row] = wrapped(ordinal >> lattice[DROP])
-                continue
-            minus = ordinal >> 63
-            number, mantissa = split((ordinal ^ minus) >> lattice[DROP], lattice)
-            lead, below = 0, lattice[TOP] - number
-            if number >= 0 and below < lattice[LEADING]:
-                n = below + lattice[DIGITS] - lattice[LEADING]
-                lead = mantissa // power(lattice[BASE], n)
-            elif number >= 0:
-                lattice[TINY] = 1
-            leads[lane, row] = wrapped(lead ^ minus)
-
-
-@kernel
-def write_residuals(residuals: Words2, scales: Ints, start: int, stop: int, out: Bytes) -> int:
-    """Write the residuals of lanes start <= l < stop, (lanes, rows); returns their bytes.
-
-    ``out`` is zero; ``scales``, in sixteenths, go along.
-    """
-    bit = 0
-    for row in range(1, residuals.shape[1]):
-        for lane in range(start, stop):
-            residual = int(residuals[lane, row])
-            bit = put_code(out, bit, residual, scales[lane])
-            scales[lane] = grown(scales[lane], residual)
-    return (bit + 7) >> 3
-
-
-def put_tail_of(out: Bytes, bit: int, ordinal: int, rest: int, lattice: Ints) -> int:
-    """Write what the lead of an ordinal leaves out, or a rest; returns the bit behind it."""
-    base = lattice[BASE]
-    if lattice[REST] >= 0:
-        bit = put_code(out, bit, rest, lattice[REST])
-        lattice[REST] = grown(lattice[REST], rest)
-        return bit
-    if base == 0:
-        return put(out, bit, ordinal & (1 << lattice[DROP]) - 1, lattice[DROP])
-    number, mantissa = split((ordinal ^ (ordinal >> 63)) >> lattice[DROP], lattice)
-    below = lattice[TOP] - number
-    if number >= 0 and below < lattice[LEADING]:
-        n = below + lattice[DIGITS] - lattice[LEADING]
-        unit = power(base, n)
-        return put_tail(out, bit, mantissa - mantissa // unit * unit, n, base)
-    return put_tiny(out, bit, number, mantissa, lattice) if lattice[TINY] else bit
-
-
-def put_tiny(out: Bytes, bit: int, number: int, mantissa: int, lattice: Ints) -> int:
-    """Write the class and the mantissa of an ordinal whose lead is 0."""
-    if number < 0:
-        return put_decimal(out, bit, 0, 1)
-    below = lattice[TOP] - number - (lattice[LEADING] - 1)
-    bit = put_decimal(out, bit, min(below, NEAR), 1)
+        return put_packed(out, bit, pack_decimal_9(0, 1))
+    number = (magnitude - lattice[FIRST]) // lattice[PER_CLASS]
+    within = magnitude - lattice[FIRST] - number * lattice[PER_CLASS]
+    below = lattice[TOP] - number - lattice[LEADING] + 1
+    bit = put_packed(out, bit, pack_decimal_9(min(below, NEAR), 1))
     if below >= NEAR:
-        bit = put_decimal(out, bit, below - NEAR, FAR_DIGITS)
+        bit = put_packed(out, bit, pack_decimal_9(below - NEAR, FAR_DIGITS))
     if lattice[BASE] == 10:
-        return put_decimal(out, bit, mantissa, lattice[DIGITS])
-    return put(out, bit, mantissa - lattice[LOW], lattice[DIGITS] - 1)
+        return put_packed(out, bit, pack_decimal(within + lattice[LOW], lattice[DIGITS]))
+    return put(out, bit, within, lattice[DIGITS] - 1)
+
+
+def put_tail(out: Bytes, bit: int, tail: int, lead: int, lattices: Ints2, lane: int) -> int:
+    """Write a tail as a column has it; returns the bit behind it."""
+    rest_scale = lattices[lane, REST]
+    if rest_scale >= 0:
+        lattices[lane, REST] = grown(rest_scale, tail)
+        return put_code(out, bit, tail, rest_scale)
+    if lattices[lane, TINY] and -1 <= lead <= 0:
+        return put_tiny(out, bit, tail, lattices[lane])
+    return put_packed(out, bit, tail)
+
+
+def write_parts(
+    lanes: CodedLanes, columns: Ints2, start: int, stop: int, residuals: Bytes, tails: Bytes
+) -> tuple[int, int]:
+    """Write residuals and tails of lanes start <= l < stop; returns their bytes. Scales go along.
+
+    Both at a time: a processor need not wait for the one to write the other.
+    """
+    numbers, lattices, leads = lanes.numbers, lanes.lattices, lanes.leads
+    left, scales = lanes.residuals, lanes.scales
+    residuals[0] = tails[0] = 0
+    bit = tail_bit = 0
+    for row in range(columns.shape[1]):
+        for lane in range(start, stop):
+            if row:
+                residual = int(left[lane, row])
+                bit = put_code(residuals, bit, residual, scales[lane])
+                scales[lane] = grown(scales[lane], residual)
+            tail, lead = columns[numbers[lane], row], int(leads[lane, row])
+            tail_bit = put_tail(tails, tail_bit, tail, lead, lattices, lane)
+    return (bit + 7) >> 3, (tail_bit + 7) >> 3
+
+
+def append(out: Bytes, at: int, part: Bytes, size: int) -> int:
+    """Copy the first bytes of ``part``; returns the offset behind them."""
+    out[at : at + size] = part[:size]
+    return at + size
 
 
 @kernel
-def write_tails(
-    ordinals: Ints2, rests: Ints2, lattices: Ints2, start: int, stop: int, out: Bytes
-) -> int:
-    """Write the tails of lanes start <= l < stop; returns their bytes. ``out`` is zero.
+def write_streams(
+    channels: Channels, lanes: CodedLanes, fields: Bytes, rooms: Bytes2, ends: Ints
+) -> None:
+    """Write the streams of groups one after the other, and note where they end.
 
-    ``ordinals`` and ``rests``: (lanes, rows); the scales of rests, in ``lattices``, go along.
+    ``fields``: those of units, one after the other. The first of three ``rooms`` is filled, the
+    others are for the parts of a group.
     """
-    bit = 0
-    for row in range(ordinals.shape[1]):
-        for lane in range(start, stop):
-            bit = put_tail_of(out, bit, ordinals[lane, row], rests[lane, row], lattices[lane])
-    return (bit + 7) >> 3
+    out, residuals, tails = rooms[0], rooms[1], rooms[2]
+    at = 0
+    for group in range(len(ends)):
+        for n in range(channels.firsts[group], channels.firsts[group + 1]):
+            at = put_head(channels, n, fields, out, at)
+        start, stop = lanes.starts[group], lanes.starts[group + 1]
+        if start < stop:
+            sizes = write_parts(lanes, channels.columns, start, stop, residuals, tails)
+            at = put_varint(out, at, sizes[0])
+            at = append(out, at, residuals, sizes[0])
+            at = append(out, at, tails, sizes[1])
+        ends[group] = at

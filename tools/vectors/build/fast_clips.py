@@ -8,22 +8,33 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.fast import heads as fast_heads
-from mcz.coding.fast.encoder import CODE_BYTES
-from mcz.coding.fast.plan_kernels import TAP_UNIT, scale_of
-from mcz.coding.forms.counts import Law
-from mcz.coding.forms.lattice import Lattice, form_of_grid
+from mcz.coding.fast.head_kernels import TAP_UNIT, scale_of
+from mcz.coding.ordinals.choices import Lattice
+from mcz.coding.ordinals.counts import Law
+from mcz.coding.ordinals.heads import form_of_grid
 from mcz.numbers import Grid
 from mcz.schema import varint
+from tools.vectors.build import fast_heads
+from tools.vectors.build.lossless_clips import (
+    COUNTS,
+    MULTIPLES,
+    PLAIN,
+    PRODUCTS,
+    Constant,
+    Copy,
+    law_fields,
+)
+
+if TYPE_CHECKING:
+    from mcz.coding.fast.survey_kernels import CodedLanes
 
 Ints = NDArray[np.int64]
-# Forms; 1 to 15: digits of base 10.
-PLAIN, MULTIPLES, PRODUCTS, COUNTS = 0, 32, 33, 34
+CODE_BYTES = 10  # of a residual, a rest or a tail, at most
 ROUNDS = 100  # until residuals are found of which each may have another as its parent
 
 
@@ -53,19 +64,6 @@ class Coded:
     rests: tuple[int, ...] = ()
     rest_scale: int = 0
     parts: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Constant:
-    """A constant channel, of its first ordinal."""
-
-
-@dataclass(frozen=True, slots=True)
-class Copy:
-    """A channel that repeats this one."""
-
-    group: int
-    channel: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,14 +109,16 @@ def build_streams(
         for place, head in enumerate(own)
         if isinstance(head, _Lane)
     ]
-    residuals, lattices = _predicted(lanes, places)
-    scales = np.array([scale_of(lane.coded.scale) for lane in lanes])
+    columns = np.array([lane.numbers for lane in lanes], np.int64)
+    table = _predicted(lanes, places, columns)
+    for lane, column in zip(lanes, columns, strict=True):
+        column[:] = lane.coded.rests or column
     streams, start = [], 0
     for own in found:
         stop = start + sum(isinstance(head, _Lane) for head in own)
         data = b"".join(head.head.build() if isinstance(head, _Lane) else head for head in own)
         if start < stop:
-            parts = _parts(lanes, residuals, scales, lattices, slice(start, stop))
+            parts = _parts(table, columns, start, stop)
             data += varint(len(parts[0])) + b"".join(parts)
         streams.append(data)
         start = stop
@@ -167,15 +167,19 @@ def _lane(coded: Coded, grid: Grid, numbers: list[int]) -> _Lane:
     return _Lane(coded, numbers, head, lattice)
 
 
-def _predicted(lanes: Sequence[_Lane], places: Sequence[tuple[int, int]]) -> tuple[Any, Ints]:
-    """The residuals of lanes, (lanes, rows), and their lattices; heads have all fields then."""
+def _predicted(
+    lanes: Sequence[_Lane], places: Sequence[tuple[int, int]], columns: Ints
+) -> CodedLanes:
+    """The lanes as they are written, whose ``columns`` become tails; heads have all fields then."""
     from mcz.coding.fast import tail_kernels as tail
     from mcz.coding.fast import write_kernels as write
 
-    columns = np.array([lane.numbers for lane in lanes], np.int64)
     lattices = np.array([lane.lattice for lane in lanes], np.int64)
     leads = np.zeros(columns.shape, np.int32)
-    write.find_leads(columns, lattices, leads)
+    scales = np.array([scale_of(lane.coded.scale) for lane in lanes])
+    numbers = np.arange(len(lanes))
+    table = write.CodedLanes(numbers, numbers, lattices, leads, leads, numbers, scales)
+    write.find_leads(table, columns)
     own = np.zeros(columns.shape, np.int64)
     for number, lane in enumerate(lanes):
         lane.head.first = int(leads[number, 0]) if lane.coded.first is None else lane.coded.first
@@ -192,7 +196,7 @@ def _predicted(lanes: Sequence[_Lane], places: Sequence[tuple[int, int]]) -> tup
         )
         residuals[:, 0] = 0
         if (before == residuals).all():
-            return residuals.astype(np.int32), lattices
+            return table._replace(residuals=residuals.astype(np.int32))
     raise ValueError("parents in a ring leave no residuals")
 
 
@@ -214,24 +218,10 @@ def _left(leads: Ints, taps: Sequence[int]) -> Ints:
     return _wrapped(steps - (_wrapped(total) >> 5)) * (np.arange(len(leads)) > 0)
 
 
-def _parts(
-    lanes: Sequence[_Lane], residuals: Any, scales: Ints, lattices: Ints, own: slice
-) -> list[bytes]:
-    """Residuals and tails of some lanes."""
+def _parts(lanes: CodedLanes, columns: Ints, start: int, stop: int) -> list[bytes]:
+    """Residuals and tails of lanes start <= l < stop."""
     from mcz.coding.fast import write_kernels as write
 
-    columns = np.array([lane.numbers for lane in lanes], np.int64)
-    nothing = [0] * columns.shape[1]
-    rests = np.array([list(lane.coded.rests) or nothing for lane in lanes], np.int64)
-    room = np.zeros((2, (columns[own].size + 1) * CODE_BYTES), np.uint8)
-    sizes = (
-        write.write_residuals(residuals, scales, own.start, own.stop, room[0]),
-        write.write_tails(columns, rests, lattices, own.start, own.stop, room[1]),
-    )
+    room = np.zeros((2, (columns[start:stop].size + 1) * CODE_BYTES), np.uint8)
+    sizes = write.write_parts(lanes, columns, start, stop, room[0], room[1])
     return [row[:size].tobytes() for row, size in zip(room, sizes, strict=True)]
-
-
-def law_fields(head: Any, law: Law) -> bytes:
-    """The fields of form 34 in the head of a channel, of this codec or another."""
-    fields = law.fields(rests=bool(head.rests))
-    return fields if head.parts is None else fields[:8] + bytes((head.parts,)) + fields[9:]

@@ -31,7 +31,6 @@ from tools.vectors.build import (
 from tools.vectors.build.random_ordinals import any_grids, clip_of_ordinals, mask_of
 from tools.vectors.build.random_parts import (
     MOST,
-    SPELLED,
     Chance,
     Clip,
     Ints,
@@ -47,7 +46,7 @@ from tools.vectors.build.spatial_clips import FRAME, PCA_RDO
 
 def clip(chance: Chance, name: str, codec: str) -> Clip:
     """A clip of ``codec`` called ``name``."""
-    if codec in ("raw", "best", "fast", SPELLED):
+    if codec in ("raw", "lossless", "best", "fast"):
         made = clip_of_ordinals(chance, codec)
     elif codec in _MAKERS:
         made = _MAKERS[codec](chance, codec)
