@@ -7,16 +7,12 @@ decoded and coded at once. What comes out does not depend on the number.
 from __future__ import annotations
 
 import os
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from mcz.errors import OptionError
-
-if TYPE_CHECKING:
-    from concurrent.futures import Future
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -56,21 +52,22 @@ def checked(threads: int | None) -> int | None:
 def in_order(
     function: Callable[[Item], Result], items: Sequence[Item], threads: int
 ) -> Iterator[Result]:
-    """``function`` of each item, in order; few results wait, so that memory is bounded."""
+    """``function`` of each item, in order; few results wait, so that memory is bounded.
+
+    The thread that asks takes one of as many items as there are threads.
+    """
     if threads < 2 or len(items) < 2:
         yield from map(function, items)
         return
     from concurrent.futures import ThreadPoolExecutor  # on first use
 
-    waiting: deque[Future[Result]] = deque()
-    with ThreadPoolExecutor(threads) as pool:
-        try:
-            for item in items:
-                waiting.append(pool.submit(function, item))
-                if len(waiting) > threads:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            for future in waiting:
-                future.cancel()
+    with ThreadPoolExecutor(threads - 1) as pool:
+        for first in range(0, len(items), threads):
+            others = [pool.submit(function, item) for item in items[first + 1 : first + threads]]
+            try:
+                yield function(items[first])
+                for other in others:
+                    yield other.result()
+            finally:
+                for other in others:
+                    other.cancel()

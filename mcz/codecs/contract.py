@@ -97,16 +97,18 @@ class Layout:
     n_resolutions: int = 1
     segment_bytes: int = 2**53  # decoded, 8 a value: the most that a segment may have
     find_model: FindModel | None = None  # in the file; a decoder's
+    n_channels: int = field(init=False, repr=False, compare=False)
+    derived: dict[str, object] = field(default_factory=dict, init=False, repr=False, compare=False)
+    # what a codec makes of it once, by the name of the codec
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "n_channels", sum(map(len, self.groups)))
 
     @property
     def most_frames(self) -> int:
         """The frames that a segment may have, at least 1."""
         per_frame = 8 * self.samples_per_frame * max(1, self.n_channels)
         return max(1, self.segment_bytes // per_frame)
-
-    @property
-    def n_channels(self) -> int:
-        return sum(len(group) for group in self.groups)
 
 
 class SignalSource(Protocol):

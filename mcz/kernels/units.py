@@ -4,6 +4,7 @@ from __future__ import annotations
 
 UNITS: dict[str, tuple[str, ...]] = {
     "fast": (
+        "mcz.coding.fast.column_kernels",
         "mcz.coding.fast.head_kernels",
         "mcz.coding.fast.lane_kernels",
         "mcz.coding.fast.parent_kernels",

@@ -11,6 +11,7 @@ RULE_SIZE = 3
 FIXED, OTHER = 0, -1  # digits of a grid of fixed decimals; of one that is not decimal
 ROWS = 256  # that are worked on at a time, so that they stay in the processor's memory
 EXACT_POWER = 22
+NONE = 1 << 62  # above all magnitudes
 
 
 def scaled(mantissa: int, power: int, tens: Floats) -> float:
@@ -25,24 +26,26 @@ def general_column(
 ) -> bool:
     """Numbers of so many significant digits; False where one has too large a power of ten."""
     low = int(tens[rule[DIGITS] - 1])
-    per_class = 9 * low
-    since = power = 0  # what magnitudes exceed mantissas by in the class of the last number
+    per_class, limit = 9 * low, rule[LIMIT]
+    first = NONE  # the least magnitude of the class of the last number
+    since = power = 0
+    ten = 1.0
     for t in range(start, stop):
-        magnitude = ordinals[t, c] ^ (ordinals[t, c] >> 63)
-        if magnitude > rule[LIMIT]:
-            return False
-        mantissa = magnitude - since
-        if mantissa < low or mantissa >= 10 * low or since == 0:
+        minus = ordinals[t, c] >> 63
+        magnitude = ordinals[t, c] ^ minus
+        if not first <= magnitude < first + per_class:
             if magnitude == 0:
-                values[t, c] = -float(magnitude) if ordinals[t, c] < 0 else 0.0
+                values[t, c] = -0.0 if minus else 0.0
                 continue
             own = (magnitude - 1) // per_class
-            since, power = own * per_class + 1 - low, own + rule[POWER]
-            mantissa = magnitude - since
-        if abs(power) > EXACT_POWER:
+            first, since, power = own * per_class + 1, own * per_class + 1 - low, own + rule[POWER]
+            if abs(power) > EXACT_POWER:
+                return False
+            ten = tens[abs(power)]
+        if magnitude > limit:
             return False
-        value = scaled(mantissa, power, tens)
-        values[t, c] = -value if ordinals[t, c] < 0 else value
+        mantissa = float(((magnitude - since) ^ minus) - minus)
+        values[t, c] = mantissa / ten if power < 0 else mantissa * ten
     return True
 
 

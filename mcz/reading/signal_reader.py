@@ -26,7 +26,7 @@ from mcz.reading.signal_info import SignalInfo
 from mcz.threads import in_force, in_order
 from mcz.types import Values
 
-BLOCK_ROWS = 512  # decoded at a time, at least
+BLOCK_ROWS = 1024  # decoded at a time, at least
 NEIGHBORS = 4  # segments whose streams are kept for a thread
 
 
@@ -61,7 +61,9 @@ class SignalReader:
         self._read_ones: set[int] = set()  # segments
         self._lock = Lock()  # of both
         self._threads = container.threads or in_force()
-        self._n_columns = sum(len(info.layout.groups[group]) for group in self.groups)
+        layout = info.layout
+        self._columns = [c for group in self.groups for c in layout.groups[group]]
+        self._grids = tuple(layout.grids[c] for c in self._columns)
 
     def read(self, start: int, stop: int) -> tuple[Values, NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
@@ -115,7 +117,7 @@ class SignalReader:
         return values, mask
 
     def _shape(self, start: int, stop: int) -> tuple[int, int]:
-        return (stop - start) * self.info.layout.samples_per_frame, self._n_columns
+        return (stop - start) * self.info.layout.samples_per_frame, len(self._columns)
 
     def blocks(self, start: int, stop: int, out: Values | None = None) -> Iterator[Block]:
         """The same block by block; values may lie in ``out``, of all rows, already."""
@@ -212,16 +214,15 @@ class SignalReader:
             return self._decode_groups(self.groups, spans, start, stop)
         lossy = tuple(group for group in self.groups if group not in exact)
         layout = self.info.layout
-        columns = [c for group in self.groups for c in layout.groups[group]]
-        is_exact = np.isin(columns, [c for group in exact for c in layout.groups[group]])
+        is_exact = np.isin(self._columns, [c for group in exact for c in layout.groups[group]])
         values = np.empty(self._shape(start, stop))
         if lossy:
             values[:, ~is_exact] = self._decode_groups(lossy, spans, start, stop)
         number = {int(column): n for n, column in enumerate(np.flatnonzero(is_exact))}
-        changes = self.exceptions(start, stop, columns)[1]
+        changes = self.exceptions(start, stop, self._columns)[1]
         values[:, is_exact] = values_of(  # CODEC-06
             self._decode_groups(exact, spans, start, stop),
-            [layout.grids[columns[column]] for column in number],
+            [self._grids[column] for column in number],
             [(row, number[column], grid) for row, column, grid in changes if column in number],
         )
         return values
@@ -328,12 +329,10 @@ class SignalReader:
         self, coded: Values, start: int, stop: int, out: Values | None = None
     ) -> tuple[Values, NDArray[np.bool_] | None]:
         """Ordinals to values, in ``out`` where that is given, exceptions and masks put in."""
-        layout = self.info.layout
         for index in self.info.covering(start, stop):
             if index not in self._read_ones:  # the codec wanted nothing of it: it is checked yet
                 self._streams(index)
-        columns = [c for g in self.groups for c in layout.groups[g]]
-        exceptions, changes = self.exceptions(start, stop, columns)
+        exceptions, changes = self.exceptions(start, stop, self._columns)
         values = coded
         if self.info.is_integer:
             if self.info.codec.domain == "values":  # CODEC-01
@@ -343,12 +342,12 @@ class SignalReader:
                 )
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
-            values = values_of(coded, [layout.grids[c] for c in columns], changes, out)  # NOTES-09
+            values = values_of(coded, self._grids, changes, out)  # NOTES-09
         if len(exceptions):  # NOTES-10
             values[exceptions.rows, exceptions.channels] = values_of_exceptions(
                 exceptions.texts, self.name
             )
-        return values, self._mask(start, stop, columns)  # MASK-04
+        return values, self._mask(start, stop)  # MASK-04
 
     def exceptions(
         self, start: int, stop: int, columns: Sequence[int] | None = None
@@ -389,7 +388,7 @@ class SignalReader:
             self.name,
         )
 
-    def _mask(self, start: int, stop: int, columns: Sequence[int]) -> NDArray[np.bool_] | None:
+    def _mask(self, start: int, stop: int) -> NDArray[np.bool_] | None:
         layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
         mask: NDArray[np.bool_] | None = None
         for index in self.info.covering(start, stop):
@@ -406,7 +405,7 @@ class SignalReader:
                 data = streams[table.mask(group) or 0]
                 if data:
                     if mask is None:
-                        mask = np.ones(((stop - start) * per_frame, len(columns)), np.bool_)
+                        mask = np.ones(self._shape(start, stop), np.bool_)
                     bits = parse_mask(data, header.n_frames * per_frame, n, self.name)
                     mask[rows, at : at + n] = bits[cut]
                 at += n

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,6 @@ from mcz.codecs.segments import Sizing, guessing
 from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
 from mcz.coding.fast.encoder import StreamBuilder
 from mcz.errors import FormatError
-from mcz.numbers import Grid
 from mcz.types import Params
 
 Ints = NDArray[np.int64]
@@ -74,9 +73,9 @@ def decode(
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("fast", header, layout)
     per_frame = layout.samples_per_frame
-    n_channels = sum(len(layout.groups[group]) for group in request.groups)
+    shape = _shape(layout)
+    n_channels = len(shape.columns(request.groups).channels)
     out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
-    shape = _shape(layout.grids, layout.groups)
     segments, parts = [], []
     for index, span in enumerate(spans):
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
@@ -104,14 +103,16 @@ def _rows(layout: Layout, span: Span) -> int:
     return n_rows
 
 
-@lru_cache(maxsize=64)
-def _shape(grids: tuple[Grid, ...], groups: tuple[tuple[int, ...], ...]) -> Shape:
-    return Shape(grids, groups)
+def _shape(layout: Layout) -> Shape:
+    found = layout.derived.get(CODEC.name)
+    if not isinstance(found, Shape):
+        found = layout.derived[CODEC.name] = Shape(layout.grids, layout.groups)
+    return found
 
 
 def subset(layout: Layout, span: Span, groups: Sequence[int], fetch: Fetch) -> tuple[bytes, ...]:
     """The streams of some groups of a segment, coded without the others."""
-    shape = _shape(layout.grids, layout.groups)
+    shape = _shape(layout)
     stream = partial(fetch, 0, 0)
     n_channels = sum(len(layout.groups[group]) for group in groups)
     ordinals = np.empty((_rows(layout, span), n_channels), np.int64)

@@ -18,7 +18,6 @@ from mcz.coding.ordinals.heads import WITH_UNIT, form_of_grid, parse_mapping
 from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels
 from mcz.numbers import Grid
-from mcz.schema import read_varint
 
 Ints = NDArray[np.int64]
 Fetch = Callable[[int], bytes]  # a group -> its stream
@@ -45,11 +44,17 @@ FAULTS = (
 
 
 @cache
-def kernels() -> tuple[ModuleType, ModuleType, ModuleType, ModuleType]:
-    """The compiled loops, imported on first use: of heads, lanes, residuals and tails."""
-    from mcz.coding.fast import head_kernels, lane_kernels, residual_kernels, tail_kernels
+def kernels() -> tuple[ModuleType, ...]:
+    """The compiled loops, imported on first use: of heads, columns, lanes, residuals and tails."""
+    from mcz.coding.fast import (
+        column_kernels,
+        head_kernels,
+        lane_kernels,
+        residual_kernels,
+        tail_kernels,
+    )
 
-    return head_kernels, lane_kernels, residual_kernels, tail_kernels
+    return head_kernels, column_kernels, lane_kernels, residual_kernels, tail_kernels
 
 
 class Shape:
@@ -164,7 +169,7 @@ class SegmentDecoder:
 
     def __init__(self, shape: Shape, wanted: tuple[int, ...], fetch: Fetch, out: Ints) -> None:
         """``out``: (rows, channels of the groups ``wanted``). Raises FormatError."""
-        lane = kernels()[1]
+        lane = kernels()[2]
         heads, n_whole = read_heads_of(shape, wanted, fetch, len(out))
         columns = heads.columns
         channel, fault = lane.link(
@@ -180,25 +185,15 @@ class SegmentDecoder:
 
     def finish(self) -> None:
         """Fill ``out``, after the lanes were decoded."""
-        own = kernels()[0]
-        data, rows, plans = self.heads.data, self.rows, self.heads.plans[: self.n_channels]
         self._map_units()
-        for channel in np.flatnonzero(plans[:, own.KIND] == own.CONSTANT).tolist():
-            at = int(plans[channel, own.FIELDS])
-            rows[:, channel] = _short_ordinal(data, at, data[at - 1] >> 2)  # FAST-23
-        for channel in np.flatnonzero(plans[:, own.KIND] == own.STEPS).tolist():
-            _put_steps(data, int(plans[channel, own.FIELDS]), rows[:, channel])
-        for channel in np.flatnonzero(plans[:, own.EXCEPTIONS] >= 0).tolist():
-            _put_exceptions(data, int(plans[channel, own.EXCEPTIONS]), rows[:, channel])
-        copies = plans[: self.out.shape[1], own.KIND] == own.COPY
-        for channel in np.flatnonzero(copies).tolist():
-            rows[:, channel] = rows[:, plans[channel, own.LINK]]  # FAST-26
-        if rows is not self.out:
-            self.out[:] = rows[:, : self.out.shape[1]]
+        n_wanted = self.out.shape[1]
+        kernels()[1].fill_columns(self.lanes.data, self.heads.plans, n_wanted, self.rows)
+        if self.rows is not self.out:
+            self.out[:] = self.rows[:, :n_wanted]
 
     def _map_units(self) -> None:
         """Turn the leads of lanes with units into ordinals."""
-        own, _, residual, _ = kernels()
+        own, _, _, residual, _ = kernels()
         plans = self.heads.plans
         n_whole = len(self.lanes.tails)
         columns = self.lanes.columns[: self.lanes.starts[n_whole]]
@@ -215,7 +210,7 @@ class SegmentDecoder:
 
 
 def _lanes_of(heads: Heads, n_whole: int, out: Ints) -> Lanes:
-    own, lane, residual, tail = kernels()
+    own, _, lane, residual, tail = kernels()
     n_lanes = int(np.sum(heads.plans[:, own.KIND] == own.CODED))
     starts, columns = np.empty(len(heads.groups) + 1, np.int64), np.empty(n_lanes, np.int64)
     lattices = np.zeros((n_lanes, tail.LATTICE_SIZE), np.int64)
@@ -240,30 +235,3 @@ def read_segments(segments: Sequence[SegmentDecoder]) -> None:
             read_lanes(segment.lanes)
     for segment in segments:
         segment.finish()
-
-
-def _short_ordinal(data: bytes, at: int, size: int) -> int:
-    folded = int.from_bytes(data[at : at + size], "little")
-    return (folded >> 1) ^ -(folded & 1)
-
-
-def _put_steps(data: bytes, at: int, column: Ints) -> None:
-    """Fill ``column`` with the ordinals of runs."""
-    n_runs, at = read_varint(data, at)
-    row = 0
-    for _ in range(n_runs):
-        n_rows, at = read_varint(data, at)
-        column[row : row + n_rows] = _short_ordinal(data, at + 1, data[at])  # FAST-24
-        row += n_rows
-        at += 1 + data[at]
-
-
-def _put_exceptions(data: bytes, at: int, column: Ints) -> None:
-    """Put exceptions into ``column``."""
-    n_exceptions, at = read_varint(data, at)
-    row = -1
-    for _ in range(n_exceptions):
-        gap, at = read_varint(data, at)
-        row += gap + 1
-        column[row : row + 1] = _short_ordinal(data, at + 1, data[at])  # FAST-38
-        at += 1 + data[at]
