@@ -25,8 +25,8 @@ import numpy as np
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton, kernels
 from mcz.codecs import CODECS
-from mcz.coding.ordinals.counts import BINARY32, Law
-from mcz.coding.ordinals.degrees import DEGREE, of_products
+from mcz.coding.forms.counts import BINARY32, Law
+from mcz.coding.forms.products import DEGREE, of_products
 from mcz.formats import bvh
 from mcz.numbers import Grid, GridKind
 from mcz.sample import bvh_walk

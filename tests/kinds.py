@@ -52,7 +52,7 @@ def protected(folder: Path) -> bytes:
 def table(folder: Path) -> bytes:
     rows = "".join(f"{row},{row / 4},{row * row}\n" for row in range(200))
     (folder / "table.csv").write_text("frame,a,b\n" + rows)
-    return encoded("table.csv", effort="normal", rate=100)(folder)
+    return encoded("table.csv", effort="fast", rate=100)(folder)
 
 
 def arrays(folder: Path) -> bytes:

@@ -20,7 +20,7 @@ from mcz.numbers import Grid, GridKind
 from tests.motions import POSITIONS, skeleton, smooth
 
 N_FRAMES, N_CHANNELS = 6, 10
-CODECS = ("fast", "lossless", "best", "raw")
+CODECS = ("fast", "best", "raw")
 
 
 def written(motion: mcz.Motion, codec: str = "fast", **params: Any) -> mcz.Motion:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.codecs import raw
-from mcz.codecs.lossless import lossless
+from mcz.codecs.lossless import best
 from mcz.codecs.wavelet import mrdwt
 from mcz.editing.recoding import recorded_options
 from mcz.errors import AccessError, MotionError, OptionError
@@ -28,7 +28,7 @@ from tests.motions import motions, smooth
 
 CASES = {
     "raw": ("raw", {"segment_frames": 100}),
-    "lossless": ("lossless", {"segment_frames": 100}),
+    "fast": ("fast", {"segment_frames": 100}),
     "mrdwt": ("mrdwt", {"segment_frames": 128}),
     "mrdwt-khan2016": ("mrdwt", {"preset": "khan2016"}),
     "mrdwt-decimals": ("mrdwt", {"Q": 2, "T_g": 0.5, "segment_frames": 128}),
@@ -39,7 +39,7 @@ CASES = {
     "awt": ("awt", {"a_w": 150}),
     "qbc-fewest": ("qbc", {"breaks": "fewest", "d2_lmt": 0.5}),
 }
-LOSSLESS = ("raw", "lossless")
+LOSSLESS = ("raw", "fast")
 
 
 @pytest.fixture(autouse=True)
@@ -47,11 +47,12 @@ def known_codecs(monkeypatch: pytest.MonkeyPatch) -> None:
     for codec in (
         overlap_codec.CODEC,
         replace(raw.CODEC, id=254, name="one", grouping="all"),
+        replace(best.CODEC, id=253, name="joints", grouping="joint"),
     ):
         monkeypatch.setitem(codecs.CODECS, codec.name, codec)
 
 
-def written(motion: Motion, codec: str = "lossless", **params: Any) -> bytes:
+def written(motion: Motion, codec: str = "fast", **params: Any) -> bytes:
     out = io.BytesIO()
     mcz.write(motion, out, codec, **params)
     return out.getvalue()
@@ -151,7 +152,7 @@ def _with_copies(n_frames: int = 300) -> Motion:
 
 
 def test_groups_that_repeat_the_joint_are_coded_anew_where_they_do() -> None:
-    data = written(_with_copies(), segment_frames=100)
+    data = written(_with_copies(), "joints", segment_frames=100)
     new = np.round(values_of(data, "spine") + 1, 4)
     after, found = edited(data, "spine", new)
     assert found.recoded == ("knee",)
@@ -160,8 +161,9 @@ def test_groups_that_repeat_the_joint_are_coded_anew_where_they_do() -> None:
     check_others(data, after, "spine")
 
 
-def test_a_joint_that_repeats_another_leaves_it_alone() -> None:
-    data = written(_with_copies(), segment_frames=100)
+@pytest.mark.parametrize("codec", ["fast", "joints"])
+def test_a_joint_that_repeats_another_leaves_it_alone(codec: str) -> None:
+    data = written(_with_copies(), codec, segment_frames=100)
     new = np.round(values_of(data, "knee") + 1, 4)
     after, found = edited(data, "knee", new)
     assert found.recoded == ()
@@ -250,7 +252,7 @@ def test_integers_stay_integers() -> None:
     assert values_of(after, "knee").tolist() == [[1]] * 20
 
 
-@pytest.mark.parametrize("codec", ["raw", "lossless", "mrdwt", "qbc"])
+@pytest.mark.parametrize("codec", ["raw", "fast", "mrdwt", "qbc"])
 def test_nan_is_invalid_where_there_is_no_source(codec: str) -> None:
     motion = smooth(60)
     mask = np.ones(motion.values.shape, bool)
@@ -445,7 +447,7 @@ def test_codecs_that_cannot_say_why() -> None:
 
 
 def test_frames_of_none() -> None:
-    for codec in ("raw", "lossless", "mrdwt", "qbc"):
+    for codec in ("raw", "fast", "mrdwt", "qbc"):
         edited(written(smooth(0), codec), "spine", np.zeros((0, 3)))
         after, _ = edited(written(smooth(1), codec), "spine", np.ones((1, 3)))
         assert np.abs(values_of(after, "spine") - 1).max() <= (0 if codec in LOSSLESS else 0.5)
@@ -467,11 +469,11 @@ def test_a_stranger_among_copies() -> None:
     motion = smooth(50)
     values = motion.values.copy()
     values[:, 7] = values[:, 9] = values[:, 0]
-    data = written(motion.with_values(values))
+    data = written(motion.with_values(values), "joints")
     after, found = edited(data, "hips", np.round(values[:, :6] + 1, 4))
     assert set(found.recoded) == {"spine", "knee"}
     assert np.array_equal(values_of(after)[:, 6:], values[:, 6:])
-    assert lossless.CODEC.regroup is not None
+    assert best.CODEC.regroup is not None
 
 
 @pytest.fixture

@@ -39,13 +39,20 @@ def vectors() -> list[Vector]:
     found = []
     for group, modules in GROUPS.items():
         made = [vector for module in modules for vector in module.vectors()]
-        start = f"{group}/"
-        made += [row.vector() for row in table_rows().values() if row.name.startswith(start)]
-        found += sorted(made, key=lambda vector: vector.name)
         MADE.update({vector.name: vector.data for vector in made if group == "valid"})
+        own = [row for row in table_rows().values() if row.name.startswith(f"{group}/")]
+        for row in sorted(own, key=_rests_on_another):
+            made.append(row.vector())
+            if group == "valid":
+                MADE[row.name] = made[-1].data
+        found += sorted(made, key=lambda vector: vector.name)
     names = [vector.name for vector in found]
     assert len(names) == len(set(names)), sorted(n for n in names if names.count(n) > 1)
     return found
+
+
+def _rests_on_another(row: Row) -> bool:
+    return str(row.fields.get("base", "")).startswith("valid/")
 
 
 def rows(made: Sequence[Vector], names: Sequence[str] = ()) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ import click
 from mcz.cli.common import Exit, Failure, echo, to_frames, to_params, to_rate
 from mcz.types import Settings
 
-EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
+EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
 RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
 ITS_RATE_HELP = "Frames a second (120, 29.97, 30000/1001), in place of what the source states."
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as those of the codec posewave
@@ -280,7 +280,7 @@ def encoding_options(function: Function) -> Function:
         click.option(
             "--effort",
             type=click.Choice(EFFORTS),
-            help="A lossless codec: read fastest, a little smaller, or smallest.",
+            help="A lossless codec: read fastest, or smallest.",
         ),
         click.option(
             "--quality",

@@ -83,7 +83,7 @@ class Codecs(MutableMapping[str, Codec]):
 
 CODECS = Codecs()
 DEFAULT = "fast"
-EFFORTS = {"fast": "fast", "normal": "lossless", "best": "best"}  # by what they cost
+EFFORTS = {"fast": "fast", "best": "best"}  # by what they cost
 ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 

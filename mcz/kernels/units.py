@@ -21,7 +21,7 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.lossless.best_kernels",
     ),
     "numbers": (
-        "mcz.coding.ordinals.product_kernels",
+        "mcz.coding.forms.product_kernels",
         "mcz.formats.text_kernels",
         "mcz.numbers.kernels",
         "mcz.numbers.ordinal_kernels",

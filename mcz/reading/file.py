@@ -298,7 +298,7 @@ def open(
     counts such segments. It saves bytes where segments are large, and does nothing in salvage.
     ``threads`` may decode at once, by default one a processor; the numbers are the same.
     ``verify`` compares the SHA-256 of every signal that is decoded whole. By default that of the
-    codecs raw, fast and lossless is not compared: checksums guard their bytes.
+    codecs raw and fast is not compared: checksums guard their bytes.
     Raises FormatError, in particular TruncatedError where there is no FOOT at the end,
     AccessError where the file cannot be read, and OptionError.
     """

@@ -114,7 +114,7 @@ def write(
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
     ``effort`` names a lossless codec in place of ``codec``: "fast", the default, is read fastest,
-    "normal" is a little smaller, "best" smallest. ``params`` are the codec's; ``profile`` is
+    "best" is smallest. ``params`` are the codec's; ``profile`` is
     "base", "large", which allows more, or "small", which embedded readers decode. ``copies``: what
     holds the clip together, skeleton and template among it, stands in the file a second time, so
     that a flipped bit there costs no frame (``mcz.open`` with ``salvage``). ``threads`` may code at

@@ -30,7 +30,7 @@ from mcz.types import JsonObject, Params
 from mcz.units import axes_of
 from mcz.writing.signal_source import MemorySource, as_stored, group_kind, settle
 
-BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
+BESIDE = "fast"  # the codec of all signals but the motion, where that one is lossy
 
 
 @dataclass(frozen=True, slots=True)

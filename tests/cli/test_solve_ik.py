@@ -31,7 +31,7 @@ def write_positions(path: Path, motion: Motion, *, virtual_markers: bool = False
     own = StoredSkeleton(motion.skeleton)
     derived = () if made is motion else (StoredSkeleton(made.skeleton, derives=True),)
     prepared = Prepared(made, (own, *derived))
-    write_plan(writer, plan_clip(prepared, by_name("lossless"), {}, BASE))
+    write_plan(writer, plan_clip(prepared, by_name("fast"), {}, BASE))
     writer.finish()
     path.write_bytes(stream.getvalue())
     return path

@@ -17,7 +17,7 @@ from mcz.codecs.lossless.best_choices import choose_links
 from mcz.codecs.lossless.best_streams import LINKED, MAX_LINKS, Link
 from mcz.coding.fast import decoder
 from mcz.coding.fast.encoder import StreamBuilder
-from mcz.coding.ordinals import degrees
+from mcz.coding.forms import products
 from mcz.coding.ordinals.streams import build_stream, plan_stream
 from mcz.numbers import Grid, GridKind
 
@@ -60,7 +60,7 @@ class Coder:
         found: list[object] = []
         for lacking in (False, True) if self.name == "fast" else (False,):
             with ExitStack() as stack:
-                for module in (degrees, decoder) if lacking else ():
+                for module in (products, decoder) if lacking else ():
                     name = f"{module.__name__}.lacks_compiled_kernels"
                     stack.enter_context(mock.patch(name, return_value=True))
                 found.append(self.decoded(stream, n_rows, n_channels, grid).tolist())

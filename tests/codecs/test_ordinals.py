@@ -43,7 +43,7 @@ def test_extreme_ordinals_of_any_form(coder: Coder, extreme: int) -> None:
         assert coder.rows(coder.coded(wanted, grid), 4, 1, grid) == wanted.tolist()
 
 
-@pytest.mark.parametrize("codec", ["raw", "lossless", "fast", "best"])
+@pytest.mark.parametrize("codec", ["raw", "fast", "best"])
 @given(motion=motions())
 def test_any_motion_comes_back(codec: str, motion: mcz.Motion) -> None:
     out = io.BytesIO()

@@ -90,7 +90,7 @@ TARGETS: dict[str, Target] = {
             vectors,
             mutator(0.2, vectors, hashed=0.5),
         ),
-        _decoder("lossless", "lossless", "raw", "numbers", "notes"),
+        _decoder("raw", "raw", "numbers", "notes"),
         _decoder("best", "best"),
         _decoder("fast", "fast"),
         _decoder("wavelets", "mrdwt", "dwt", "awt"),

@@ -1,6 +1,5 @@
 // SPEC.md, "Codec 1: fast": the heads of channels.
 
-import { GENERAL } from "./grids.js";
 import {
   CODED,
   CONSTANT,
@@ -14,7 +13,8 @@ import {
   isClasses,
   readUnit,
   scaleOf,
-} from "./heads.js";
+} from "./forms.js";
+import { GENERAL } from "./grids.js";
 
 export const STEPS = 3;
 

@@ -1,7 +1,7 @@
 // SPEC.md, "Codec 1: fast", "Tails" and "Units": the ordinals of leads.
 
+import { COUNTS, MULTIPLES, PLAIN, PRODUCTS, classesOf, ordinalOfCount, productOf } from "./forms.js";
 import { binary32Ordinal } from "./grids.js";
-import { COUNTS, MULTIPLES, PLAIN, PRODUCTS, classesOf, ordinalOfCount, productOf } from "./heads.js";
 import { halvesOf, setHalves, setInteger } from "./int64.js";
 import { ordinalOf } from "./ordinals.js";
 import { nextScale } from "./rice.js";

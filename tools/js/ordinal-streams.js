@@ -4,21 +4,18 @@ import { ByteReader } from "./bytes.js";
 import { Refused } from "./errors.js";
 import { CODED, CONSTANT, COPY, readHead } from "./heads.js";
 
-/** Decodes a run of segments: all groups, or those of these numbers, without copies. */
+/** Decodes a run of segments. */
 export class SignalDecoder {
   /**
    * @param {{name: string, rules: object, decoder: (ordinals: BigInt64Array) => object}} codec what
    *     heads it has, and what decodes the coded channels of a group
    * @param {object} layout of the signal
    * @param {object[]} segments with their streams
-   * @param {number[] | null} numbers of groups
    */
-  constructor(codec, layout, segments, numbers = null) {
+  constructor(codec, layout, segments) {
     this.codec = codec;
     this.layout = layout;
     this.segments = segments;
-    this.copying = numbers === null;
-    this.numbers = numbers ?? [...layout.groups.keys()];
     this.nChannels = layout.channels.length;
     const nRows = segments.reduce((sum, segment) => sum + segment.nRows, 0);
     this.ordinals = new BigInt64Array(nRows * this.nChannels);
@@ -37,8 +34,7 @@ export class SignalDecoder {
 
   decodeSegment({ streams, nRows }, firstRow) {
     const { grids } = this.layout;
-    const groups = this.numbers.map((g) => {
-      const columns = this.layout.groups[g];
+    const groups = this.layout.groups.map((columns, g) => {
       const reader = new ByteReader(streams[0][g], `${this.codec.name} stream of group ${g}`);
       const bits = this.decoderOf(reader);
       const heads = columns.map((column) => readHead(reader, grids[column], column, this.codec.rules));
@@ -46,9 +42,6 @@ export class SignalDecoder {
     });
     const heads = groups.flatMap((group) => group.heads);
     const copies = heads.filter(({ kind }) => kind === COPY);
-    if (copies.length > 0 && !this.copying) {
-      throw new Refused(`${this.codec.name}: a copy in an exact group`);
-    }
     const sources = copies.map((copy) => sourceOf(copy, groups, this.codec.name));
     for (const { column, ordinal } of heads.filter(({ kind }) => kind === CONSTANT)) {
       this.eachRow(firstRow, nRows, column, () => ordinal);

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.ordinals.choices import Lattice, fixed_point
+from mcz.coding.forms.lattice import Lattice
+from mcz.coding.ordinals.choices import fixed_point
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]

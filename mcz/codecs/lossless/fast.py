@@ -28,14 +28,19 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.lossless.segments import segment_frames
 from mcz.codecs.segments import Sizing, guessing
-from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
+from mcz.coding.fast.decoder import (
+    MOST_ROWS,
+    MOST_VALUES,
+    SegmentDecoder,
+    Shape,
+    check_size,
+    read_segments,
+)
 from mcz.coding.fast.encoder import StreamBuilder
-from mcz.errors import FormatError
 from mcz.types import Params
 
 Ints = NDArray[np.int64]
 
-MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
 USUAL_ROWS = 1024
 SIZING = Sizing(60_000, 63_000, value_bytes=1.5, most_rows=USUAL_ROWS, spare=1)
 
@@ -96,10 +101,7 @@ def decode(
 
 def _rows(layout: Layout, span: Span) -> int:
     n_rows = span.n_frames * layout.samples_per_frame
-    if (n_rows > MOST_ROWS and span.n_frames > 1) or n_rows * layout.n_channels > MOST_VALUES:
-        raise FormatError(  # FAST-18
-            f"fast: a segment of {n_rows} rows and {layout.n_channels} channels"
-        )
+    check_size(n_rows, layout.n_channels, span.n_frames)
     return n_rows
 
 

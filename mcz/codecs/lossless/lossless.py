@@ -29,11 +29,11 @@ from mcz.codecs.contract import (
 from mcz.codecs.lossless.copying import decode_streams, encode_streams, recode_streams, regroup
 from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
 from mcz.codecs.segments import Sizing
-from mcz.coding.ordinals.choices import has_binary32
-from mcz.coding.ordinals.count_search import find_counts
-from mcz.coding.ordinals.degrees import is_tiny
+from mcz.coding.forms.count_search import find_counts
+from mcz.coding.forms.lattice import has_binary32
+from mcz.coding.forms.multiples import find_multiples
+from mcz.coding.forms.products import is_tiny
 from mcz.coding.ordinals.streams import build_stream, parse_stream
-from mcz.coding.ordinals.units import find_unit
 from mcz.numbers import GridKind
 from mcz.types import Params
 
@@ -76,7 +76,7 @@ def _has_counts(source: SignalSource) -> bool:
         return False
     places = {(layout.n_frames - length) * place // (PLACES - 1) for place in range(PLACES)}
     runs = (source.ordinals(first, first + length) for first in sorted(places))
-    return any(find_counts(run[:, c], find_unit(run[:, c])) for run in runs for c in tried)
+    return any(find_counts(run[:, c], find_multiples(run[:, c])) for run in runs for c in tried)
 
 
 def decode(

@@ -1,4 +1,4 @@
-"""Exact channels of ``posewave``: groups of ordinals beside the rows, as those of lossless.
+"""Exact channels of ``posewave``: groups of ordinals beside the rows, each a signal of fast.
 
 SPEC.md, "Exact channels", is normative.
 """
@@ -6,6 +6,7 @@ SPEC.md, "Exact channels", is normative.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from functools import cache
 from itertools import groupby
 
 import numpy as np
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import Layout, Request, SignalSource, Span
 from mcz.codecs.posewave.header import NAME, PosewaveHeader, build_header
 from mcz.codecs.segments import gather
-from mcz.coding.ordinals.heads import COPY, read_heads
-from mcz.coding.ordinals.streams import build_stream, parse_stream
+from mcz.coding.fast.decoder import MOST_ROWS, MOST_VALUES, Shape, read_alone
+from mcz.coding.fast.encoder import StreamBuilder
 from mcz.errors import FormatError, OptionError
 from mcz.kinematics.words import joints_of
 from mcz.motion import Skeleton
@@ -85,21 +86,25 @@ def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int,
     return build_header(**vars(fields) | left)
 
 
+def most_frames(layout: Layout, groups: Sequence[int]) -> int:
+    """Frames of a segment in which these groups can be exact."""
+    widest = max((len(layout.groups[group]) for group in groups), default=1)
+    return min(MOST_ROWS, MOST_VALUES // widest)
+
+
 def build_exact(source: SignalSource, groups: Sequence[int], first: int, stop: int) -> list[bytes]:
     """The stream of each of these groups in the segment first <= f < stop."""
     if not groups:
         return []
     layout, grids = source.layout, source.grids(first)
     ordinals = source.ordinals(first, stop)
-    return [
-        build_stream(
-            ordinals[:, list(layout.groups[group])],
-            [(grids[c], layout.grids[c]) for c in layout.groups[group]],
-            group,
-            None,
-        )
-        for group in groups
-    ]
+    streams: list[bytes] = []
+    for group in groups:
+        channels = list(layout.groups[group])
+        builder = StreamBuilder([layout.grids[c] for c in channels], [range(len(channels))])
+        own = np.ascontiguousarray(ordinals[:, channels])
+        streams += builder.build(own, tuple(grids[c] for c in channels))
+    return streams
 
 
 def decode_exact(
@@ -107,14 +112,16 @@ def decode_exact(
 ) -> Ints:
     """The ordinals of the groups of ``request``, all exact, whatever its resolution."""
 
+    @cache
+    def shape(group: int) -> Shape:
+        channels = layout.groups[group]
+        return Shape([layout.grids[channel] for channel in channels], [range(len(channels))])
+
     def rows(index: int, group: int) -> Ints:
         for resolution in range(1, layout.n_resolutions - request.resolution):
             if stream(index, resolution, group):  # PWAVE-35
                 raise FormatError(f"a detail of the exact group {group}", where=where)
-        grids = [layout.grids[channel] for channel in layout.groups[group]]
         data = stream(index, 0, group)
-        if any(kind == COPY for kind, _, _ in read_heads(data, grids)[0]):  # PWAVE-37
-            raise FormatError(f"a copy in the exact group {group}", where=where)
-        return parse_stream(data, grids, spans[index].n_frames)[0]  # PWAVE-36
+        return read_alone(shape(group), data, spans[index].n_frames)  # PWAVE-36
 
     return gather(layout, spans, request, rows)

@@ -35,7 +35,14 @@ from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
 from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.choices import PRESETS, Choice, choose, guess
 from mcz.codecs.posewave.contact_choice import parse_runs, run_words
-from mcz.codecs.posewave.exact import build_exact, cut, decode_exact, joint_words, partition
+from mcz.codecs.posewave.exact import (
+    build_exact,
+    cut,
+    decode_exact,
+    joint_words,
+    most_frames,
+    partition,
+)
 from mcz.codecs.posewave.header import NAME, Header, parse_header
 from mcz.codecs.posewave.limits import joint_limits, limit_words
 from mcz.codecs.posewave.live import LiveDecoder, LiveEncoder
@@ -85,6 +92,8 @@ def _segments(
         return
     wanted = segment_frames_of(layout, params["segment_frames"])
     length = min(wanted or MOST_FRAMES, layout.most_frames)
+    if header.exact_groups:
+        length = min(length, most_frames(layout, header.exact_groups))
     lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
     octaves, keeper, lossy = params["refinement"], choice.keeper, _lossy(header, layout)

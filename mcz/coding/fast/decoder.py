@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.fast.lanes import Lanes, read_lanes
-from mcz.coding.ordinals.heads import WITH_UNIT, form_of_grid, parse_mapping
+from mcz.coding.forms.lattice import WITH_UNIT, form_of_grid
+from mcz.coding.forms.units import parse_mapping
 from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels
 from mcz.numbers import Grid
@@ -22,6 +23,7 @@ from mcz.numbers import Grid
 Ints = NDArray[np.int64]
 Fetch = Callable[[int], bytes]  # a group -> its stream
 
+MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
 MOST_KNOWN = 64  # requests of which a shape keeps the columns
 SPARE = 16  # bytes behind the streams that a window may reach
 FAULTS = (
@@ -123,6 +125,12 @@ class Heads:
         at = int(np.searchsorted(self.columns.firsts, channel, "right")) - 1
         where = f"channel {channel - self.columns.firsts[at]} of group {self.groups[at]}"
         return FormatError(f"fast: {where}: {FAULTS[fault]}")
+
+
+def check_size(n_rows: int, n_channels: int, n_frames: int) -> None:
+    """Raise FormatError for a segment that is larger than any."""
+    if (n_rows > MOST_ROWS and n_frames > 1) or n_rows * n_channels > MOST_VALUES:
+        raise FormatError(f"fast: a segment of {n_rows} rows and {n_channels} channels")  # FAST-18
 
 
 def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int) -> Heads:
@@ -235,3 +243,12 @@ def read_segments(segments: Sequence[SegmentDecoder]) -> None:
             read_lanes(segment.lanes)
     for segment in segments:
         segment.finish()
+
+
+def read_alone(shape: Shape, stream: bytes, n_rows: int) -> Ints:
+    """The ordinals of the only group of a signal in a segment; raises FormatError."""
+    n_channels = len(shape.grids)
+    check_size(n_rows, n_channels, n_rows)
+    out = np.empty((n_rows, n_channels), np.int64)
+    read_segments([SegmentDecoder(shape, (0,), lambda group: stream, out)])
+    return out

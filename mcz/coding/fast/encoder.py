@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.ordinals.choices import has_binary32
-from mcz.coding.ordinals.degrees import tiny_limit
-from mcz.coding.ordinals.heads import form_of_grid
-from mcz.coding.ordinals.streams import in_units
+from mcz.coding.forms.lattice import form_of_grid, has_binary32
+from mcz.coding.forms.products import tiny_limit
+from mcz.coding.forms.units import find_units
 from mcz.numbers import Grid
 
 if TYPE_CHECKING:
@@ -112,9 +111,11 @@ class StreamBuilder:
         fields = b""
         for n in np.flatnonzero(tried).tolist():
             column = np.ascontiguousarray(channels.ordinals[:, self.numbers[n]])
-            version = int(self.grids[n] == self.clip_grids[n])
-            form, own, leads, rest = in_units(column, self.grids[n], version)
-            if form is None or int((leads ^ (leads >> 63)).max()) >> survey.LEAD_BITS:
+            units = find_units(column, self.grids[n], every=self.grids[n] == self.clip_grids[n])
+            if units is None:
+                continue
+            leads, own, rest = units.integers, units.fields, units.rests
+            if int((leads ^ (leads >> 63)).max()) >> survey.LEAD_BITS:
                 continue
             channels.columns[n] = leads
             rest_scale = -1
@@ -122,7 +123,7 @@ class StreamBuilder:
                 rests[n] = rest
                 quarters = plan.byte_of(16 * float(np.abs(rest).mean()))
                 rest_scale, own = head.scale_of(quarters), own + bytes((quarters,))
-            plans[n, [head.FORM, head.REST, survey.LIMIT]] = form, rest_scale, -1
+            plans[n, [head.FORM, head.REST, survey.LIMIT]] = units.form, rest_scale, -1
             plans[n, [head.BASE, head.DIGITS, head.DROP, head.TOP]] = 0
             plans[n, [head.FIELDS, survey.FIELDS_END]] = len(fields), len(fields) + len(own)
             fields += own

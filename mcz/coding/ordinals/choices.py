@@ -5,12 +5,11 @@ mcz/codecs/lossless/README.md describes it. Nothing here is normative: any plan 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.numbers import Grid, GridKind, printed_base
+from mcz.coding.forms.lattice import Lattice, base_and_digits
+from mcz.numbers import Grid
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -21,43 +20,6 @@ MAX_TAP = 16 * TAP_UNIT - 1
 FIXED_ORDERS = ((1, ()), (1, (32,)), (1, (64, -32)), (0, ()))  # from_last, taps
 _FITTED = 4  # taps of a fitted predictor
 _ROUNDS = 3  # of reweighted least squares, so that outliers count less
-
-
-@dataclass(frozen=True, slots=True)
-class Lattice:
-    """How ordinals of a channel are split: base 0 plain, else classes of mantissas."""
-
-    base: int
-    digits: int
-    drop: int = 0
-    top: int = 0
-
-
-def max_top(shape: Lattice) -> int:
-    """The greatest class that numbers of this form have."""
-    if shape.base == 10:
-        return 614
-    return 255 if shape.digits + shape.drop == 24 else 2047
-
-
-def base_and_digits(grid: Grid) -> tuple[int, int]:
-    """Base and mantissa digits that a grid has by its kind; (0, 0) for a plain one."""
-    if grid.kind == GridKind.PRINTED:
-        return base_and_digits(printed_base(grid))
-    if grid.kind == GridKind.GENERAL:
-        return 10, grid.digits
-    if grid.kind in (GridKind.TEXT64, GridKind.BINARY64):
-        return 2, 53
-    if grid.kind in (GridKind.TEXT32, GridKind.BINARY32, GridKind.VAX_F):
-        return 2, 24
-    return 0, 0
-
-
-def has_binary32(grid: Grid) -> bool:
-    """Whether ordinals of the grid are those of BINARY32, which forms 32 and 34 give."""
-    return grid.kind == GridKind.BINARY32 or (
-        grid.kind == GridKind.PRINTED and printed_base(grid).kind == GridKind.TEXT32
-    )
 
 
 def lattice(grid: Grid, ordinals: Ints) -> Lattice:

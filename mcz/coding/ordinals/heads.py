@@ -5,35 +5,26 @@ SPEC.md, "Codec 128: lossless", is normative.
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.ordinals.choices import MAX_TAP, Lattice, base_and_digits, max_top
-from mcz.coding.ordinals.counts import parse_law
-from mcz.coding.ordinals.degrees import of_products
-from mcz.coding.ordinals.units import of_multiples
+from mcz.coding.forms.lattice import COUNTS, MULTIPLES, PRODUCTS, Lattice, form_of_grid, max_top
+from mcz.coding.forms.units import Mapping, parse_mapping
+from mcz.coding.ordinals.choices import MAX_TAP
 from mcz.errors import FormatError
-from mcz.numbers import Grid, GridKind
+from mcz.numbers import Grid
 from mcz.schema import read_varint
 
 Ints = NDArray[np.int64]
-Mapping = Callable[[Ints], Ints]
 
 CODED, CONSTANT, COPY = range(3)  # bits 0 and 1 of a channel's first byte
 MAX_DROP = 19
 MAX_SCALE = 172  # 2^43
 MAX_TAPS = 8
-MAX_SHIFTS = 63
 OWN_FORM = 128  # in kind: form and drop are in the stream
-MULTIPLES = 32  # form: integers that are multiplied by a unit, to binary32
-PRODUCTS = 33  # form, from version 1 on: odd numbers, shifts and a unit, to a decimal grid
-COUNTS = 34  # form, from version 1 on: integers that a law makes binary32 numbers, and rests
-WITH_UNIT = MULTIPLES, PRODUCTS, COUNTS
 
 
 def read_heads(
@@ -112,39 +103,6 @@ def _parse_coded(
     return make_plan(shape, scale, kind >> 2 & 1, taps), mapping, rests, at
 
 
-def parse_mapping(
-    stream: bytes, at: int, form: int, grid: Grid
-) -> tuple[Mapping | None, bool, int]:
-    """The map of coded integers, of whole columns, to ordinals; rests; the offset after both."""
-    if form not in WITH_UNIT:
-        return None, False, at
-    unit, at = _parse_unit(stream, at)
-    if form == MULTIPLES:
-        return partial(of_multiples, unit=unit), False, at
-    if form == COUNTS:
-        law, rests, at = parse_law(stream, at, unit)
-        return law.ordinals, rests, at
-    if grid.kind != GridKind.GENERAL:  # FAST-49, LOSS-32
-        raise FormatError(f"lossless: form {form} on the grid {grid.kind.name}")
-    shifts, at = _byte(stream, at)
-    if not 1 <= shifts <= MAX_SHIFTS:  # FAST-50, LOSS-34
-        raise FormatError(f"lossless: {shifts} shifts")
-    return partial(of_products, unit=unit, shifts=shifts, grid=grid), False, at
-
-
-def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
-    if at + 8 > len(stream):
-        raise FormatError(f"lossless: the stream ends at {len(stream)}, in a unit")
-    (unit,) = struct.unpack_from("<d", stream, at)
-    check_unit("lossless", unit)
-    return unit, at + 8
-
-
-def check_unit(codec: str, unit: float) -> None:
-    if not 2.0**-200 <= unit <= 2.0**80:  # FAST-47, LOSS-12
-        raise FormatError(f"{codec}: a unit of {unit!r}")
-
-
 def _shape(form: int, drop: int, version: int) -> Lattice:
     if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):  # LOSS-17
         return Lattice(0, 0, drop)
@@ -155,16 +113,6 @@ def _shape(form: int, drop: int, version: int) -> Lattice:
     if form in (64 + 24, 64 + 53) and drop <= form - 64 - 2:  # LOSS-16, LOSS-17
         return Lattice(2, form - 64 - drop, drop)
     raise FormatError(f"lossless: form {form}, drop {drop}")  # LOSS-16
-
-
-def form_of(shape: Lattice) -> int:
-    """The byte ``form``: 0 plain, digits of base 10, or 64 + digits of base 2, drop included."""
-    return {0: 0, 10: shape.digits, 2: 64 + shape.digits + shape.drop}[shape.base]
-
-
-def form_of_grid(grid: Grid) -> int:
-    base, digits = base_and_digits(grid)
-    return form_of(Lattice(base, digits))
 
 
 def scale_of(quarters: int) -> int:

@@ -5,7 +5,6 @@ SPEC.md, "Codec 128: lossless", is normative; the names below are its field name
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 from functools import cache
 from types import ModuleType
@@ -13,32 +12,19 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.ordinals.choices import (
-    Lattice,
-    choose_predictor,
-    fixed_point,
-    has_binary32,
-    lattice,
-    max_top,
-)
-from mcz.coding.ordinals.count_search import find_counts
-from mcz.coding.ordinals.degrees import find_degrees
+from mcz.coding.forms.lattice import Lattice, form_of, form_of_grid, max_top
+from mcz.coding.forms.units import find_units
+from mcz.coding.ordinals.choices import choose_predictor, fixed_point, lattice
 from mcz.coding.ordinals.heads import (
     CODED,
     CONSTANT,
     COPY,
-    COUNTS,
     MAX_SCALE,
-    MULTIPLES,
     OWN_FORM,
-    PRODUCTS,
-    form_of,
-    form_of_grid,
     make_plan,
     read_heads,
     scale_of,
 )
-from mcz.coding.ordinals.units import find_unit
 from mcz.coding.start import start_states
 from mcz.errors import FormatError
 from mcz.numbers import Grid, GridKind
@@ -110,36 +96,27 @@ def _coded_head(
     column: Ints, grid: Grid, clip_grid: Grid, version: int, *, fitted: bool
 ) -> tuple[bytes, Ints, Ints, Ints | None]:
     """The head of a coded channel, its plan for the compiled loop, the integers to code, rests."""
-    own, fields, column, rests = in_units(column, grid, version if grid == clip_grid else 0)
-    shape = lattice(grid if own is None else PLAIN, column)
+    units = find_units(column, grid, every=version >= 1 and grid == clip_grid)
+    if units is not None:
+        column = units.integers
+    shape = lattice(grid if units is None else PLAIN, column)
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
     from_last, taps, error = choose_predictor(fixed_point(column, shape), fitted=fitted)
     scale = next((q for q in range(MAX_SCALE) if scale_of(q) >= error), MAX_SCALE)
-    form = form_of(shape) if own is None else own
+    form = form_of(shape) if units is None else units.form
     own_form = shape.drop > 0 or form != form_of_grid(clip_grid)
     kind = CODED | from_last << 2 | len(taps) << 3 | OWN_FORM * own_form
-    head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b"", fields]
+    head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b""]
+    head += [] if units is None else [units.fields]
     head += [varint(shape.top)] if shape.base else []
     head += [bytes((scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
-    return b"".join(head), make_plan(shape, scale, from_last, taps), column, rests
-
-
-def in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, bytes, Ints, Ints | None]:
-    """A form with a unit, its fields, integers and rests; none and the column where none fits."""
-    if has_binary32(grid):
-        found = find_unit(column)
-        law = find_counts(column, found) if version >= 1 else None
-        if law is not None:
-            rests = law.rests if law.rests.any() else None
-            return COUNTS, law.law.fields(rests=rests is not None), law.counts, rests
-        if found is not None:
-            return MULTIPLES, struct.pack("<d", found[0]), found[1], None
-    products = find_degrees(column, grid) if version >= 1 else None
-    if products is not None:
-        unit, shifts, codes = products
-        return PRODUCTS, struct.pack("<dB", unit, shifts), codes, None
-    return None, b"", column, None
+    return (
+        b"".join(head),
+        make_plan(shape, scale, from_last, taps),
+        column,
+        None if units is None else units.rests,
+    )
 
 
 @cache

@@ -4,7 +4,7 @@ import { ByteReader } from "../bytes.js";
 import { Refused } from "../errors.js";
 import { STEPS, readFastHead } from "../fast-heads.js";
 import { numbersOf } from "../fast-numbers.js";
-import { CODED, CONSTANT, COPY } from "../heads.js";
+import { CODED, CONSTANT, COPY } from "../forms.js";
 import { halvesOf, setHalves } from "../int64.js";
 import { RiceReader, nextScale } from "../rice.js";
 
@@ -34,18 +34,46 @@ export function open(header, layout) {
   };
 }
 
+/**
+ * The ordinals of groups of which each is decoded as the only one of a signal.
+ *
+ * @param {{groups: number[][], grids: object[]}} layout
+ * @param {object[]} segments whose streams of the coarsest resolution are those of fast
+ * @param {number[]} numbers of the groups
+ * @returns {BigInt64Array} all rows, row after row; 0 in the columns of other groups
+ * @throws {Refused}
+ */
+export function decodeAlone({ groups, grids }, segments, numbers) {
+  const ordinals = ordinalsOf(segments, grids.length);
+  for (const g of numbers) {
+    const own = segments.map((segment) => ({ ...segment, streams: [[segment.streams[0][g]]] }));
+    decodeInto(ordinals, own, [groups[g]], grids);
+  }
+  return ordinals;
+}
+
 /** The ordinals of all rows of some segments, row after row. */
-function decodeSegments({ channels, groups, grids }, segments) {
-  for (const segment of segments) checkSize(segment, channels.length);
+function decodeSegments({ groups, grids }, segments) {
+  const ordinals = ordinalsOf(segments, grids.length);
+  decodeInto(ordinals, segments, groups, grids);
+  return ordinals;
+}
+
+/** Room for the ordinals of segments. */
+function ordinalsOf(segments, nChannels) {
   const nRows = segments.reduce((sum, segment) => sum + segment.nRows, 0);
-  const ordinals = new BigInt64Array(nRows * channels.length);
+  return new BigInt64Array(nRows * nChannels);
+}
+
+function decodeInto(ordinals, segments, groups, grids) {
+  const nChannels = groups.reduce((sum, columns) => sum + columns.length, 0);
+  for (const segment of segments) checkSize(segment, nChannels);
   let first = 0;
   for (const segment of segments) {
-    const end = first + segment.nRows * channels.length;
+    const end = first + segment.nRows * grids.length;
     new SegmentDecoder(segment, groups, grids, ordinals.subarray(first, end)).decode();
     first = end;
   }
-  return ordinals;
 }
 
 function checkSize({ nFrames, nRows }, nChannels) {

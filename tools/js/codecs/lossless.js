@@ -72,19 +72,6 @@ export function open(header, layout, codecVersion) {
   };
 }
 
-/**
- * The ordinals of some groups of another codec, which has no copies in them.
- *
- * @param {object} layout as of {@link open}
- * @param {object[]} segments with their streams
- * @param {number[]} groups numbers of groups
- * @returns {BigInt64Array} row after row; 0 in the columns of other groups
- * @throws {Refused}
- */
-export function decodeGroups(layout, segments, groups) {
-  return new SignalDecoder(VERSIONS[0], layout, segments, groups).decode();
-}
-
 // Bits
 
 /** A coded channel: its head, what it remembers, and the numbers of its form. */

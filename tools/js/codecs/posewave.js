@@ -11,7 +11,7 @@ import { Pyramid, Walk } from "../pose-levels.js";
 import { RowDecoder } from "../pose-rows.js";
 import { HEAD, startTable } from "../pose-start.js";
 import { stepOf } from "../scales.js";
-import { decodeGroups } from "./lossless.js";
+import { decodeAlone } from "./fast.js";
 
 export const id = 3;
 export const name = "posewave";
@@ -209,7 +209,7 @@ class PoseDecoder {
         throw new Refused(`${name}: segment at frame ${firstFrame}: details of an exact group`);
       }
     }
-    return decodeGroups(this.layout, segments, exactGroups);
+    return decodeAlone(this.layout, segments, exactGroups);
   }
 
   /**

@@ -14,26 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.fast.head_kernels import TAP_UNIT, scale_of
-from mcz.coding.ordinals.choices import Lattice
-from mcz.coding.ordinals.counts import Law
-from mcz.coding.ordinals.heads import form_of_grid
+from mcz.coding.forms.counts import Law
+from mcz.coding.forms.lattice import Lattice, form_of_grid
 from mcz.numbers import Grid
 from mcz.schema import varint
 from tools.vectors.build import fast_heads
-from tools.vectors.build.lossless_clips import (
-    COUNTS,
-    MULTIPLES,
-    PLAIN,
-    PRODUCTS,
-    Constant,
-    Copy,
-    law_fields,
-)
 
 if TYPE_CHECKING:
     from mcz.coding.fast.survey_kernels import CodedLanes
 
 Ints = NDArray[np.int64]
+# Forms; 1 to 15: digits of base 10.
+PLAIN, MULTIPLES, PRODUCTS, COUNTS = 0, 32, 33, 34
 CODE_BYTES = 10  # of a residual, a rest or a tail, at most
 ROUNDS = 100  # until residuals are found of which each may have another as its parent
 
@@ -64,6 +56,19 @@ class Coded:
     rests: tuple[int, ...] = ()
     rest_scale: int = 0
     parts: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A constant channel, of its first ordinal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Copy:
+    """A channel that repeats this one."""
+
+    group: int
+    channel: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,3 +230,9 @@ def _parts(lanes: CodedLanes, columns: Ints, start: int, stop: int) -> list[byte
     room = np.zeros((2, (columns[start:stop].size + 1) * CODE_BYTES), np.uint8)
     sizes = write.write_parts(lanes, columns, start, stop, room[0], room[1])
     return [row[:size].tobytes() for row, size in zip(room, sizes, strict=True)]
+
+
+def law_fields(head: Any, law: Law) -> bytes:
+    """The fields of form 34 in the head of a channel, of this codec or another."""
+    fields = law.fields(rests=bool(head.rests))
+    return fields if head.parts is None else fields[:8] + bytes((head.parts,)) + fields[9:]

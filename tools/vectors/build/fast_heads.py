@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.ordinals.choices import Lattice
+from mcz.coding.forms.lattice import Lattice
 from mcz.schema import varint
 
 CODED, CONSTANT, COPY, STEPS = range(4)  # bits 0 and 1 of ``kind``

@@ -13,20 +13,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.coding.forms.counts import Law
+from mcz.coding.forms.lattice import Lattice, form_of_grid
 from mcz.coding.ordinals import heads as lossless_heads
 from mcz.coding.ordinals import streams as ordinal_streams
-from mcz.coding.ordinals.choices import Lattice
-from mcz.coding.ordinals.counts import Law
 from mcz.coding.start import start_states
-from mcz.numbers import Grid, GridKind
+from mcz.numbers import Grid
 from mcz.schema import varint
+from tools.vectors.build.fast_clips import (
+    COUNTS,
+    MULTIPLES,
+    PLAIN,
+    PRODUCTS,
+    Constant,
+    Copy,
+    law_fields,
+)
 
 Ints = NDArray[np.int64]
-# Forms; 1 to 15: digits of base 10.
-PLAIN, MULTIPLES, PRODUCTS, COUNTS, BINARY32, BINARY64 = 0, 32, 33, 34, 88, 117
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
-WHOLE, SIX = Grid(GridKind.INTEGER), Grid(GridKind.GENERAL, 6)
-DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +53,6 @@ class Coded:
     law: Law | None = None
     rests: tuple[int, ...] = ()
     parts: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Constant:
-    """A constant channel, of its first ordinal."""
-
-
-@dataclass(frozen=True, slots=True)
-class Copy:
-    group: int
-    channel: int
 
 
 Head = Coded | Constant | Copy
@@ -116,7 +110,7 @@ def heads_of(
 
 
 def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
-    form = lossless_heads.form_of_grid(grid) if head.form is None else head.form
+    form = form_of_grid(grid) if head.form is None else head.form
     if form in (PLAIN, MULTIPLES, PRODUCTS, COUNTS):
         return Lattice(0, 0, head.drop)
     base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
@@ -136,12 +130,6 @@ def _coded_head(head: Coded, shape: Lattice) -> bytes:
     data += varint(shape.top) if shape.base else b""
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
     return data + bytes((head.scale,)) + b"".join(map(varint, folded))
-
-
-def law_fields(head: Any, law: Law) -> bytes:
-    """The fields of form 34 in the head of a channel, of this codec or another."""
-    fields = law.fields(rests=bool(head.rests))
-    return fields if head.parts is None else fields[:8] + bytes((head.parts,)) + fields[9:]
 
 
 def _code_to_the_fault(ordinals: Ints, plans: Sequence[Ints]) -> bytes:

@@ -31,6 +31,7 @@ from tools.vectors.build import (
 from tools.vectors.build.random_ordinals import any_grids, clip_of_ordinals, mask_of
 from tools.vectors.build.random_parts import (
     MOST,
+    SPELLED,
     Chance,
     Clip,
     Ints,
@@ -46,7 +47,7 @@ from tools.vectors.build.spatial_clips import FRAME, PCA_RDO
 
 def clip(chance: Chance, name: str, codec: str) -> Clip:
     """A clip of ``codec`` called ``name``."""
-    if codec in ("raw", "lossless", "best", "fast"):
+    if codec in ("raw", "best", "fast", SPELLED):
         made = clip_of_ordinals(chance, codec)
     elif codec in _MAKERS:
         made = _MAKERS[codec](chance, codec)

@@ -1,9 +1,10 @@
-"""Clips of raw and lossless made at random: grids, changes of grid, exceptions, masks, copies."""
+"""Clips of raw, fast and best made at random: grids, changes of grid, exceptions, masks, copies."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded, Segment
 from mcz.codecs.lossless.best_streams import Link
-from mcz.coding.ordinals.heads import form_of_grid
+from mcz.coding.forms.lattice import form_of_grid
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
 from tools.vectors.build import (
@@ -22,6 +23,7 @@ from tools.vectors.build import (
 )
 from tools.vectors.build.edits import raw_stream
 from tools.vectors.build.random_parts import (
+    SPELLED,
     Chance,
     Clip,
     Ints,
@@ -61,7 +63,7 @@ def _column(chance: Chance, grid: Grid, n: int) -> list[int]:
     """Ordinals of a grid: small, or anywhere up to its ends."""
     limit = grid.limit
     if grid.kind in (GridKind.FIXED, GridKind.TRIMMED, GridKind.SCALED, GridKind.INTEGER):
-        limit = min(limit, 2**43)  # which lossless holds as plain numbers
+        limit = min(limit, 2**43)  # which best holds as plain numbers
     if chance.random() < 0.6:
         return [max(-limit, min(limit, value)) for value in integers(chance, n, limit)]
     return [chance.randrange(-limit, limit + 1) for _ in range(n)]
@@ -200,7 +202,9 @@ def clip_of_ordinals(chance: Chance, name: str) -> Clip:
         made = _segments(chance, source, parts[which], found[which][1], write)
         return Encoded(b"", iter(made), version=0)
 
-    codec = replace(by_name(name), encode=encode, parameters=raw.CODEC.parameters)
+    codec = replace(
+        by_name("fast" if name == SPELLED else name), encode=encode, parameters=raw.CODEC.parameters
+    )
     return Clip(codec, motion, grouping)
 
 
@@ -232,17 +236,10 @@ def _raw_streams(
     return tuple(streams)
 
 
-def _lossless_streams(
-    chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
-) -> tuple[bytes, ...]:
-    """Streams of ``_heads``."""
-    return lossless_clips._streams(layout, block, _heads(chance, layout, grids, block, copies))
-
-
 def _best_streams(
     chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
 ) -> tuple[bytes, ...]:
-    """The same of best, with any links."""
+    """Streams of ``_heads``, with any links."""
     every = _heads(chance, layout, grids, block, copies)
     streams = []
     for group in layout.groups:
@@ -270,9 +267,9 @@ def _heads(
         column = block[:, c]
         twin = copies.get(c)
         if twin is not None and (column == block[:, twin]).all() and chance.random() < 0.8:
-            heads.append(lossless_clips.Copy(*place[twin]))
+            heads.append(fast_clips.Copy(*place[twin]))
         elif (column == column[0]).all() and chance.random() < 0.7:
-            heads.append(lossless_clips.Constant())
+            heads.append(fast_clips.Constant())
         else:
             form = form_of_grid(grids[c])
             own = form != form_of_grid(layout.grids[c]) or chance.random() < 0.1
@@ -281,20 +278,30 @@ def _heads(
 
 
 def _fast_streams(
-    chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
+    chance: Chance,
+    layout: Any,
+    grids: Sequence[Grid],
+    block: Ints,
+    copies: dict[int, int],
+    *,
+    more: bool = False,
 ) -> tuple[bytes, ...]:
-    """The same of fast, with any taps and parents; long ordinals of 64 bits are plain or not."""
+    """The same of fast, with any taps and parents; long ordinals of 64 bits are plain or not.
+
+    ``more``: heads may say the form that their grid has.
+    """
     place = {c: (g, k) for g, group in enumerate(layout.groups) for k, c in enumerate(group)}
     heads: list[fast_clips.Head] = []
     own = Chance(block.tobytes())  # of what other codecs have not
     for c in range(layout.n_channels):
         column, twin, form = block[:, c], copies.get(c), form_of_grid(grids[c])
         if twin is not None and (column == block[:, twin]).all() and chance.random() < 0.8:
-            heads.append(lossless_clips.Copy(*place[twin]))
+            heads.append(fast_clips.Copy(*place[twin]))
         elif (column == column[0]).all() and chance.random() < 0.7:
-            heads.append(lossless_clips.Constant())
+            heads.append(fast_clips.Constant())
         else:
-            made = _coded(chance, form if form != form_of_grid(layout.grids[c]) else None)
+            spelled = form != form_of_grid(layout.grids[c]) or (more and chance.random() < 0.1)
+            made = _coded(chance, form if spelled else None)
             is_steps = own.random() < 0.1
             heads.append(fast_clips.Steps() if is_steps else _lane(own, made, column, form))
     return fast_clips.streams_of(layout, block, _with_parents(own, layout, place, heads))
@@ -308,10 +315,10 @@ def _lane(own: Chance, made: lossless_clips.Coded, column: Ints, form: int) -> f
         exceptions = ((row, numbers[row]),)
         numbers[row] = numbers[row - 1]
     longest = max((o if o >= 0 else -1 - o).bit_length() for o in numbers)
-    wide = form == lossless_clips.PLAIN or (longest > 44 and own.random() < 0.3)
+    wide = form == fast_clips.PLAIN or (longest > 44 and own.random() < 0.3)
     drop = max(0, longest - 31) if wide else 0
     return fast_clips.Coded(
-        lossless_clips.PLAIN if wide and (drop or form) else made.form,
+        fast_clips.PLAIN if wide and (drop or form) else made.form,
         drop,
         scale=min(made.scale, 120),
         predictor=own.randrange(4),
@@ -353,7 +360,7 @@ def _coded(chance: Chance, form: int | None) -> lossless_clips.Coded:
 
 _WRITERS: dict[str, Streams] = {
     "raw": _raw_streams,
-    "lossless": _lossless_streams,
     "best": _best_streams,
     "fast": _fast_streams,
+    SPELLED: partial(_fast_streams, more=True),
 }

@@ -1,6 +1,6 @@
 """Channels whose binary32 values are whole multiples of a unit: integers scaled by some recorder.
 
-``of_multiples`` is normative (SPEC.md, "Codec 128: lossless", form 32); finding a unit is not.
+``of_multiples`` is normative (SPEC.md, "Codec 1: fast", form 32); finding a unit is not.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ def of_multiples(multiples: Ints, unit: float) -> Ints:
     return BINARY32.ordinals_of_bits(values.view("<u4"))
 
 
-def find_unit(ordinals: Ints) -> tuple[float, Ints] | None:
+@np.errstate(over="ignore")  # numbers near the greatest
+def find_multiples(ordinals: Ints) -> tuple[float, Ints] | None:
     """A unit and the multiples of it that ``of_multiples`` turns into these ordinals, or None."""
     if ordinals.max() > BINARY32.limit or ordinals.min() < -1 - BINARY32.limit:
         return None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.ordinals.counts import BINARY32, MOST, Law
+from mcz.coding.forms.counts import BINARY32, MOST, Law
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]

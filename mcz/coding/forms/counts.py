@@ -1,6 +1,6 @@
 """Channels that were counts of a converter: scaled, moved and rounded to binary32.
 
-``Law.ordinals`` is normative (SPEC.md, "Codec 128: lossless", form 34); finding a law is not.
+``Law.ordinals`` is normative (SPEC.md, "Codec 1: fast", form 34); finding a law is not.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ class Law:
 def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
     """The law whose ``parts`` stand at an offset, whether there are rests, the offset after it."""
     if at >= len(stream) or stream[at] > OFFSET | SHIFT | RESTS:  # FAST-52, LOSS-35
-        raise FormatError(f"lossless: parts {stream[at : at + 1].hex() or 'missing'} of a law")
+        raise FormatError(f"parts {stream[at : at + 1].hex() or 'missing'} of a law")
     parts, at = stream[at], at + 1
     terms: list[float | None] = [None, None]
     for place, bit in enumerate((OFFSET, SHIFT)):
         if parts & bit:
             if at + 8 > len(stream):
-                raise FormatError(f"lossless: the stream ends at {len(stream)}, in a law")
+                raise FormatError(f"the stream ends at {len(stream)}, in a law")
             (term,) = struct.unpack_from("<d", stream, at)
             if not -MOST <= term <= MOST:  # FAST-53, LOSS-36
-                raise FormatError(f"lossless: an offset or shift of {term!r}")
+                raise FormatError(f"an offset or shift of {term!r}")
             terms[place], at = term, at + 8
     return Law(unit, *terms), bool(parts & RESTS), at

@@ -1,6 +1,6 @@
 """Channels of rounding noise: angles that were a few units in the last place, printed in degrees.
 
-``of_products`` is normative (SPEC.md, "Codec 128: lossless", form 33); finding a unit is not.
+``of_products`` is normative (SPEC.md, "Codec 1: fast", form 33); finding a unit is not.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
 
     A code has a sign, and its size less 1 is q * shifts + z: it says (2q + 1) * 2^z units.
     """
-    from mcz.coding.ordinals import product_kernels as own  # on first use
+    from mcz.coding.forms import product_kernels as own  # on first use
 
     codes = np.ascontiguousarray(codes)
     out = np.full(len(codes), own.PRINTED)
@@ -63,11 +63,11 @@ def tiny_limit(grid: Grid) -> int:
     return int(grid.ordinals(np.array([LARGEST]))[0][0]) if grid.kind == GridKind.GENERAL else 0
 
 
-def find_degrees(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
+def find_products(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
     """A unit, shifts and the codes that ``of_products`` turns into these ordinals, or None."""
     if not is_tiny(ordinals, grid):
         return None
-    from mcz.coding.ordinals import product_kernels as own  # on first use
+    from mcz.coding.forms import product_kernels as own  # on first use
 
     values = np.ravel(values_of(ordinals[:, None], (grid,)))
     codes = np.empty(len(values), np.int64)
