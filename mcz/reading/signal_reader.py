@@ -18,6 +18,7 @@ from mcz.container.reader import Container
 from mcz.container.runs import MOST_OF_ONE, Run
 from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
 from mcz.errors import FormatError, MczError
+from mcz.kernels import lacks_compiled_kernels
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind, values_of
 from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
@@ -27,6 +28,7 @@ from mcz.threads import in_force, in_order
 from mcz.types import Values
 
 BLOCK_ROWS = 1024  # decoded at a time, at least
+BARE_BLOCK_ROWS = 4096  # without compiled kernels: numpy is faster with several segments at a time
 NEIGHBORS = 4  # segments whose streams are kept for a thread
 
 
@@ -196,9 +198,10 @@ class SignalReader:
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
         rows = self.info.rows
+        least = BARE_BLOCK_ROWS if lacks_compiled_kernels() else BLOCK_ROWS
         for index in self.info.covering(start, stop):
             end = min(rows[index].header.stop, stop)
-            full = (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS
+            full = (end - start) * self.info.layout.samples_per_frame >= least
             # A block that began amid what hangs together would be decoded from its start.
             if full and index + 1 < len(rows) and rows[index + 1].header.flags & FRESH:
                 yield start, end

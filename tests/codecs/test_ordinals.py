@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -10,6 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
+from mcz.codecs import by_name
+from mcz.codecs.contract import Layout, Request, Span
+from mcz.coding.fast import decoder
+from mcz.coding.fast.encoder import StreamBuilder
 from mcz.numbers import Grid
 from tests.codecs.coders import CODERS, GRIDS, Coder, columns
 from tests.motions import motions, smooth
@@ -52,6 +57,26 @@ def test_any_motion_comes_back(codec: str, motion: mcz.Motion) -> None:
         back = file.clips[motion.name].motion()
     for one, other in zip(motion.signals, back.signals, strict=True):
         np.testing.assert_array_equal(one.values, other.values)
+
+
+@pytest.mark.parametrize("grid", [GRIDS[0], GRIDS[3], GRIDS[8], GRIDS[11]], ids=repr)
+def test_segments_of_several_lengths_at_once(grid: Grid) -> None:
+    """Both decoders of fast; those of numpy take all segments row by row."""
+    rng = np.random.default_rng(2)
+    lengths = 7, 30, 30, 1, 19, 30
+    tables = [rng.integers(-(10**7), 10**7, (n, 5)).cumsum(axis=0) for n in lengths]
+    groups = (0, 1), (2,), (3, 4)
+    builder = StreamBuilder([grid] * 5, groups)
+    streams = [builder.build(table, (grid,) * 5) for table in tables]
+    ends = np.cumsum(lengths).tolist()
+    spans = [Span(end - n, n) for end, n in zip(ends, lengths, strict=True)]
+    layout, request = Layout(ends[-1], groups, grids=(grid,) * 5), Request(3, ends[-1], (0, 1, 2))
+    for lacking in (False, True):
+        with mock.patch.object(decoder, "lacks_compiled_kernels", return_value=lacking):
+            found = by_name("fast").decode(
+                b"", layout, spans, request, lambda s, r, g: streams[s][g]
+            )
+        np.testing.assert_array_equal(found, np.concatenate(tables)[3:])
 
 
 @EVERY

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,24 +30,24 @@ NEVER = 1 << 62  # a least long tail, where there are none
 
 def read_all(segments: Sequence[Lanes]) -> None:
     """Fill the columns of the lanes of segments; raises FormatError for bad bytes."""
-    for _, alike in groupby(segments, lambda lanes: len(lanes.out)):
-        batch = [lanes for lanes in alike if len(lanes.columns)]
-        if batch:
-            _read_leads(batch)
-            _read_tails(batch)
+    batch = [lanes for lanes in segments if len(lanes.columns)]
+    if batch:
+        _read_leads(batch)
+        _read_tails(batch)
 
 
 @dataclass(slots=True)
 class Streams:
     """Bits of many streams, those of most lanes first.
 
-    ``data`` has the eight bytes from each offset on; ``lanes``: those that come first, second and
-    so on in their streams, of all segments.
+    ``data`` has the eight bytes from each offset on; ``rows``: those of their segments; ``lanes``:
+    those that come first, second and so on in their streams, of all segments.
     """
 
     data: Words
     bits: Ints
     ends: Ints
+    rows: Ints
     lanes: list[Ints]
 
     def words(self, n: int) -> Words:
@@ -64,6 +63,18 @@ class Streams:
         if ((left < 0) | (left > 7) | (rest != 0)).any():  # FAST-20
             raise FormatError(f"fast: bits are left in the {part}")
 
+    def longer(self, n_rows: int) -> Streams:
+        """Those of segments of more rows."""
+        kept = self.rows > n_rows
+        lanes = [own[kept[: len(own)]] for own in self.lanes]
+        lanes = [own for own in lanes if len(own)]
+        return Streams(self.data, self.bits[kept], self.ends[kept], self.rows[kept], lanes)
+
+    def ended(self, n_rows: int) -> Streams:
+        """Those of segments of so many rows."""
+        own = self.rows == n_rows
+        return Streams(self.data, self.bits[own], self.ends[own], self.rows[own], [])
+
 
 def _streams(
     batch: Sequence[Lanes],
@@ -71,13 +82,14 @@ def _streams(
     wanted: NDArray[np.bool_],
 ) -> Streams:
     """The streams of a part of all groups, and which of the lanes that are ``wanted`` they have."""
-    bits, ends, own = [], [], []
+    bits, ends, rows, own = [], [], [], []
     at = first = 0
     for lanes in batch:
         for group, (bit, end) in enumerate(parts(lanes).tolist()):
             lane = np.arange(first + lanes.starts[group], first + lanes.starts[group + 1])
             bits.append(8 * at + bit)
             ends.append(8 * at + end)
+            rows.append(len(lanes.out))
             own.append(lane[wanted[lane]])
         at += len(lanes.data)
         first += len(lanes.columns)
@@ -86,7 +98,8 @@ def _streams(
     windows = np.ndarray((len(data) - 7,), "<u8", data, strides=(1,)).astype(np.uint64)
     most = len(own[order[0]])
     nth = [np.array([own[n][at] for n in order if len(own[n]) > at]) for at in range(most)]
-    return Streams(windows, np.array(bits)[order], np.array(ends)[order], nth)
+    begins, stops, n_rows = (np.array(items)[order] for items in (bits, ends, rows))
+    return Streams(windows, begins, stops, n_rows, nth)
 
 
 def _joined(batch: Sequence[Lanes], field: Callable[[Lanes], NDArray[np.signedinteger]]) -> Ints:
@@ -94,7 +107,7 @@ def _joined(batch: Sequence[Lanes], field: Callable[[Lanes], NDArray[np.signedin
 
 
 def _read_leads(batch: Sequence[Lanes]) -> None:
-    n_rows = len(batch[0].out)
+    lengths = {len(lanes.out) for lanes in batch}
     sizes = [len(lanes.columns) for lanes in batch]
     every = np.ones(sum(sizes), np.bool_)
     streams = _streams(batch, lambda lanes: lanes.residuals, every)
@@ -105,10 +118,13 @@ def _read_leads(batch: Sequence[Lanes]) -> None:
     parents = _joined(batch, lambda lanes: lanes.predictors.parents)
     weights[parents < 0] = 0
     parents = np.where(parents < 0, 0, parents + firsts)
-    leads = np.empty((residual.BEHIND + n_rows, len(scales)), np.int64)
+    leads = np.empty((residual.BEHIND + max(lengths), len(scales)), np.int64)
     leads[: residual.BEHIND + 1] = _joined(batch, lambda lanes: lanes.predictors.first)
     residuals = np.zeros(len(scales), np.int64)
     for row in range(residual.BEHIND + 1, len(leads)):
+        if row - residual.BEHIND in lengths:  # what lanes of these segments have now is not used
+            streams.ended(row - residual.BEHIND).check("residuals")
+            streams = streams.longer(row - residual.BEHIND)
         for lanes in streams.lanes:
             residuals[lanes], scales[lanes] = _read_codes(streams, scales[lanes])
         if (streams.bits > streams.ends).any():
@@ -120,7 +136,7 @@ def _read_leads(batch: Sequence[Lanes]) -> None:
     streams.check("residuals")
     first = 0
     for own in batch:
-        own.leads[:] = leads[:, first : first + len(own.columns)]
+        own.leads[:] = leads[: len(own.leads), first : first + len(own.columns)]
         first += len(own.columns)
 
 
@@ -176,12 +192,11 @@ def _read_tails(batch: Sequence[Lanes]) -> None:
         first += len(lanes.columns)
     if is_odd.all():
         return
-    leads = np.concatenate([lanes.leads[residual.BEHIND :] for lanes in batch], axis=1)
-    ordinals = _read_digits(batch, leads.astype(np.int64), lattices, ~is_odd)
+    ordinals = _read_digits(batch, lattices, ~is_odd)
     first = 0
     for lanes in batch:
         usual = np.flatnonzero(~is_odd[first : first + len(lanes.columns)])
-        lanes.out[:, lanes.columns[usual]] = ordinals[:, first + usual]
+        lanes.out[:, lanes.columns[usual]] = ordinals[: len(lanes.out), first + usual]
         first += len(lanes.columns)
 
 
@@ -194,10 +209,15 @@ def _read_as_kernel(lanes: Lanes, group: int) -> None:
         raise fault_of("tails", "lane", fault)
 
 
-def _read_digits(
-    batch: Sequence[Lanes], leads: Ints, lattices: Ints, wanted: NDArray[np.bool_]
-) -> Ints:
-    """The ordinals of lanes whose tails are digits of one base alone, (rows, lanes)."""
+def _read_digits(batch: Sequence[Lanes], lattices: Ints, usual: NDArray[np.bool_]) -> Ints:
+    """The ordinals of lanes whose tails are digits of one base alone, ``usual``: (rows, lanes)."""
+    leads = np.zeros((max(len(lanes.out) for lanes in batch), len(lattices)), np.int64)
+    wanted = np.zeros(leads.shape, np.bool_)
+    first = 0
+    for lanes in batch:
+        rows, own = len(lanes.out), slice(first, first + len(lanes.columns))
+        leads[:rows, own], wanted[:rows, own] = lanes.leads[residual.BEHIND :], usual[own]
+        first += len(lanes.columns)
     base, leading = lattices[:, tail.BASE], lattices[:, tail.LEADING]
     minus = np.where(base > 0, leads >> 31, 0)
     sizes = leads ^ minus
@@ -210,9 +230,9 @@ def _read_digits(
     n = np.where((base > 0) & (sizes > 0) & wanted, lattices[:, tail.DIGITS] - digits, 0)
     tens = np.where(base == 10, n, 0)
     bits = np.where(base == 10, FEWEST_BITS[tens], np.where(base == 2, n, lattices[:, tail.DROP]))
-    bits = np.where((base == 10) & (sizes == 0), 0, bits)
+    bits = np.where(((base == 10) & (sizes == 0)) | ~wanted, 0, bits)
     long = np.where((base == 10) & (n > 0), FIRST_LONG[tens], NEVER)
-    streams = _streams(batch, lambda lanes: lanes.tails, wanted & (bits.max(axis=0) > 0))
+    streams = _streams(batch, lambda lanes: lanes.tails, usual & (bits.max(axis=0) > 0))
     tails = _read_bits(streams, bits, long, LONGER[tens])
     mantissas = np.where(base == 10, sizes * POWERS[tens], sizes << np.where(base == 2, n, 0))
     magnitudes = numbers * lattices[:, tail.PER_CLASS] + mantissas + tails
