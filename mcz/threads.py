@@ -10,6 +10,8 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from math import inf
+from time import perf_counter
 from typing import TypeVar
 
 from mcz.errors import OptionError
@@ -17,6 +19,9 @@ from mcz.errors import OptionError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+WORTH = 0.01  # seconds of work that threads are started for
+
+_PACES: dict[str, float] = {}  # seconds for one of an amount, the last time, by the kind of work
 _LIMIT: ContextVar[int | None] = ContextVar("threads", default=None)
 
 
@@ -47,6 +52,19 @@ def checked(threads: int | None) -> int | None:
     if threads is not None and threads < 1:
         raise OptionError(f"threads: {threads}, not at least 1")
     return threads
+
+
+@contextmanager
+def timed(kind: str, amount: int) -> Iterator[None]:
+    """Note how long work of some kind takes."""
+    start = perf_counter()
+    yield
+    _PACES[kind] = (perf_counter() - start) / max(amount, 1)
+
+
+def worthwhile(kind: str, amount: int, threads: int) -> int:
+    """``threads``, or 1 where so much work of this kind is done as soon as they are started."""
+    return threads if _PACES.get(kind, inf) * amount >= WORTH else 1
 
 
 def in_order(

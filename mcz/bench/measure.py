@@ -166,7 +166,7 @@ def work_of(
         spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
         n = len(layout.groups)
         exact = codec.exact(encoded.header, layout) if codec.exact else ()
-        for groups in (set(range(n)) - set(exact), exact):
+        for groups in filter(None, (set(range(n)) - set(exact), exact)):
             request = Request(0, layout.n_frames, tuple(sorted(groups)))
             codec.decode(
                 encoded.header,

@@ -24,7 +24,7 @@ from mcz.numbers import Grid, GridKind, values_of
 from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
 from mcz.reading.salvage import salvage
 from mcz.reading.signal_info import SignalInfo
-from mcz.threads import in_force, in_order
+from mcz.threads import in_force, in_order, timed, worthwhile
 from mcz.types import Values
 
 BLOCK_ROWS = 1024  # decoded at a time, at least
@@ -126,17 +126,19 @@ class SignalReader:
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
             self._decode(spans, start, stop)
-        per_frame = self.info.layout.samples_per_frame
+        per_frame, name = self.info.layout.samples_per_frame, self.info.codec.name
 
         def block(ends: tuple[int, int]) -> Block:
             a, b = ends
             own = None
             if out is not None and not self.info.is_integer:
                 own = out[(a - start) * per_frame : (b - start) * per_frame]
-            coded = self._decode(spans, a, b)
-            return Block(a, b, coded, *self._finish(coded, a, b, own))
+            with timed(name, math.prod(self._shape(a, b))):
+                coded = self._decode(spans, a, b)
+                return Block(a, b, coded, *self._finish(coded, a, b, own))
 
-        yield from in_order(block, list(self._ranges(start, stop)), self._threads)
+        threads = worthwhile(name, math.prod(self._shape(start, stop)), self._threads)
+        yield from in_order(block, list(self._ranges(start, stop)), threads)
 
     def _near(self, start: int, stop: int, out: Values) -> Iterator[Block]:
         """The same; a run of which the range has a part is decoded whole, and kept."""

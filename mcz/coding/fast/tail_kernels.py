@@ -127,6 +127,8 @@ def read_magnitude(data: Bytes, bit: int, lead: int, lattices: Ints2, lane: int)
 def read_whole(data: Bytes, bit: int, size: int, lattices: Ints2, lane: int) -> tuple[int, int]:
     """The magnitude of a decimal lead that may have all digits, and the bit behind its tail."""
     n = int(lattices[lane, DIGITS]) - decimal_digits(size)
+    if n == 0:
+        return int(lattices[lane, SHIFT]) + size, bit
     tail, bit = read_decimal_9(data, bit, n)
     magnitude = lattices[lane, SHIFT] - n * lattices[lane, PER_CLASS] + size * POWERS[n] + tail
     return (magnitude if n <= lattices[lane, TOP] else -1), bit  # FAST-44
