@@ -117,7 +117,7 @@ def _common_grid(
     for flags in sorted({GridFlag.POINT_ZERO, *(grid.flags for grid in grids)}):
         with suppress(OptionError):
             candidates.append(replace(guess, flags=flags))
-    for grid in dict.fromkeys(candidates):
+    for grid in dict.fromkeys(grid for grid in candidates if grid != guess):
         more = grid.ordinals_of_tokens(tokens)[1]
         if np.count_nonzero(more) > np.count_nonzero(printed):
             guess, printed = grid, more

@@ -93,10 +93,9 @@ class Tokens:
     def __getitem__(self, index: Any) -> Tokens:
         if isinstance(index, int | np.integer):
             raise TypeError("a single token is a slice of one, or token(i)")
-        start, stop, fields = (
-            np.ascontiguousarray(a[index]) for a in (self.start, self.stop, self.fields)
-        )
-        return Tokens(self.text, start, stop, fields, [values[index] for values in self.known])
+        fields = np.ascontiguousarray(self.fields[index])  # the rest is seldom looked at
+        known = [values[index] for values in self.known]
+        return Tokens(self.text, self.start[index], self.stop[index], fields, known)
 
     def token(self, index: int) -> bytes:
         """The text of one token."""
