@@ -21,8 +21,8 @@ SPARE_OUTPUT = 2**25  # bytes that an answer may have beyond what is expected
 # Classes of SPEC.md, "Classes of conformance": the codecs of each, None for all.
 CLASSES: dict[str, frozenset[str] | None] = {
     "core": frozenset({"raw", "fast"}),
-    "archival": frozenset({"raw", "fast", "best", "lossless"}),
-    "lossy": frozenset({"raw", "fast", "best", "lossless", "posewave"}),
+    "archival": frozenset({"raw", "fast", "best"}),
+    "lossy": frozenset({"raw", "fast", "best", "posewave"}),
     "research": None,
 }
 SIZES = {"<f8": 8, "<i8": 8, "u1": 1}  # bytes of a value

@@ -17,7 +17,6 @@ import mcz
 from mcz import codecs
 from mcz.codecs import raw
 from mcz.codecs.contract import Encoded
-from mcz.codecs.lossless import best
 from mcz.container import payloads
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH
@@ -48,7 +47,6 @@ EXTRA = (
     overlap_codec.CODEC,
     replace(raw.CODEC, id=253, name="running", encode=_running_encode),
     replace(raw.CODEC, id=254, name="one", grouping="all"),
-    replace(best.CODEC, id=252, name="joints", grouping="joint"),
 )
 LENGTH = {"overlap": "length"}  # else segment_frames
 
@@ -99,7 +97,7 @@ def check(whole: bytes, part: bytes, start: int, stop: int, joints: Any, resolut
                 assert canonical(piece) == canonical(found[a * one.layout.samples_per_frame :])
 
 
-CODECS = ("raw", "fast", "joints", "overlap", "running")
+CODECS = ("raw", "fast", "overlap", "running")
 
 
 def motion_for(codec: str) -> mcz.Motion:
@@ -125,8 +123,6 @@ def requests(draw: st.DrawFn) -> tuple[str, int, list[dict[str, Any]]]:
             n_frames = stop - start
         if draw(st.booleans()) or not how:
             kept = draw(st.lists(st.sampled_from(joints or JOINTS), unique=True))
-            if "knee" in kept and "spine" not in kept:
-                kept.append("spine")  # of which it is a copy
             how["joints"] = joints = tuple(kept)
         if resolutions > 1 and draw(st.booleans()):
             how["resolution"] = 1
@@ -210,15 +206,6 @@ def test_every_signal_is_cut_at_its_own_segments() -> None:
     check(out.getvalue(), part, 25, 30, None, 0)
     with mcz.open(part) as file:
         assert [(s.skip, s.spare) for s in file.clips["smooth"].signals] == [(5, 10), (25, 10)]
-
-
-def test_copies_need_the_joint_that_they_repeat() -> None:
-    whole = written(motion_for("joints"), "joints")
-    with pytest.raises(mcz.OptionError, match=r"copies of those of joint spine, which must be"):
-        extracted(whole, joints=["knee"])
-    part = extracted(whole, joints=["knee", "spine"])
-    check(whole, part, 0, 40, ["knee", "spine"], 0)
-    assert set(streams_of(part)) - set(streams_of(whole))  # the groups have new numbers
 
 
 def test_copies_of_a_joint_that_goes_are_coded_anew() -> None:

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.codecs import raw
-from mcz.codecs.lossless import best
 from mcz.codecs.wavelet import mrdwt
 from mcz.editing.recoding import recorded_options
 from mcz.errors import AccessError, MotionError, OptionError
@@ -47,7 +46,6 @@ def known_codecs(monkeypatch: pytest.MonkeyPatch) -> None:
     for codec in (
         overlap_codec.CODEC,
         replace(raw.CODEC, id=254, name="one", grouping="all"),
-        replace(best.CODEC, id=253, name="joints", grouping="joint"),
     ):
         monkeypatch.setitem(codecs.CODECS, codec.name, codec)
 
@@ -92,7 +90,7 @@ def test_the_joint_changes_and_nothing_else(case: str, joint: str) -> None:
     wave = np.round(10 * np.cos(np.arange(500) * 0.11), 4)
     new = np.round(values_of(data, joint) + wave[:, None], 4)
     after, found = edited(data, joint, new)
-    assert (found.clip, found.joint, found.codec, found.recoded) == ("smooth", joint, codec, ())
+    assert (found.clip, found.joint, found.codec) == ("smooth", joint, codec)
     check_others(data, after, joint)
     error = np.abs(values_of(after, joint) - new)
     assert found.max_error == error.max()
@@ -151,22 +149,19 @@ def _with_copies(n_frames: int = 300) -> Motion:
     return motion.with_values(values)
 
 
-def test_groups_that_repeat_the_joint_are_coded_anew_where_they_do() -> None:
-    data = written(_with_copies(), "joints", segment_frames=100)
+def test_joints_that_repeat_the_joint_keep_their_values() -> None:
+    data = written(_with_copies(), segment_frames=100)
     new = np.round(values_of(data, "spine") + 1, 4)
-    after, found = edited(data, "spine", new)
-    assert found.recoded == ("knee",)
+    after, _ = edited(data, "spine", new)
     assert np.array_equal(values_of(after, "knee"), values_of(data, "knee"))
     assert np.array_equal(values_of(after, "spine"), new)
     check_others(data, after, "spine")
 
 
-@pytest.mark.parametrize("codec", ["fast", "joints"])
-def test_a_joint_that_repeats_another_leaves_it_alone(codec: str) -> None:
-    data = written(_with_copies(), codec, segment_frames=100)
+def test_a_joint_that_repeats_another_leaves_it_alone() -> None:
+    data = written(_with_copies(), segment_frames=100)
     new = np.round(values_of(data, "knee") + 1, 4)
-    after, found = edited(data, "knee", new)
-    assert found.recoded == ()
+    after, _ = edited(data, "knee", new)
     check_others(data, after, "knee")
     assert np.array_equal(values_of(after, "knee"), new)
 
@@ -469,11 +464,9 @@ def test_a_stranger_among_copies() -> None:
     motion = smooth(50)
     values = motion.values.copy()
     values[:, 7] = values[:, 9] = values[:, 0]
-    data = written(motion.with_values(values), "joints")
-    after, found = edited(data, "hips", np.round(values[:, :6] + 1, 4))
-    assert set(found.recoded) == {"spine", "knee"}
+    data = written(motion.with_values(values))
+    after, _ = edited(data, "hips", np.round(values[:, :6] + 1, 4))
     assert np.array_equal(values_of(after)[:, 6:], values[:, 6:])
-    assert best.CODEC.regroup is not None
 
 
 @pytest.fixture

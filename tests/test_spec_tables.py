@@ -16,7 +16,6 @@ from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.online import kernels as online_kernels
 from mcz.codecs.posewave import header as posewave
 from mcz.coding import logistic, mixing, residuals, space_kernels
-from mcz.coding.ordinals import kernels as lossless_kernels
 from mcz.container.grammar import GRAMMAR
 from mcz.formats import FORMATS, amc, c3d_restore, trc
 from mcz.formats.c3d_layout import Kind
@@ -79,20 +78,6 @@ def test_contexts_of_residuals() -> None:
     assert f"There are {counts}." in words_of("Residuals")
 
 
-def test_contexts_of_lossless() -> None:
-    loops = lossless_kernels
-    assert table_after(section("Codec 128: lossless"), "| bit |") == [
-        ["SAME", str(loops.C_SAME), str(loops.M_SAME)],
-        ["UP", str(loops.C_UP), str(loops.M_UP)],
-        ["ZERO", str(loops.C_ZERO), str(loops.M_ZERO)],
-        ["FAR", str(loops.C_FAR), str(loops.M_FAR)],
-        ["MINUS", str(loops.C_MINUS), str(loops.M_MINUS)],
-        ["ZERO_SIGN", str(loops.C_MINUS + 32), str(loops.M_ZERO_SIGN)],
-        ["of residuals", str(loops.C_RESIDUAL), str(loops.M_RESIDUAL)],
-    ]
-    assert f"{loops.N_CONTEXTS} contexts and {loops.N_MIXERS} mixers" in WORDS
-
-
 def test_nodes_of_the_mixer() -> None:
     text = re.search(r"NODES = ([\d\s]+)", SPEC)
     assert text is not None
@@ -107,9 +92,6 @@ def test_nodes_of_the_mixer() -> None:
         ("Entropy coding", f"clamp(a.p, {mixing.LEAST_ONE}, {65536 - mixing.LEAST_ONE})"),
         ("Entropy coding", f"-2^{mixing.MAX_WEIGHT.bit_length() - 1}, 2^24)"),
         ("Residuals", "refuse if n > 53"),
-        ("Codec 128: lossless", f"refuse if t > {lossless_kernels.MAX_STEPS_LENGTH}"),
-        ("Codec 128: lossless", f"{lossless_kernels.DECIMAL_WIDTH} for base 10 and 44 for base 2"),
-        ("Codec 128: lossless", f"j = max(c - P, -{lossless_kernels.LAST_POWER})"),
     ],
 )
 def test_constants(heading: str, words: str) -> None:
@@ -117,8 +99,7 @@ def test_constants(heading: str, words: str) -> None:
 
 
 START = {  # annex: what the text says of each of its sets
-    "lossless": ["3376 contexts and 23 mixers"],
-    "best": ["2585 contexts and 17 mixers"],
+    "best": ["2568 contexts and 17 mixers"],
     "wavelet": 5 * ["2568 contexts and 17 mixers"],
     "qbc": ["2568 contexts, 17 mixers", "7736 contexts, 52 mixers"],
     "pca": ["7704 contexts, 51 mixers"],

@@ -20,7 +20,7 @@ from tools import known_answers as maker
 from tools.vectors.engine.edits import edited
 
 WRONG = 'CEND.value_sha256.0 = "vvvvvvvvvvvvvvvvvvvvvvvvvvvvvvvv"'
-OPTIONAL = {"raw", "fast", "lossless"}
+OPTIONAL = {"raw", "fast"}
 NAMES = sorted(CODECS)
 
 

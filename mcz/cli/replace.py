@@ -120,8 +120,6 @@ def command(
         before = f"{found.n_exceptions_before:,} before"
         line = f"  {plural(found.n_exceptions, 'number')} of the joint off the grid, {before}"
         echo(f"{line}; --on-grid rounds to it" if found.n_exceptions else line)
-    if found.recoded:
-        echo(f"  coded anew, as they repeated it: {' '.join(found.recoded)}")
     for text in found.left_out:
         say(f"left out: {text}")
     return Exit.FINE

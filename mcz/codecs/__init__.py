@@ -37,7 +37,6 @@ HOMES = {
     "mdtt": Home(20, 2, "spatial.mdtt"),
     "pca-rdo": Home(20, 3, "spatial.pca_rdo"),
     "online": Home(21, 0, "online.online"),
-    "lossless": Home(128, 0, "lossless.lossless"),
 }
 SHARED = {16: "wavelet"}  # ids of which no codec has the name of the bitstream
 PRIVATE = range(128, 256)  # ids that SPEC.md never gives a meaning

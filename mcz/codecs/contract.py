@@ -173,11 +173,6 @@ Decode = Callable[[bytes, Layout, Sequence[Span], Request, Fetch], Values]
 # first <= f < stop, both of them ends of segments, and with these groups, ascending.
 Cut = Callable[[bytes, Layout, int, int, tuple[int, ...]], bytes]
 
-# (stream, layout, group, numbers) -> the stream of a group where the groups that are left have the
-# new ``numbers``. Looking up a group that is left out raises; the message is the caller's.
-Regroup = Callable[[bytes, Layout, int, Mapping[int, int]], bytes]
-
-
 # (layout, span, groups, fetch) -> the streams of some groups of a segment, ascending, coded without
 # the others; ``fetch`` counts this segment as 0.
 Subset = Callable[[Layout, Span, Sequence[int], "Fetch"], tuple[bytes, ...]]
@@ -290,10 +285,9 @@ class Codec:
     is left is renumbered from 0. ``decode`` then is given the numbers of frames, groups and
     resolutions that are left, MUST give the same values as before, and takes details that are
     not stored as those that a request leaves out. ``cut`` makes the header fit where it says
-    something of frames or channels (None: it holds as it is); ``regroup`` a stream that names other
-    groups (None: none does). ``subset`` codes what is left of a segment anew, of a codec that codes
-    all groups together: it recodes all of them, too. All are given the layout before the cut, and
-    raise FormatError for bad bytes.
+    something of frames or channels (None: it holds as it is). ``subset`` codes what is left of a
+    segment anew, of a codec that codes all groups together: it recodes all of them, too. Both are
+    given the layout before the cut, and raise FormatError for bad bytes.
 
     ``positions``: it is made for positions of points; of a clip of channels it is given those of
     its points, unless its parameter ``domain`` says ``channels``. ``uses``: the models that a
@@ -304,10 +298,10 @@ class Codec:
     ``promise`` gives the targets that it meets where a caller asks for none and leaves its dial
     alone (None: none).
 
-    ``recode`` codes some groups anew (None: the codec cannot do that), of a codec with ``regroup``
-    in any of the segments, of others in all. ``preview`` says what can be read without decoding
-    the rest (None: nothing exactly). ``earlier`` has the ``decode`` of each earlier version.
-    ``hash_optional``: readers may omit to compare the value hash.
+    ``recode`` codes some groups anew in all segments (None: the codec cannot do that). ``preview``
+    says what can be read without decoding the rest (None: nothing exactly). ``earlier`` has the
+    ``decode`` of each earlier version. ``hash_optional``: readers may omit to compare the value
+    hash.
     """
 
     id: int
@@ -322,7 +316,6 @@ class Codec:
     dial: Dial | None = None
     promise: Callable[[Params], Settings] | None = None
     cut: Cut | None = None
-    regroup: Regroup | None = None
     subset: Subset | None = None
     recode: Recode | None = None
     preview: Preview | None = None
@@ -368,7 +361,7 @@ class Codec:
 
 def refuse_extras(name: str, header: bytes, layout: Layout) -> None:
     """Raise FormatError where a codec without header and resolutions is given some."""
-    if header:  # LOSS-01, RAW-01, FAST-01
+    if header:  # RAW-01, FAST-01
         raise FormatError(f"{name}: a header of {len(header)} bytes, which it does not have")
     if layout.n_resolutions != 1:  # CLIP-15
         raise FormatError(f"{name}: {layout.n_resolutions} resolutions, it has 1")

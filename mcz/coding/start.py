@@ -35,6 +35,6 @@ def start_state(table: Params) -> NDArray[np.int64]:
     rates = rate_table()
     state[mixing.RATES : mixing.RATES + len(rates)] = rates
     state[mixing.WEIGHTS : mixing.WEIGHTS + len(table["weights"])] = table["weights"]
-    state[mixing.MODELS :: 2] = probabilities.astype(np.int64) * 256 + 128  # LOSS-22
+    state[mixing.MODELS :: 2] = probabilities.astype(np.int64) * 256 + 128
     state[mixing.MODELS + 1 :: 2] = counts
     return state

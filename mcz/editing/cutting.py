@@ -277,25 +277,6 @@ def _signal_record(part: SignalCut, record: payloads.Signal) -> payloads.Signal:
     )
 
 
-class _Numbers(dict[int, int]):
-    """The new number of each group that is left."""
-
-    def __init__(self, part: SignalCut, name: str) -> None:
-        super().__init__({old: new for new, old in enumerate(part.groups)})
-        self._part, self._name = part, name
-
-    def __missing__(self, group: int) -> int:
-        layout = self._part.info.layout
-        skeleton = layout.skeleton
-        assert skeleton is not None
-        joint = joint_of_column(skeleton)[layout.groups[group][0]]
-        raise OptionError(
-            f"channels of the chosen joints are stored as copies of those "
-            f"of joint {skeleton.addresses()[joint]}, which must be extracted, too",
-            clip=self._name,
-        )
-
-
 class Unchanged:
     """The streams of a segment as they are; an edit has others."""
 
@@ -317,7 +298,6 @@ def cut_segment(
     row: SegmentRow,
     *,
     noted: bool,
-    name: str,
     edit: Unchanged = UNCHANGED,
 ) -> tuple[SegmentHeader, list[bytes], bytes]:
     """Header, streams and extension of what is left of a segment; ``noted``: with frame notes.
@@ -340,7 +320,6 @@ def cut_segment(
         if any(found) or (found and header.flags & flag):
             flags |= flag
             kept += found
-    left = _Numbers(part, name)
     if not part.has_all_groups and part.info.codec.subset is not None:
         span = Span(row.header.first, row.header.n_frames)
 
@@ -352,8 +331,6 @@ def cut_segment(
     for resolution in range(part.info.counts.n_resolutions - part.dropped):
         for group in part.groups:
             stream = streams[table.codec(resolution, group)]
-            if not part.has_all_groups and part.info.codec.regroup is not None:
-                stream = part.info.codec.regroup(stream, part.info.layout, group, left)
             kept.append(edit.coded(resolution, group, stream))
     return _cut_header(part, row, flags), kept, table.extension
 

@@ -232,7 +232,7 @@ class Copier(Carrier):
         self, cut: ClipCut, part: SignalCut, row: SegmentRow, *, noted: bool
     ) -> tuple[SegmentHeader, list[bytes], bytes]:
         """Header, streams and extension of what is left of a segment."""
-        return cut_segment(self.container, part, row, noted=noted, name=cut.clip.name)
+        return cut_segment(self.container, part, row, noted=noted)
 
     def write_anew(self, cut: ClipCut) -> None:
         """Write what is left of a clip, decoded and coded anew."""

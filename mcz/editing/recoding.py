@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcz.codecs.contract import Codec, Recoding, Request
 from mcz.codecs.parameters import TARGETS
-from mcz.editing.cutting import coded_together, groups_of, joint_of_column
+from mcz.editing.cutting import coded_together, groups_of
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
@@ -27,14 +27,13 @@ Streams = dict[tuple[int, int], tuple[bytes, ...]]  # (segment, group) -> by sto
 class Recoded:
     """One joint of a clip with other values, coded.
 
-    ``given`` is the motion as it was asked for, ``decoded`` as a reader has it now; ``others`` are
-    the joints that repeated this one. The sizes are those of the joint's own streams.
+    ``given`` is the motion as it was asked for, ``decoded`` as a reader has it now. The sizes are
+    those of the joint's own streams.
     """
 
     info: SignalInfo
     joint: int
     groups: tuple[int, ...]
-    others: tuple[int, ...]
     streams: Streams
     size: int
     size_before: int
@@ -67,15 +66,9 @@ def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool)
     signal = motion.signals[0]
     source = _source_of(clip, info, signal)
     reader = SignalReader(clip.container, info, tuple(range(len(info.layout.groups))), 0, clip.name)
-    dependents: dict[int, list[int]] = {}
-    if info.codec.subset is None:
-        dependents = _dependents(info, groups, reader)
-        streams = _streams(clip, info, source, groups, reader)
-    else:
-        streams = _streams(clip, info, source, reader.groups, reader)
-    for group, segments in dependents.items():
-        streams |= _streams(clip, info, source, (group,), reader, segments)
-    decoded = _decoded(info, signal, source, streams, (*groups, *dependents), reader)
+    coded = groups if info.codec.subset is None else reader.groups
+    streams = _streams(clip, info, source, coded, reader)
+    decoded = _decoded(info, signal, source, streams, groups, reader)
     n_segments = range(len(info.rows))
     n_resolutions = range(info.counts.n_resolutions)
     with np.errstate(invalid="ignore"):  # infinities
@@ -84,7 +77,6 @@ def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool)
         info=info,
         joint=edited.joint,
         groups=groups,
-        others=_joints_of(clip, info, dependents),
         streams=streams,
         size=sum(len(s) for g in groups for i in n_segments for s in streams[i, g]),
         size_before=sum(
@@ -145,11 +137,6 @@ def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...
     if info.codec.recode is None:
         raise OptionError(f"codec {info.codec.name} cannot code one joint anew")
     return groups
-
-
-def _joints_of(clip: Clip, info: SignalInfo, groups: Mapping[int, object]) -> tuple[int, ...]:
-    owners = joint_of_column(clip.skeleton)
-    return tuple(sorted({owners[c] for group in groups for c in info.layout.groups[group]}))
 
 
 def _checked(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDArray[np.float64]:
@@ -272,53 +259,20 @@ def _with_hidden(clip: Clip, info: SignalInfo, shown: Signal) -> Signal:
     )
 
 
-def _dependents(
-    info: SignalInfo, groups: Sequence[int], reader: SignalReader
-) -> dict[int, list[int]]:
-    """The groups that repeat channels of ``groups``, and in which segments."""
-    found: dict[int, list[int]] = {}
-    if info.codec.regroup is None:
-        return found
-    for segment in range(len(info.rows)):
-        for group in range(len(info.layout.groups)):
-            named = _Named()
-            stream = reader.fetch(segment, 0, group)
-            if group not in groups:
-                info.codec.regroup(stream, info.layout, group, named)
-            if not named.seen.isdisjoint(groups):
-                found.setdefault(group, []).append(segment)
-    return found
-
-
-class _Named(dict[int, int]):
-    """Numbers of groups as they are; ``seen`` are those that were looked up."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.seen: set[int] = set()
-
-    def __missing__(self, group: int) -> int:
-        self.seen.add(group)
-        return group
-
-
 def _streams(
     clip: Clip,
     info: SignalInfo,
     source: MemorySource,
     groups: tuple[int, ...],
     reader: SignalReader,
-    segments: Sequence[int] | None = None,
 ) -> Streams:
-    """The streams of ``groups`` in these segments (None: all)."""
+    """The streams of ``groups`` in all segments."""
     assert info.codec.recode is not None
-    numbers = range(len(info.rows)) if segments is None else segments
-    spans = [info.spans[number] for number in numbers]
-    options = recorded_options(info.codec, clip.quality or {})
+    spans, options = info.spans, recorded_options(info.codec, clip.quality or {})
     coded = info.codec.recode(Recoding(info.header, source, groups, spans, options, reader.fetch))
     return {
         (number, group): streams[at :: len(groups)]
-        for number, streams in zip(numbers, coded, strict=True)
+        for number, streams in enumerate(coded)
         for at, group in enumerate(groups)
     }
 

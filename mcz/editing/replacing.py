@@ -41,10 +41,9 @@ RECODED = "edit-recoded"
 class Replacement:
     """What ``replace`` did.
 
-    ``recoded``: the joints that stood in the file as copies of this one and were coded anew, their
-    values as before. The two numbers of bytes are those of the joint's streams, its masks and its
-    exceptions: numbers off the grid, which are counted, too. ``max_error``: how far a decoded value
-    is from the one that was given, at most, in source units.
+    The two numbers of bytes are those of the joint's streams, its masks and its exceptions: numbers
+    off the grid, which are counted, too. ``max_error``: how far a decoded value is from the one
+    that was given, at most, in source units.
 
     ``anew``: the whole clip was coded anew, and other joints are off by at most ``others_error``;
     the numbers of bytes are those of the clip then.
@@ -53,7 +52,6 @@ class Replacement:
     clip: str
     joint: str
     codec: str
-    recoded: tuple[str, ...]
     joint_bytes: int
     joint_bytes_before: int
     n_exceptions: int
@@ -137,7 +135,6 @@ class _Editor(Copier):
     """Copies a file, one joint of one clip replaced."""
 
     joint: int
-    others: tuple[int, ...] = ()
     anew = False
 
     def __init__(self, copying: Copying, clip: Clip) -> None:
@@ -156,7 +153,6 @@ class _Editor(Copier):
             clip=self.edited.name,
             joint=addresses[self.joint],
             codec=self.edited.codec,
-            recoded=tuple(addresses[other] for other in self.others),
             joint_bytes=self.after.size,
             joint_bytes_before=self.before.size,
             n_exceptions=self.after.n_exceptions,
@@ -174,7 +170,7 @@ class _StreamEditor(_Editor):
 
     def __init__(self, copying: Copying, clip: Clip, recoded: Recoded) -> None:
         super().__init__(copying, clip)
-        self.recoded, self.joint, self.others = recoded, recoded.joint, recoded.others
+        self.recoded, self.joint = recoded, recoded.joint
         self.before, self.after = _Sizes(recoded.size_before), _Sizes(recoded.size)
         self.max_error = recoded.max_error
         self._numbers = {row.offset: number for number, row in enumerate(recoded.info.rows)}
@@ -196,7 +192,7 @@ class _StreamEditor(_Editor):
         if self.is_same(cut) or part.info.index:
             return super().segment(cut, part, row, noted=noted)
         edit = _SegmentEdit(self, row, self._numbers[row.offset])
-        return cut_segment(self.container, part, row, noted=noted, name=cut.clip.name, edit=edit)
+        return cut_segment(self.container, part, row, noted=noted, edit=edit)
 
     def entries(self, cut: ClipCut, old: Mapping[str, str] | None) -> dict[str, str] | None:
         given, codec = self.recoded.given, self.recoded.info.codec

@@ -16,7 +16,6 @@ UNITS: dict[str, tuple[str, ...]] = {
     ),
     "best": (
         "mcz.coding.mixing",
-        "mcz.coding.ordinals.kernels",
         "mcz.codecs.table_kernels",
         "mcz.codecs.lossless.best_kernels",
     ),

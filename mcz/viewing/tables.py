@@ -16,7 +16,6 @@ ALWAYS = ("words.bin",)  # the names of joints are packed with them
 BASES = "pca_start.json"  # how models of bases are coded
 TABLES = {
     "raw": (),
-    "lossless": ("lossless_start.json",),
     "mrdwt": ("wavelet_start.json",),
     "qbc": ("qbc_start.json",),
     "pca": (BASES,),
@@ -27,7 +26,7 @@ TABLES = {
     "mdtt": ("window_start.json", BASES),
     "pca-rdo": ("window_start.json", BASES),
     "online": ("online_start.json", BASES),
-    "best": ("best_start.json", "lossless_start.json"),
+    "best": ("best_start.json",),
     "posewave": ("posewave_start.json",),
     "fast": (),
 }

@@ -50,7 +50,6 @@ PREFIX, WINDOW = {"coder": "prefix"}, {"window": 16}
 CHANNELS = {"step": 0.1, "domain": "channels"}
 CASES = {
     "raw": Case("raw"),
-    "lossless": Case("lossless"),
     "fast": Case("fast"),
     "best": Case("best"),
     "overlap": Case("overlap", 1e-12, {}, "length"),

@@ -12,13 +12,11 @@ from hypothesis import strategies as st
 
 from mcz.codecs import by_name
 from mcz.codecs.contract import Layout, Request, Span
-from mcz.codecs.lossless import best_streams
-from mcz.codecs.lossless.best_choices import choose_links
-from mcz.codecs.lossless.best_streams import LINKED, MAX_LINKS, Link
+from mcz.codecs.lossless.best_streams import AS_FAST, code_plan
+from mcz.codecs.lossless.references import choose_references
 from mcz.coding.fast import decoder
-from mcz.coding.fast.encoder import StreamBuilder
+from mcz.coding.fast.encoder import Plan, StreamBuilder
 from mcz.coding.forms import products
-from mcz.coding.ordinals.streams import build_stream, plan_stream
 from mcz.numbers import Grid, GridKind
 
 GRIDS = (
@@ -68,28 +66,30 @@ class Coder:
         return found[0]
 
 
-def linked(
-    columns: Ordinals, own: list[tuple[Grid, Grid]], links: list[Link] | None = None
+def plan_of(columns: Ordinals, own: list[tuple[Grid, Grid]]) -> Plan:
+    builder = StreamBuilder([clip for _, clip in own], [range(len(own))])
+    return builder.plan(columns, tuple(grid for grid, _ in own))
+
+
+def predicted(
+    columns: Ordinals, own: list[tuple[Grid, Grid]], references: list[list[int]] | None = None
 ) -> bytes:
-    """A stream of method 1 of ``best``, whether it is the shorter one or not."""
-    head, plans, coded = plan_stream(columns, own, 0, {})
-    if not plans:
-        return best_streams.build_stream(columns, own, 0, {})
-    links = links or [Link(*link) for link in choose_links(coded, plans, MAX_LINKS)]
-    links = links[: len(plans)]
-    bits = best_streams.code(coded, plans, links)
-    return bytes((LINKED,)) + head + b"".join(link.head() for link in links) + bits
+    """A stream of method 1 of ``best``, or of 0 where no channel is coded."""
+    plan = plan_of(columns, own)
+    if not len(plan.lanes.numbers):
+        return bytes((AS_FAST,)) + FAST.build(columns, own)
+    chosen = references or choose_references(plan.lanes.leads.T, 8, 4096)
+    return code_plan(plan, chosen[: len(plan.lanes.numbers)], [])
 
 
-LOSSLESS = Coder("lossless", lambda columns, own: build_stream(columns, own, 0, {}))
 FAST = Coder(
     "fast",
     lambda columns, own: StreamBuilder([clip for _, clip in own], [range(len(own))]).build(
         columns, tuple(grid for grid, _ in own)
     )[0],
 )
-BEST = Coder("best", linked)
-CODERS = (LOSSLESS, FAST, BEST)
+BEST = Coder("best", predicted)
+CODERS = (FAST, BEST)
 
 
 @st.composite

@@ -29,7 +29,7 @@ from tests.motions import smooth
 EVERY = pytest.mark.parametrize("name", CASES)
 FINITE = pytest.mark.parametrize("name", [n for n in CASES if n != "overlap"])
 LOSSY = pytest.mark.parametrize("name", [n for n in CASES if CASES[n].error > 1e-9])
-LOSSLESS = ("raw", "lossless", "fast", "best")
+LOSSLESS = ("raw", "fast", "best")
 CODEC = pytest.mark.parametrize("name", CODECS)
 LOSSY_CODEC = pytest.mark.parametrize("name", [n for n in CODECS if n not in LOSSLESS])
 

@@ -62,7 +62,7 @@ def test_what_a_column_hides_is_coded(name: str) -> None:
         data = saved(codec, motion)
         with mcz.open(data) as file:
             clip = file.only_clip()
-            plainly = 1.11 if codec == "fast" else 1  # its codes take a bit at least
+            plainly = 1.11 if codec == "fast" else 1.02  # codes take a bit at least; heads
             assert sum(row.size for row in clip.signals[0].rows) < most * plainly
             assert clip.read()[:, 0].tobytes() == values.tobytes()
 

@@ -2,7 +2,6 @@
 
 import * as best from "./codecs/best.js";
 import * as fast from "./codecs/fast.js";
-import * as lossless from "./codecs/lossless.js";
 import * as lsdtClip from "./codecs/lsdt-clip.js";
 import * as lsdtFrame from "./codecs/lsdt-frame.js";
 import * as online from "./codecs/online.js";
@@ -14,7 +13,7 @@ import * as wavelet from "./codecs/wavelet.js";
 import { Unsupported } from "./errors.js";
 
 const CODECS = new Map(
-  [raw, fast, best, posewave, wavelet, qbc, pca, lsdtFrame, lsdtClip, online, lossless].map(
+  [raw, fast, best, posewave, wavelet, qbc, pca, lsdtFrame, lsdtClip, online].map(
     (codec) => [codec.id, codec],
   ),
 );

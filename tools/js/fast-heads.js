@@ -26,7 +26,6 @@ const EXCEPTIONS = 64;
 const FORM = 128;
 
 const MAX_ORDINAL_BYTES = 8;
-const MAX_DROP = 32; // of plain forms
 const MAX_SCALE = 120;
 const TWO_15 = 2 ** 15;
 const TWO_31 = 2 ** 31;
@@ -165,7 +164,7 @@ function readCoded(reader, kind, grid, column, nRows) {
 }
 
 function checkForm(reader, form, drop, grid) {
-  const greatest = greatestDrop(form, MAX_DROP);
+  const greatest = greatestDrop(form);
   if (greatest < 0) reader.refuse(`form ${form}`); // FAST-29
   if (drop > greatest) reader.refuse(`form ${form} with a drop of ${drop}`); // FAST-30
   if (form === PRODUCTS && grid.kind !== GENERAL) {

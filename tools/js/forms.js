@@ -27,8 +27,8 @@ const CLASSES_53 = 117;
 export const NO_UNIT = { unit: 1, shifts: 0, law: null };
 
 /** B^j for 0 <= j <= 63; the last ones stand for "too large", and all are exact. */
-export const POWERS_OF_2 = Float64Array.from({ length: 64 }, (_, j) => 2 ** Math.min(j, 62));
-export const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) =>
+const POWERS_OF_2 = Float64Array.from({ length: 64 }, (_, j) => 2 ** Math.min(j, 62));
+const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) =>
   Number(`1e${Math.min(j, 18)}`),
 );
 
@@ -55,13 +55,13 @@ function readShifts(reader) {
   return shifts;
 }
 
-/** What follows the unit of counts; null for a sum that is not made. `counted`: the last ordinal. */
+/** What follows the unit of counts; null for a sum that is not made. */
 function readLaw(reader) {
   const parts = reader.u8();
   if (parts > 7) reader.refuse(`parts ${parts}`); // FAST-52
   const offset = parts & 1 ? readTerm(reader) : null;
   const shift = parts & 2 ? readTerm(reader) : null;
-  return { offset, shift, hasRests: (parts & 4) !== 0, counted: 0 };
+  return { offset, shift, hasRests: (parts & 4) !== 0 };
 }
 
 function readTerm(reader) {
@@ -98,9 +98,9 @@ export function formOf(grid) {
   }
 }
 
-/** Greatest `drop` of a form, given that of plain ones; -1 where there is no such form. */
-export function greatestDrop(form, ofPlain) {
-  if (form === PLAIN) return ofPlain;
+/** Greatest `drop` of a form; -1 where there is no such form. */
+export function greatestDrop(form) {
+  if (form === PLAIN) return 32;
   if (form <= 15 || hasUnit(form)) return 0;
   if (form === CLASSES_24) return 22;
   if (form === CLASSES_53) return 51;
@@ -113,7 +113,7 @@ export function greatestTop(form) {
 }
 
 /** What follows from a head for numbers in classes; it means nothing for plain forms. */
-export function classesOf({ form, drop, top }) {
+export function classesOf({ form, drop }) {
   const decimal = form <= 15;
   const nDigits = decimal ? form : form - 64 - drop; // P
   const least = decimal ? 10 ** (form - 1) : 2 ** (nDigits - 1); // L
@@ -122,10 +122,7 @@ export function classesOf({ form, drop, top }) {
     nDigits,
     least,
     powers: decimal ? POWERS_OF_10 : POWERS_OF_2,
-    width: decimal ? 13 : 44, // W
-    greatest: (decimal ? 10 : 2) * least - 1, // B * L - 1
     perClass: (decimal ? 9 : 1) * least, // K
-    small: (top + 1) * (decimal ? 9 : 1) * least * 2 ** drop < 2 ** 53, // all magnitudes
   };
 }
 

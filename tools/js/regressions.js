@@ -36,8 +36,8 @@ export class Learner {
     return bounded(total);
   }
 
-  /** Takes in, in row r, what the target was, and what was guessed. */
-  learn(r, target, guess, due) {
+  /** Takes in, in row r, what the target was, and what was guessed. BEST-18 */
+  learn(r, target, guess) {
     const { n, features, sums, keep, weighted, typical } = this;
     const e = target - guess;
     const g = 1 / (typical * typical + 0.3 * (e * e) + 1e-9);
@@ -47,10 +47,10 @@ export class Learner {
       const at = i * (n + 1);
       for (let j = i; j <= n; j++) sums[at + j] = keep * sums[at + j] + features[i] * weighted[j];
     }
-    if (due) this.solve();
     this.typical = typical + (Math.abs(e) - typical) * (r < 20 ? 0.2 : 0.05);
   }
 
+  /** Fits the weights to the sums. */
   solve() {
     const { n, ridge, weights, work } = this;
     const width = n + 1;

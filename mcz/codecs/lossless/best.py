@@ -1,41 +1,60 @@
-"""Codec mrdwt, ``best``: ordinals predicted by regressions that are learned while they are used.
+"""Codec best: the leads of fast, predicted by regressions that learn while they are used.
 
 SPEC.md, "Codec 2: best", is normative; the names below are its field names.
 
 Exactness: lossless and bit-exact. Predictions are binary64 in one stated order, of ``+ - * /`` and
-rounding down alone; all else is in integers. A stream holds all channels of a segment, so that each
-can look at those before it, and needs no other.
+rounding down alone; all else is in integers. A signal is one group, so that each channel can be
+predicted from those before it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
     Codec,
     Encoded,
     Fetch,
     Layout,
+    Recoding,
     Request,
     SignalSource,
     Span,
     refuse_extras,
 )
-from mcz.codecs.lossless import copying
-from mcz.codecs.lossless.best_streams import build_stream, parse_stream
-from mcz.codecs.lossless.copying import Ints
-from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
-from mcz.codecs.segments import Sizing
+from mcz.codecs.lossless.best_streams import build_stream, read_stream
+from mcz.codecs.lossless.segments import segment_frames
+from mcz.codecs.segments import Sizing, gather, guessing
+from mcz.coding.fast.decoder import MOST_ROWS, Shape, check_size
+from mcz.errors import FormatError
 from mcz.threads import in_force
 from mcz.types import Params
 
-SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MAX_ROWS, spare=1, full=True)
+Ints = NDArray[np.int64]
+
+SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MOST_ROWS, spare=1, full=True)
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    return copying.encode_streams(source, params, SIZING, build_stream, in_force())
+    prepare = partial(_prepare, source)
+    return Encoded(b"", guessing(source, params["segment_frames"], SIZING, prepare, in_force()))
+
+
+def _prepare(source: SignalSource, start: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
+    """The making of the streams of a segment."""
+    layout, grids, ordinals = source.layout, source.grids(start), source.ordinals(start, stop)
+    return lambda: tuple(build_stream(ordinals, grids, layout) for _ in layout.groups)
+
+
+def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+    """The streams of all segments with new values."""
+    for span in asked.spans:
+        yield _prepare(asked.source, span.first, span.stop)()
 
 
 def decode(
@@ -43,12 +62,18 @@ def decode(
 ) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("best", header, layout)  # BEST-01
-    return copying.decode_streams(layout, spans, request, fetch, parse_stream)
+    if len(layout.groups) > 1:  # BEST-02
+        raise FormatError(f"best: {len(layout.groups)} groups of channels")
+    shape = Shape(layout.grids, layout.groups)
 
+    def rows(index: int, group: int) -> Ints:
+        n_rows = spans[index].n_frames * layout.samples_per_frame
+        check_size(n_rows, layout.n_channels, spans[index].n_frames)
+        out = np.empty((n_rows, layout.n_channels), np.int64)
+        read_stream(shape, fetch(index, 0, group), out)
+        return out
 
-def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
-    """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
-    return stream[:1] + copying.regroup(stream[1:], layout, group, numbers)
+    return gather(layout, spans, request, rows)
 
 
 CODEC = Codec(
@@ -60,7 +85,6 @@ CODEC = Codec(
     grouping="all",
     encode=encode,
     decode=decode,
-    regroup=regroup,
-    recode=partial(copying.recode_streams, build_stream),
-    parameters=(segment_frames("57,000"),),
+    recode=recode,
+    parameters=(segment_frames("57,000", MOST_ROWS),),
 )

@@ -1,266 +1,278 @@
-"""Compiled: the rows of one group, coded by ``best``.
+"""Compiled: the leads and tails of a segment, coded by ``best``.
 
-SPEC.md, "Codec 2: best", is normative and has the steps below in the same order. One function
-serves encoder and decoder. Imported on first use only.
+SPEC.md, "Codec 2: best", is normative and has the steps below in the same order. The functions
+that code serve encoder and decoder. Imported on first use only.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from mcz.codecs.lossless.best_numbers import code_number
-from mcz.coding.ordinals.kernels import (
-    BAD,
-    FAST,
-    LAST,
-    NEAR,
-    OTHER,
-    SCALE,
-    SIDE_1,
-    SLOW,
-    TRACK_SIZE,
-    predict,
-)
-from mcz.coding.regression import (
-    LIMIT,
-    bounded,
-    estimate,
-    follow,
-    solve,
-    take_in,
-    weight_of,
-    width_of,
-)
-from mcz.kernels import kernel
-from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
+from mcz.coding.fast.residual_kernels import BEHIND, Predictors, is_read
+from mcz.coding.fast.survey_kernels import CodedLanes
+from mcz.coding.fast.tail_kernels import REST, Tails, read_ordinal, settle
+from mcz.coding.fast.write_kernels import put_tail
+from mcz.coding.mixing import number
+from mcz.coding.regression import LIMIT, Regressions, bounded, estimate, learn, solve
+from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
+from mcz.kernels import kernel, wrapped
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2, Words2
 
-# Columns of ``links``, one row a coded channel: powers of two that its steps and levels are
-# counted in, where its sums begin, how many other channels it looks at, and which.
-UNIT, REACH, NEAR_SUMS, BENT_SUMS, N_SEEN, SEEN = range(6)
-MAX_SEEN = 8
-LINKS_SIZE = SEEN + MAX_SEEN
+# A row of references, of one channel: their number, then they.
+MOST_REFERENCES, MOST_IN_ALL, COUNT_BITS = 8, 4096, 4
 
-# The three regressions of a channel, and the figures of each.
-NEARBY, BENT, FINAL = range(3)
-NEARBY_LAGS, NEARBY_SEEN = 4, 6
-BENT_LAGS = 3
-MOST_NEARBY = NEARBY_LAGS + 2 * NEARBY_SEEN
-MOST_BENT = BENT_LAGS + MAX_SEEN + MAX_SEEN * (MAX_SEEN + 1) // 2
-N_FINAL = 3
+# The regressions of a channel, and the figures of each.
+LINEAR, QUADRATIC, BLEND = range(3)
+N_KINDS = 3
 KEEP = 0.95, 0.998, 0.98
 RIDGE = 0.01, 0.001, 0.01
-FIRST_ROWS = 8  # in which the final regression is not asked
-OFTEN_ROWS = 64  # in which the bent one is solved every other row, later every fourth
+LINEAR_LAGS, LINEAR_REFERENCES, QUADRATIC_LAGS, N_BLENDED = 4, 6, 3, 3
+FIRST_ROWS = 8  # in which the blend is not asked
+UNIT_BITS = 2  # a unit is about four times the first scale
+REACH = 64.0  # units that a level is counted in
 
-# Columns of ``steps``: now and before; of ``levels``: now, before, and the first value.
-STEPS = NEARBY_LAGS + 1
-NOW, BEFORE, FIRST = range(3)
-FARTHEST = 17592186044416.0  # 2^44
-
-
-def sizes_of(n_seen: int) -> tuple[int, int]:
-    """How many numbers the sums of the first two regressions are."""
-    near, bent = n_nearby(n_seen), n_bent(n_seen)
-    return near * width_of(near), bent * width_of(bent)
+FAST, SLOW, SIDE_1, SIDE_2 = range(4)  # columns of memories, a row a channel
+NEAR, OTHER = range(2)  # of what is remembered of a row
+STEPS = LINEAR_LAGS + 1
+NOW, BEFORE = range(2)
+LEAST_WORD, MOST_WORD = -2147483648.0, 2147483647.0
+RESIDUALS = 0, 0  # first context and mixer
 
 
-def n_nearby(n_seen: int) -> int:
-    return NEARBY_LAGS + 2 * min(n_seen, NEARBY_SEEN)
+class Rests(NamedTuple):
+    """What counts are off, (rows, channels), and first scales, -1 of a channel without rests."""
+
+    values: Words2
+    scales: Ints
 
 
-def n_bent(n_seen: int) -> int:
-    return BENT_LAGS + n_seen + n_seen * (n_seen + 1) // 2
+def n_linear(n_references: int) -> int:
+    return LINEAR_LAGS + 2 * min(n_references, LINEAR_REFERENCES)
 
 
-def look_nearby(features: Floats, link: Ints, channel: int, steps: Floats2) -> None:
-    """The features of the first regression: steps, a row's own and those of others."""
-    n_seen = min(link[N_SEEN], NEARBY_SEEN)
-    for lag in range(NEARBY_LAGS):
+def n_quadratic(n_references: int) -> int:
+    return QUADRATIC_LAGS + n_references + n_references * (n_references + 1) // 2
+
+
+@kernel
+def code_references(state: Ints, data: Bytes, references: Ints2) -> int:
+    """Code the references of all channels; return how many they are, -1 where one is bad."""
+    total = 0
+    for channel in range(1, len(references)):
+        own = references[channel]
+        own[0] = number(state, data, own[0], COUNT_BITS)  # BEST-08
+        if own[0] > MOST_REFERENCES:  # BEST-09
+            return -1
+        total += own[0]
+        if total > MOST_IN_ALL:  # BEST-11
+            return -1
+        for place in range(1, own[0] + 1):
+            own[place] = number(state, data, own[place], bits(channel - 1))
+            if own[place] >= channel:  # BEST-10
+                return -1
+    return total
+
+
+def set_linear(features: Floats, own: Ints, channel: int, steps: Floats2) -> None:
+    """The features of LINEAR: steps, a channel's own and those of its references."""
+    n = min(own[0], LINEAR_REFERENCES)
+    for lag in range(LINEAR_LAGS):
         features[lag] = steps[channel, 1 + lag]
-    for i in range(n_seen):
-        features[NEARBY_LAGS + i] = steps[link[SEEN + i], 0]
-        features[NEARBY_LAGS + n_seen + i] = steps[link[SEEN + i], 1]
+    for i in range(n):
+        features[LINEAR_LAGS + i] = steps[own[1 + i], 0]
+        features[LINEAR_LAGS + n + i] = steps[own[1 + i], 1]
 
 
-def look_bent(
-    features: Floats, link: Ints, channel: int, steps: Floats2, levels: Floats2, ratio: float
+def set_quadratic(
+    features: Floats, own: Ints, channel: int, steps: Floats2, levels: Floats2
 ) -> None:
-    """Those of the second: steps, and the steps of products of two levels."""
-    n_seen = link[N_SEEN]
-    for lag in range(BENT_LAGS):
+    """Those of QUADRATIC: steps, and the steps of products of two levels."""
+    n = own[0]
+    for lag in range(QUADRATIC_LAGS):
         features[lag] = steps[channel, 1 + lag]
-    at = BENT_LAGS + n_seen
-    for i in range(n_seen):
-        one = link[SEEN + i]
-        features[BENT_LAGS + i] = steps[one, 0]
-        for j in range(i, n_seen):
-            other = link[SEEN + j]
-            step = (
-                levels[one, NOW] * levels[other, NOW] - levels[one, BEFORE] * levels[other, BEFORE]
-            )
-            features[at] = step * ratio
+    at = QUADRATIC_LAGS + n
+    for i in range(n):
+        one = own[1 + i]
+        features[QUADRATIC_LAGS + i] = steps[one, 0]
+        for j in range(i, n):
+            two = own[1 + j]
+            step = levels[one, NOW] * levels[two, NOW] - levels[one, BEFORE] * levels[two, BEFORE]
+            features[at] = step * REACH
             at += 1
 
 
-def to_next_row(steps: Floats2, levels: Floats2) -> None:
-    for channel in range(len(steps)):
-        for lag in range(STEPS - 1, 0, -1):
-            steps[channel, lag] = steps[channel, lag - 1]
-        levels[channel, BEFORE] = levels[channel, NOW]
+def expected_step(lanes: Predictors, leads: Words2, row: int, channel: int) -> int:
+    """The step that the taps of fast expect after a row of ``leads``."""
+    total = 16
+    for lag in range(BEHIND):
+        total += int(lanes.behind[lag, channel]) * int(leads[row - 1 - lag, channel])
+    return wrapped(total) >> 5
 
 
-def foresee(opinions: Floats, weights: Floats, row: int) -> float:
-    """The step that is expected, of what the two regressions and the taps say."""
-    return opinions[FINAL] if row < FIRST_ROWS else estimate(weights, opinions, N_FINAL)
+def code_miss(state: Ints, data: Bytes, miss: int, memory: Ints, flow: Ints) -> int:
+    """Code a lead less what was predicted; FAULT where it is too long."""
+    near = clamp(flow[NEAR] + 3, 0, 7)
+    sides = memory[SIDE_1], memory[SIDE_2], flow[OTHER]
+    scales = memory[FAST], memory[SLOW]
+    return code_residual(state, data, miss, 0, scales, near, sides, RESIDUALS)
 
 
-def learn(
-    sums: Floats,
-    weights: Floats,
-    features: Floats,
-    which: int,
-    n: int,
-    target: float,
-    guess: float,
-    typical: Floats,
-    row: int,
-    due: bool,
-    work: Floats,
-    top: Floats,
-    weighted: Floats,
-) -> None:
-    """Teach a regression, its sums, weights and features, what the step was that it guessed."""
-    keep, ridge = KEEP[which], RIDGE[which]
-    error = target - guess  # BEST-11
-    take_in(sums, features, n, target, weight_of(error, typical[which]), keep, weighted)
-    if due:
-        solve(sums, weights, n, ridge, work, top)
-    typical[which] = follow(typical[which], error, row)
+def remember(miss: int, memory: Ints) -> None:
+    size = 16 * abs(miss)  # BEST-15
+    memory[FAST] += (size - memory[FAST]) >> 1
+    memory[SLOW] += (size - memory[SLOW]) >> 5
+    memory[SIDE_2], memory[SIDE_1] = memory[SIDE_1], side_of(miss)
 
 
-def is_due(row: int, channel: int) -> bool:
-    """Whether the second regression is solved."""
-    return row % 2 == 0 if row < OFTEN_ROWS else (row + channel) % 4 == 0
+def code_rest(state: Ints, data: Bytes, rest: int, memory: Ints, flow: Ints) -> int:
+    """Code what a count is off; FAULT where it is too long."""
+    found = code_miss(state, data, rest, memory, flow)
+    if found == FAULT or found >> 31 != found >> 63:  # BEST-14
+        return FAULT
+    remember(found, memory)  # BEST-13
+    return found
 
 
-def echo_of(ordinals: Ints2, place: int) -> int:
-    """The number at ``place``, counted through from 1; of the other sign where that is below 0."""
+def echo_of(leads: Words2, place: int) -> int:
+    """The lead at ``place``, counted through from 1; of the other sign where that is below 0."""
     at = abs(place) - 1
-    found = int(ordinals[at // ordinals.shape[1], at % ordinals.shape[1]])
+    n_channels = leads.shape[1]
+    found = int(leads[BEHIND + at // n_channels, at % n_channels])
     return found if place > 0 else -1 - found
 
 
 @kernel
-def code_rows(
+def code_leads(
     state: Ints,
     data: Bytes,
-    ordinals: Ints2,
-    plans: Ints2,
-    powers: Ints2,
-    links: Ints2,
-    n_sums: int,
+    lanes: Predictors,
+    references: Ints2,
+    own: Regressions,
     echoes: Ints2,
+    leads: Words2,
+    rests: Rests,
 ) -> int:
-    """Code all rows of (n_rows, n_channels) ordinals in place; return the row of a fault or -1.
+    """Code rests, and all rows but the first of ``leads``, in place; return a bad row or -1.
 
-    ``powers`` has the powers of 2 in row 0 and those of 10 in row 1; ``n_sums`` is where the sums
-    of all channels end. ``echoes`` are those of ``table_of``.
+    ``leads`` (BEHIND + rows, channels): the first rows are those before the first. ``own``:
+    N_KINDS regressions a channel. ``echoes``: those of ``table_of``.
     """
-    n_channels = len(plans)
-    tracks = np.zeros((n_channels, TRACK_SIZE), np.int64)
-    tracks[:, FAST] = tracks[:, SLOW] = plans[:, SCALE]
-    flow = np.zeros(3, np.int64)
-    sums = np.zeros(n_sums, np.float64)
-    final_sums = np.zeros((n_channels, N_FINAL * width_of(N_FINAL)), np.float64)
-    near_weights = np.zeros((n_channels, MOST_NEARBY), np.float64)
-    bent_weights = np.zeros((n_channels, MOST_BENT), np.float64)
-    final_weights = np.zeros((n_channels, N_FINAL), np.float64)
-    typical = np.zeros((n_channels, 3), np.float64)
-    typical[:, :] = 1.0
+    n_channels = leads.shape[1]
+    memories, rest_memories = (
+        np.zeros((n_channels, 4), np.int64),
+        np.zeros((n_channels, 4), np.int64),
+    )
+    units = np.zeros(n_channels, np.float64)
+    for channel in range(n_channels):
+        memories[channel, FAST] = memories[channel, SLOW] = lanes.scales[channel]
+        rest_memories[channel, FAST] = rest_memories[channel, SLOW] = rests.scales[channel]
+        units[channel] = float(1 << (bits(lanes.scales[channel] >> 4) + UNIT_BITS))
+        for row in range(BEHIND + 1):
+            leads[row, channel] = lanes.first[channel]
+    flow = np.zeros(2, np.int64)
     steps = np.zeros((n_channels, STEPS), np.float64)
-    levels = np.zeros((n_channels, 3), np.float64)
-    near, bent = np.zeros(MOST_NEARBY, np.float64), np.zeros(MOST_BENT, np.float64)
-    opinions = np.zeros(N_FINAL, np.float64)
-    work = np.zeros(MOST_BENT * width_of(MOST_BENT), np.float64)
-    top, weighted = np.zeros(64, np.float64), np.zeros(64, np.float64)
-    for row in range(len(ordinals)):
+    levels = np.zeros((n_channels, 2), np.float64)
+    linear = np.zeros(own.weights.shape[1], np.float64)
+    quadratic = np.zeros(own.weights.shape[1], np.float64)
+    opinions = np.zeros(N_BLENDED, np.float64)
+    for row in range(len(leads) - BEHIND):
         flow[NEAR], flow[OTHER] = 0, 3
-        to_next_row(steps, levels)
         for channel in range(n_channels):
-            if len(echoes) > 0 and echoes[row, channel] != 0:  # BEST-23
-                ordinals[row, channel] = echo_of(ordinals, echoes[row, channel])
-                steps[channel, 0] = 0.0
-                continue
-            plan, track, link = plans[channel], tracks[channel], links[channel]
-            unit, reach = float(powers[0, link[UNIT]]), float(powers[0, link[REACH]])
-            n_near, n_bend = n_nearby(link[N_SEEN]), n_bent(link[N_SEEN])
-            last = float(track[LAST])  # BEST-10
-            look_nearby(near, link, channel, steps)
-            look_bent(bent, link, channel, steps, levels, reach / unit)
-            opinions[NEARBY] = estimate(near_weights[channel], near, n_near)
-            opinions[BENT] = estimate(bent_weights[channel], bent, n_bend)
-            opinions[FINAL] = bounded((float(predict(plan, track)) - last) / unit)
-            guess = foresee(opinions, final_weights[channel], row)
-            place = np.floor(last + guess * unit + 0.5)
-            predicted = int(min(max(place, -FARTHEST), FARTHEST))
-            given = ordinals[row, channel]
-            found = code_number(state, data, given, predicted, plan, track, flow, powers)
-            if flow[BAD]:
-                return row
-            ordinals[row, channel] = found
-            flow[OTHER] = track[SIDE_1]
-            value = float(track[LAST])
+            for lag in range(STEPS - 1, 0, -1):
+                steps[channel, lag] = steps[channel, lag - 1]
+            levels[channel, BEFORE] = levels[channel, NOW]
+        for channel in range(n_channels):
+            if rests.scales[channel] >= 0:
+                rest = int(rests.values[row, channel])
+                rest = code_rest(state, data, rest, rest_memories[channel], flow)
+                if rest == FAULT:
+                    return row
+                rests.values[row, channel] = wrapped(rest)
             if row == 0:
-                levels[channel, FIRST] = value
                 continue
-            step = min(max((value - last) / unit, -LIMIT), LIMIT)
+            index, unit = N_KINDS * channel, units[channel]
+            last, first = float(leads[BEHIND + row - 1, channel]), float(lanes.first[channel])
+            is_echo = len(echoes) > 0 and echoes[row, channel] != 0
+            guess = 0.0
+            if is_echo:  # BEST-24
+                leads[BEHIND + row, channel] = wrapped(echo_of(leads, echoes[row, channel]))
+            else:
+                set_linear(linear, references[channel], channel, steps)  # BEST-17
+                set_quadratic(quadratic, references[channel], channel, steps, levels)
+                opinions[LINEAR] = estimate(own, index + LINEAR, linear)
+                opinions[QUADRATIC] = estimate(own, index + QUADRATIC, quadratic)
+                taps = expected_step(lanes, leads, BEHIND + row, channel)
+                opinions[BLEND] = bounded(float(taps) / unit)
+                guess = opinions[BLEND]
+                if row >= FIRST_ROWS:
+                    guess = estimate(own, index + BLEND, opinions)
+                place = np.floor(last + guess * unit + 0.5)
+                predicted = int(min(max(place, LEAST_WORD), MOST_WORD))
+                given = int(leads[BEHIND + row, channel])
+                miss = code_miss(state, data, given - predicted, memories[channel], flow)
+                lead = predicted + miss
+                if miss == FAULT or lead >> 31 != lead >> 63:  # BEST-16
+                    return row
+                size = bits(16 * abs(miss))
+                flow[NEAR] = (flow[NEAR] + size - bits(memories[channel, SLOW])) >> 1
+                remember(miss, memories[channel])
+                flow[OTHER] = memories[channel, SIDE_1]
+                leads[BEHIND + row, channel] = wrapped(lead)
+            lead_now = float(leads[BEHIND + row, channel])
+            step = min(max((lead_now - last) / unit, -LIMIT), LIMIT)
             steps[channel, 0] = step
-            levels[channel, NOW] = (value - levels[channel, FIRST]) / reach
-            at, end = link[NEAR_SUMS], link[BENT_SUMS]
-            learn(
-                sums[at:end],
-                near_weights[channel],
-                near,
-                NEARBY,
-                n_near,
-                step,
-                opinions[NEARBY],
-                typical[channel],
-                row,
-                True,
-                work,
-                top,
-                weighted,
-            )
-            own = sums[end : end + n_bend * width_of(n_bend)]
-            learn(
-                own,
-                bent_weights[channel],
-                bent,
-                BENT,
-                n_bend,
-                step,
-                opinions[BENT],
-                typical[channel],
-                row,
-                is_due(row, channel),
-                work,
-                top,
-                weighted,
-            )
-            learn(
-                final_sums[channel],
-                final_weights[channel],
-                opinions,
-                FINAL,
-                N_FINAL,
-                step,
-                guess,
-                typical[channel],
-                row,
-                True,
-                work,
-                top,
-                weighted,
-            )
+            levels[channel, NOW] = (lead_now - first) / (REACH * unit)
+            if is_echo:
+                continue
+            learn(own, index + LINEAR, linear, step, opinions[LINEAR], KEEP[LINEAR], row)
+            solve(own, index + LINEAR, RIDGE[LINEAR])
+            at = index + QUADRATIC
+            learn(own, at, quadratic, step, opinions[QUADRATIC], KEEP[QUADRATIC], row)
+            if (row + channel) % 2 == 0:
+                solve(own, at, RIDGE[QUADRATIC])
+            learn(own, index + BLEND, opinions, step, guess, KEEP[BLEND], row)
+            solve(own, index + BLEND, RIDGE[BLEND])
     return -1
+
+
+@kernel
+def read_ordinals(tails: Tails, lattices: Ints2, leads: Words2, echoes: Ints2, out: Ints2) -> int:
+    """Fill columns of ``out`` (rows, channels) from ``leads`` (rows, lanes) and tails.
+
+    Returns the lane that has no tail, -2 where bits are left, or -1.
+    """
+    bit, end = tails.bits[0], tails.ends[0]
+    columns = tails.columns
+    n_lanes = len(lattices)
+    for lane in range(n_lanes):
+        settle(lattices, lane)
+    for row in range(len(out)):
+        for lane in range(n_lanes):
+            place = echoes[row, lane] if len(echoes) > 0 else 0
+            if place != 0:  # BEST-24
+                at = abs(place) - 1
+                ordinal = int(out[at // n_lanes, columns[at % n_lanes]])
+                out[row, columns[lane]] = ordinal if place > 0 else -1 - ordinal
+                continue
+            ordinal, bit = read_ordinal(tails.data, bit, int(leads[row, lane]), lattices, lane)
+            if bit < 0 or bit > end:
+                return lane
+            out[row, columns[lane]] = ordinal
+    return -1 if is_read(tails.data, bit, end) else -2
+
+
+@kernel
+def write_tails(lanes: CodedLanes, columns: Ints2, echoes: Ints2, out: Bytes) -> int:
+    """Write the tails of lanes that have no rests, one group; returns their bytes."""
+    out[0] = 0
+    bit = 0
+    for row in range(columns.shape[1]):
+        for lane in range(len(lanes.numbers)):
+            is_echo = len(echoes) > 0 and echoes[row, lane] != 0
+            if is_echo or lanes.lattices[lane, REST] >= 0:
+                continue
+            tail, lead = columns[lanes.numbers[lane], row], int(lanes.leads[lane, row])
+            bit = put_tail(out, bit, tail, lead, lanes.lattices, lane)
+    return (bit + 7) >> 3

@@ -1,4 +1,4 @@
-"""The stream of a group of best: heads as lossless has them, echoes, links, then bits.
+"""The stream of a segment of best: heads and tails as fast has them, and other residuals.
 
 SPEC.md, "Codec 2: best", is normative; the names below are its field names.
 """
@@ -6,176 +6,174 @@ SPEC.md, "Codec 2: best", is normative; the names below are its field names.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.lossless.best_choices import choose_links
+from mcz.codecs.contract import Layout
 from mcz.codecs.lossless.echoes import Echo, build_echoes, find_echoes, read_echoes, table_of
-from mcz.coding.ordinals import streams
-from mcz.coding.ordinals.heads import CODED, read_heads
-from mcz.coding.ordinals.streams import Own, Seen, plan_stream, powers
+from mcz.codecs.lossless.references import choose_references
+from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
+from mcz.coding.fast.encoder import Plan, StreamBuilder
+from mcz.coding.fast.encoder import kernels as fast_kernels
+from mcz.coding.fast.lanes import fault_of
 from mcz.coding.start import start_states
+from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError
 from mcz.numbers import Grid
-from mcz.schema import read_varint, varint
+from mcz.schema import varint
+
+if TYPE_CHECKING:
+    from mcz.codecs.lossless.best_kernels import Rests
+    from mcz.coding.fast.residual_kernels import Predictors
+    from mcz.coding.regression import Regressions
 
 Ints = NDArray[np.int64]
+Words = NDArray[np.int32]
+Bytes = NDArray[np.uint8]
 
-AS_CODEC_1, LINKED, ECHOED = range(3)  # method
-HEADS = 1  # the version of lossless that has them
-MAX_UNIT = 44
-MAX_SEEN = 8
-MAX_LINKS = 4096  # in a stream, so that what is learned takes little memory
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """What a coded channel is counted in, and which coded channels before it it looks at."""
-
-    unit: int
-    reach: int
-    seen: tuple[int, ...]
-
-    def head(self) -> bytes:
-        first = bytes((self.unit, len(self.seen) | self.reach - self.unit << 4))
-        return first + b"".join(map(varint, self.seen))
-
-
-def build_stream(ordinals: Ints, grids: Sequence[Own], group: int, seen: Seen | None) -> bytes:
-    """One stream, as ``mcz.coding.ordinals.streams.build_stream``: the shortest of all methods."""
-    seen_before = None if seen is None else dict(seen)
-    heads, plans, coded = plan_stream(ordinals, grids, group, seen, HEADS, fitted=False)
-    simple = streams.build_stream(ordinals, grids, group, seen_before, HEADS)
-    if not plans:
-        return bytes((AS_CODEC_1,)) + simple
-    links = [Link(*link) for link in choose_links(coded, plans, MAX_LINKS)]
-    link_heads = b"".join(link.head() for link in links)
-    linked = bytes((LINKED,)) + heads + link_heads + code(coded, plans, links)
-    found = [bytes((AS_CODEC_1,)) + simple, linked]
-    own = _may_echo(heads, [grid for _, grid in grids])
-    echoes = find_echoes(coded[:, : len(own)], own)
-    if echoes:
-        bits = code(coded, plans, links, echoes)
-        found.append(bytes((ECHOED,)) + heads + build_echoes(echoes) + link_heads + bits)
-    return min(found, key=len)
-
-
-def _may_echo(stream: bytes, grids: Sequence[Grid]) -> list[bool]:
-    """Of each coded channel, but for rests, whether its numbers are ordinals."""
-    heads, _ = read_heads(stream, grids, HEADS)
-    return [found[1] is None for kind, found, _ in heads if kind == CODED]
-
-
-def parse_stream(
-    stream: bytes, grids: Sequence[Grid], n_rows: int
-) -> tuple[Ints, dict[int, tuple[int, int]]]:
-    """The ordinals of a group, (n_rows, channels), and which channels are copies of which."""
-    if not stream or stream[0] > ECHOED:  # BEST-02
-        raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
-    method, stream = stream[0], stream[1:]
-    if method == AS_CODEC_1:
-        return streams.parse_stream(stream, grids, n_rows, version=HEADS)
-    may_echo = _may_echo(stream, grids) if method == ECHOED else None
-    uncode = partial(_uncode, may_echo=may_echo)
-    return streams.parse_stream(stream, grids, n_rows, uncode, version=HEADS)
-
-
-def _uncode(data: bytes, plans: Sequence[Ints], n_rows: int, may_echo: list[bool] | None) -> Ints:
-    """The numbers of the coded channels, (n_rows, len(plans)); None: there are no echoes."""
-    if not plans:  # BEST-03
-        raise FormatError("best: no channel is coded, and yet there are links")
-    echoes: list[Echo] = []
-    if may_echo is not None:
-        rests = [False] * (len(plans) - len(may_echo))
-        echoes, end = read_echoes(data, n_rows, may_echo + rests)
-        data = data[end:]
-    links, end = read_links(data, len(plans))
-    bits = np.frombuffer(data[end:], np.uint8).copy()
-    _, coding = loops()
-    state = start_states("best")[0].copy()  # BEST-08
-    rows = np.zeros((n_rows, len(plans)), np.int64)
-    coding.start(state, bits, 0)
-    fault = run(state, bits, rows, plans, links, echoes)
-    if fault >= 0:
-        raise FormatError(f"best: row {fault} cannot be decoded")
-    if coding.coded_size(state) != len(bits):  # BEST-09, RANGE-04
-        raise FormatError(f"best: {len(bits)} bytes, of which {coding.coded_size(state)} belong")
-    return rows
-
-
-def read_links(data: bytes, n_coded: int) -> tuple[list[Link], int]:
-    """The links of the coded channels and the offset after them."""
-    links, at, total = [], 0, 0
-    for channel in range(n_coded):
-        if at + 2 > len(data):
-            raise FormatError(f"best: the stream ends in the links, channel {channel}")
-        unit, n_seen, reach = data[at], data[at + 1] & 15, data[at + 1] >> 4
-        at += 2
-        if unit > MAX_UNIT:  # BEST-04
-            raise FormatError(f"best: a unit of 2^{unit}")
-        if n_seen > MAX_SEEN:  # BEST-05
-            raise FormatError(f"best: {n_seen} links of one channel")
-        seen = []
-        for _ in range(n_seen):
-            other, at = read_varint(data, at)
-            seen.append(other)
-        if any(other >= channel for other in seen):  # BEST-06
-            raise FormatError(f"best: coded channel {channel} looks at {seen}")
-        total += n_seen
-        links.append(Link(unit, unit + reach, tuple(seen)))
-    if total > MAX_LINKS:  # BEST-07
-        raise FormatError(f"best: {total} links, more than {MAX_LINKS}")
-    return links, at
+AS_FAST, PREDICTED, ECHOED = range(3)  # method
+WORK, SPARE = 64, 1024  # references x rows that a byte pays for; bytes that are given
 
 
 @cache
-def loops() -> tuple[ModuleType, ModuleType]:
+def kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
+    """The compiled loops, imported on first use: of best, regressions, residuals of fast."""
     from mcz.codecs.lossless import best_kernels
-    from mcz.coding import mixing
+    from mcz.coding import regression
+    from mcz.coding.fast import residual_kernels
 
-    return best_kernels, mixing
-
-
-def code(
-    coded: Ints, plans: Sequence[Ints], links: Sequence[Link], echoes: Sequence[Echo] = ()
-) -> bytes:
-    """The bits of the coded channels, at least one."""
-    _, coding = loops()
-    size = 4 * coded.size + 1024
-    while True:
-        data = np.zeros(size, np.uint8)
-        state = start_states("best")[0].copy()
-        coding.start(state, data, 1)
-        fault = run(state, data, coded.copy(), plans, links, echoes)
-        used = coding.finish(state, data)
-        if fault >= 0:
-            raise AssertionError(f"best: row {fault} has no code")
-        if used <= size:
-            return data[:used].tobytes()
-        size = used + 1024
+    return best_kernels, regression, residual_kernels
 
 
-def run(
-    state: Ints,
-    data: NDArray[np.uint8],
-    rows: Ints,
-    plans: Sequence[Ints],
-    links: Sequence[Link],
-    echoes: Sequence[Echo],
-) -> int:
-    """Code ``rows`` in place; return the row of a fault or -1."""
-    own, _ = loops()
-    table = np.zeros((len(links), own.LINKS_SIZE), np.int64)
-    end = 0
-    for row, link in zip(table, links, strict=True):
-        near, bent = own.sizes_of(len(link.seen))
-        row[: own.SEEN] = link.unit, link.reach, end, end + near, len(link.seen)
-        row[own.SEEN : own.SEEN + len(link.seen)] = link.seen
-        end += near + bent
-    repeats = table_of(echoes, *rows.shape)
-    with np.errstate(all="ignore"):  # what is no number is no estimate
-        return int(own.code_rows(state, data, rows, np.stack(plans), powers(), table, end, repeats))
+def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> bytes:
+    """The shortest stream of all methods: ``ordinals`` (rows, channels); ``grids``: in force."""
+    builder = StreamBuilder(layout.grids, layout.groups)
+    plan = builder.plan(ordinals, grids)
+    found: list[bytes] = []
+    if len(plan.lanes.numbers):
+        own = kernels()[0]
+        leads = np.ascontiguousarray(plan.lanes.leads.T)
+        chosen = choose_references(leads, own.MOST_REFERENCES, own.MOST_IN_ALL)
+        echoes = _echoes_of(plan, leads)
+        for repeated in ([], echoes) if echoes else ([],):
+            stream = code_plan(plan, chosen, repeated)
+            if _work(chosen, len(leads)) <= WORK * (len(stream) + SPARE):
+                found.append(stream)
+    found.append(bytes((AS_FAST,)) + builder.write(plan)[0])  # last: it gives the heads parents
+    return min(found, key=len)
+
+
+def _echoes_of(plan: Plan, leads: Words) -> list[Echo]:
+    """Echoes in lanes whose ordinals are what their leads and tails say."""
+    _, tail, survey, *_ = fast_kernels()
+    numbers = plan.lanes.numbers
+    is_whole = plan.channels.plans[numbers, survey.LIMIT] < 0
+    is_usable = is_whole & (plan.lanes.lattices[:, tail.REST] < 0)
+    columns = plan.channels.numbers[numbers]
+    return find_echoes(plan.channels.ordinals[:, columns], leads, np.flatnonzero(is_usable))
+
+
+def _work(references: Sequence[Sequence[int]], n_rows: int) -> int:
+    return (len(references) + sum(map(len, references))) * n_rows
+
+
+def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[Echo]) -> bytes:
+    """The stream of method 1, or of method 2 where there are echoes, of at least one lane."""
+    own, _, residual = kernels()
+    head, tail, *_, write = fast_kernels()
+    coded, columns = plan.lanes, plan.channels.columns
+    n_lanes, n_rows = coded.leads.shape
+    table = table_of(echoes, n_rows, n_lanes)
+    lanes = residual.predictors_of(n_lanes)
+    lanes.first[:], lanes.scales[:] = coded.leads[:, 0], coded.scales
+    taps = plan.channels.plans[coded.numbers, head.TAPS : head.TAPS + head.N_TAPS]
+    lanes.behind[:] = np.diff(taps, axis=1, prepend=0, append=0).T
+    leads = np.zeros((residual.BEHIND + n_rows, n_lanes), np.int32)
+    leads[residual.BEHIND :] = coded.leads.T
+    rests = own.Rests(np.zeros((n_rows, n_lanes), np.int32), coded.lattices[:, tail.REST].copy())
+    has_rests = rests.scales >= 0
+    rests.values[:, has_rests] = columns[coded.numbers[has_rests]].T
+    model = _Model(lanes, table, leads, rests)
+    for row, ones in zip(model.references, references, strict=True):
+        row[: 1 + len(ones)] = len(ones), *ones
+    bits = code(start_states("best")[0], 4 * leads.size + 1024, model.run, "best: a segment")
+    residuals = (build_echoes(echoes) if echoes else b"") + bits
+    room = np.empty(plan.most_bytes, np.uint8)
+    heads = room[: write.write_heads(plan.channels, 0, plan.fields, room)].tobytes()
+    tails = room[: own.write_tails(coded, columns, table, room)].tobytes()
+    method = bytes((ECHOED if echoes else PREDICTED,))
+    return b"".join((method, heads, varint(len(residuals)), residuals, tails))
+
+
+class _Model:
+    """The loops that a coder runs over a segment."""
+
+    def __init__(self, lanes: Predictors, echoes: Ints, leads: Words, rests: Rests) -> None:
+        self.lanes, self.echoes, self.leads, self.rests = lanes, echoes, leads, rests
+        n_lanes, most = leads.shape[1], kernels()[0].MOST_REFERENCES
+        self.references = np.zeros((n_lanes, 1 + most), np.int64)  # their number, then they
+        self.most_work: int | None = None  # of references x rows, for a decoder
+
+    def run(self, state: Ints, data: Bytes) -> bool:
+        """Code references, leads and rests in place; False where one of them has no code."""
+        own, _, residual = kernels()
+        total = own.code_references(state, data, self.references)
+        if total < 0:
+            return False
+        work = (len(self.references) + total) * (len(self.leads) - residual.BEHIND)
+        if self.most_work is not None and work > self.most_work:  # BEST-12
+            raise FormatError("best: more references than its bytes pay for")
+        args = state, data, self.lanes, self.references, self._regressions(), self.echoes
+        with np.errstate(all="ignore"):  # an estimate may be no number
+            return bool(own.code_leads(*args, self.leads, self.rests) < 0)
+
+    def _regressions(self) -> Regressions:
+        own, regression, _ = kernels()
+        sizes: list[int] = []
+        for n in self.references[:, 0].tolist():
+            sizes += own.n_linear(n), own.n_quadratic(n), own.N_BLENDED
+        found: Regressions = regression.regressions_of(sizes)
+        return found
+
+
+def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
+    """Fill ``out`` (rows, channels) with the ordinals of a segment; raises FormatError."""
+    if not stream or stream[0] > ECHOED:  # BEST-03
+        raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
+    decoder = SegmentDecoder(shape, (0,), lambda _: stream[1:], out)
+    if stream[0] == AS_FAST:
+        read_segments([decoder])
+        return
+    own, _, residual = kernels()
+    lanes = decoder.lanes
+    n_lanes = len(lanes.columns)
+    if n_lanes == 0:  # BEST-04
+        raise FormatError("best: no channel is coded, and yet the method is not 0")
+    if (lanes.predictors.parents >= 0).any():  # BEST-05
+        raise FormatError("best: a channel with a parent")
+    (start, stop), (tail, end) = lanes.residuals[0] // 8, lanes.tails[0]
+    bits = lanes.data[start:stop].tobytes()
+    rests = own.Rests(np.zeros((len(out), n_lanes), np.int32), lanes.lattices[:, own.REST].copy())
+    lanes.lattices[:, own.REST] = -1  # tails have none
+    echoes: list[Echo] = []
+    if stream[0] == ECHOED:
+        echoes, at = read_echoes(bits, len(out), (rests.scales < 0).tolist())
+        bits = bits[at:]
+    table = table_of(echoes, len(out), n_lanes)
+    lanes.leads[:] = 0
+    model = _Model(lanes.predictors, table, lanes.leads, rests)
+    model.most_work = WORK * (len(stream) + SPARE)
+    start = start_states("best")[0]  # BEST-06
+    uncode(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
+    tails = own.Tails(lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns)
+    leads = lanes.leads[residual.BEHIND :]
+    fault = own.read_ordinals(tails, lanes.lattices, leads, table, decoder.rows)
+    if fault != -1:
+        raise fault_of("tails", "lane", fault)
+    for lane in np.flatnonzero(rests.scales >= 0).tolist():
+        decoder.rows[:, lanes.columns[lane]] = rests.values[:, lane]
+    decoder.finish()

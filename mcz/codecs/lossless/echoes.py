@@ -16,6 +16,7 @@ from mcz.errors import FormatError
 from mcz.schema import read_varint, varint
 
 Ints = NDArray[np.int64]
+Words = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 FIELDS = 6  # of an echo, before its flags
@@ -59,11 +60,11 @@ def build_echoes(echoes: Sequence[Echo]) -> bytes:
 def read_echoes(data: bytes, n_rows: int, may_echo: Sequence[bool]) -> tuple[list[Echo], int]:
     """The echoes that ``data`` begins with, and the offset after them.
 
-    ``may_echo``: of each coded channel, whether its numbers are ordinals.
+    ``may_echo``: of each coded channel, that it has no rests.
     """
     count, at = read_varint(data, 0)
     left = n_rows * len(may_echo)
-    if not 1 <= count <= left:  # BEST-18
+    if not 1 <= count <= left:  # BEST-19
         raise FormatError(f"best: {count} echoes")
     echoes = []
     for _ in range(count):
@@ -73,27 +74,27 @@ def read_echoes(data: bytes, n_rows: int, may_echo: Sequence[bool]) -> tuple[lis
             fields.append(field)
         if at >= len(data):
             raise FormatError("best: the stream ends in the echoes")
-        if data[at] > MINUS:  # BEST-22
+        if data[at] > MINUS:  # BEST-23
             raise FormatError(f"best: flags {data[at]:#04x} of an echo")
         row, rows, channel, channels, lag, source = fields
         echo = Echo(row, rows, channel, channels, lag, source, data[at] == MINUS)
         at += 1
         _check(echo, n_rows, may_echo)
         left -= echo.n_rows * echo.n_channels
-        if left < 0:  # BEST-18
+        if left < 0:  # BEST-19
             raise FormatError("best: more echoes than there are numbers")
         echoes.append(echo)
     return echoes, at
 
 
 def _check(echo: Echo, n_rows: int, may_echo: Sequence[bool]) -> None:
-    if not 1 <= echo.n_rows <= n_rows - echo.row:  # BEST-19
+    if not 1 <= echo.n_rows <= n_rows - echo.row:  # BEST-20
         raise FormatError(f"best: an echo in {echo.n_rows} of {n_rows} rows from {echo.row} on")
-    if not 1 <= echo.lag <= echo.row:  # BEST-20
+    if not 1 <= echo.lag <= echo.row:  # BEST-21
         raise FormatError(f"best: an echo in row {echo.row} of what was {echo.lag} rows before")
     for first in (echo.channel, echo.source):
         own = may_echo[first : first + echo.n_channels]
-        if not 1 <= echo.n_channels == len(own) or not all(own):  # BEST-21
+        if not 1 <= echo.n_channels == len(own) or not all(own):  # BEST-22
             raise FormatError(f"best: an echo of {echo.n_channels} channels from {first} on")
 
 
@@ -114,15 +115,15 @@ def table_of(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:
 # How they are found
 
 
-def find_echoes(numbers: Ints, may_echo: Sequence[bool]) -> list[Echo]:
+def find_echoes(numbers: Ints, leads: Words, usable: Ints) -> list[Echo]:
     """Echoes in ``numbers`` (rows, channels) that are likely to pay; mostly none.
 
-    Numbers of which one was there before vote for how far and in which channel that was.
+    Numbers of which one was there before vote for how far and in which channel that was. ``leads``
+    must repeat as well. ``usable``: the channels that are looked at.
     """
-    usable = np.flatnonzero(may_echo)
     if len(usable) == 0 or len(numbers) < 2 * VOTES:
         return []
-    own = np.ascontiguousarray(numbers[:, usable])
+    own, own_leads = np.ascontiguousarray(numbers[:, usable]), leads[:, usable]
     changes = np.empty(own.shape, bool)
     changes[0] = True
     np.not_equal(own[1:], own[:-1], out=changes[1:])
@@ -130,13 +131,14 @@ def find_echoes(numbers: Ints, may_echo: Sequence[bool]) -> list[Echo]:
     taken = np.zeros(own.shape, bool)
     found: list[Echo] = []
     for lag, channel, source, minus in _candidates(own, changes):
-        before = own[:-lag, source]
-        same = own[lag:, channel] == (-1 - before if minus else before)
-        same &= ~taken[lag:, channel]
+        same = ~taken[lag:, channel]
+        for rows in (own, own_leads):
+            before = rows[:-lag, source]
+            same &= rows[lag:, channel] == (-1 - before if minus else before)
         for start, stop in _runs(same):
-            rows = slice(lag + start, lag + stop)
-            if np.count_nonzero(changes[rows, channel]) * weights[channel] > COST:
-                taken[rows, channel] = True
+            rows_of = slice(lag + start, lag + stop)
+            if np.count_nonzero(changes[rows_of, channel]) * weights[channel] > COST:
+                taken[rows_of, channel] = True
                 place = int(usable[channel]), 1, lag, int(usable[source])
                 found.append(Echo(lag + start, stop - start, *place, minus))
     return _merged(found)

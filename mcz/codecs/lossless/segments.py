@@ -1,22 +1,12 @@
-"""Rows of segments and copies in streams, for all lossless codecs."""
+"""How long segments of the lossless codecs are."""
 
 from __future__ import annotations
 
-from mcz.codecs.contract import Layout
 from mcz.codecs.parameters import Parameter, integer
-from mcz.errors import FormatError
-
-MAX_ROWS = 2**16
 
 
-def check_copy(name: str, layout: Layout, group: int, column: int) -> None:
-    """Raise FormatError for a copy of a channel that there is not."""
-    if not group < len(layout.groups) or not column < len(layout.groups[group]):  # LOSS-10
-        raise FormatError(f"{name}: a copy of channel {column} of group {group}")
-
-
-def segment_frames(size: str, most: int = MAX_ROWS) -> Parameter:
-    """The parameter of their length, where 0 means about ``size``."""
+def segment_frames(size: str, most: int) -> Parameter:
+    """The parameter of their length, at most ``most`` frames; 0 means about ``size`` bytes."""
     return Parameter(
         "segment_frames",
         0,

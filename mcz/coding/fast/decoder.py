@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.fast.lanes import Lanes, read_lanes
-from mcz.coding.forms.lattice import WITH_UNIT, form_of_grid
+from mcz.coding.forms.ids import WITH_UNIT, form_of_grid
 from mcz.coding.forms.units import parse_mapping
 from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels

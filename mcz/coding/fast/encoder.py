@@ -6,6 +6,7 @@ SPEC.md, "Codec 1: fast", is normative for the bytes; the choice of a plan is no
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.forms.lattice import form_of_grid, has_binary32
+from mcz.coding.forms.ids import form_of_grid, has_binary32
 from mcz.coding.forms.products import tiny_limit
 from mcz.coding.forms.units import find_units
 from mcz.numbers import Grid
@@ -46,6 +47,21 @@ def kernels() -> tuple[ModuleType, ...]:
     return head_kernels, tail_kernels, *choice, write_kernels
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A segment as it is written: its channels, those that are coded, the fields of all units."""
+
+    channels: Channels
+    lanes: CodedLanes
+    fields: NDArray[np.uint8]
+
+    @property
+    def most_bytes(self) -> int:
+        """The bytes that no stream, and no part of one, has more of."""
+        sizes = self.channels.ordinals.size * VALUE_BYTES, len(self.channels.plans) * HEAD_BYTES
+        return sum(sizes) + SPARE
+
+
 class StreamBuilder:
     """Builds the streams of all groups of segments of one signal."""
 
@@ -70,9 +86,13 @@ class StreamBuilder:
 
     def build(self, ordinals: Ints, grids: tuple[Grid, ...]) -> tuple[bytes, ...]:
         """The streams of a segment, ``ordinals`` (rows, channels); ``grids``: those in force."""
+        return self.write(self.plan(ordinals, grids))
+
+    def plan(self, ordinals: Ints, grids: tuple[Grid, ...]) -> Plan:
+        """The heads of a segment, without parents, and its lanes."""
         if grids != self._signal_grids:
             self._set_grids(grids)
-        _, _, survey, plan, parent, write = kernels()
+        _, _, survey, plan, _, _ = kernels()
         channels = self._channels(ordinals)
         survey.survey(channels)
         rests, fields = self._find_units(channels)
@@ -81,12 +101,16 @@ class StreamBuilder:
         for n, column in rests.items():
             channels.columns[n] = column  # in the place of tails
         plan.choose_predictors(lanes, channels.plans)
-        if len(lanes.numbers) > 1 and len(ordinals) >= FEWEST_ROWS:
-            parent.choose_parents(lanes, channels.plans)
-        size = ordinals.size * VALUE_BYTES + len(self.numbers) * HEAD_BYTES + SPARE
-        rooms = np.empty((3, size), np.uint8)
+        return Plan(channels, lanes, np.frombuffer(fields, np.uint8))
+
+    def write(self, plan: Plan) -> tuple[bytes, ...]:
+        """The streams of a plan, whose heads have parents then."""
+        *_, parent, write = kernels()
+        if len(plan.lanes.numbers) > 1 and len(plan.channels.ordinals) >= FEWEST_ROWS:
+            parent.choose_parents(plan.lanes, plan.channels.plans)
+        rooms = np.empty((3, plan.most_bytes), np.uint8)
         ends = np.empty(len(self.firsts) - 1, np.int64)
-        write.write_streams(channels, lanes, np.frombuffer(fields, np.uint8), rooms, ends)
+        write.write_streams(plan.channels, plan.lanes, plan.fields, rooms, ends)
         stops = ends.tolist()
         starts = [0, *stops[:-1]]
         return tuple(rooms[0, a:b].tobytes() for a, b in zip(starts, stops, strict=False))

@@ -188,6 +188,19 @@ def append(out: Bytes, at: int, part: Bytes, size: int) -> int:
     return at + size
 
 
+def put_heads(channels: Channels, group: int, fields: Bytes, out: Bytes, at: int) -> int:
+    """Write the heads of a group; returns the offset behind them."""
+    for n in range(channels.firsts[group], channels.firsts[group + 1]):
+        at = put_head(channels, n, fields, out, at)
+    return at
+
+
+@kernel
+def write_heads(channels: Channels, group: int, fields: Bytes, out: Bytes) -> int:
+    """Write the heads of a group; returns their bytes."""
+    return put_heads(channels, group, fields, out, 0)
+
+
 @kernel
 def write_streams(
     channels: Channels, lanes: CodedLanes, fields: Bytes, rooms: Bytes2, ends: Ints
@@ -200,8 +213,7 @@ def write_streams(
     out, residuals, tails = rooms[0], rooms[1], rooms[2]
     at = 0
     for group in range(len(ends)):
-        for n in range(channels.firsts[group], channels.firsts[group + 1]):
-            at = put_head(channels, n, fields, out, at)
+        at = put_heads(channels, group, fields, out, at)
         start, stop = lanes.starts[group], lanes.starts[group + 1]
         if start < stop:
             sizes = write_parts(lanes, channels.columns, start, stop, residuals, tails)

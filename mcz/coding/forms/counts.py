@@ -34,7 +34,7 @@ class Law:
 
     def ordinals(self, counts: Ints) -> Ints:
         """The ordinals of counts on the grid BINARY32."""
-        values = counts * np.float64(self.unit)  # LOSS-37
+        values = counts * np.float64(self.unit)
         if self.offset is not None:
             values = values + self.offset
         rounded = values.astype("<f4")
@@ -52,7 +52,7 @@ class Law:
 
 def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
     """The law whose ``parts`` stand at an offset, whether there are rests, the offset after it."""
-    if at >= len(stream) or stream[at] > OFFSET | SHIFT | RESTS:  # FAST-52, LOSS-35
+    if at >= len(stream) or stream[at] > OFFSET | SHIFT | RESTS:  # FAST-52
         raise FormatError(f"parts {stream[at : at + 1].hex() or 'missing'} of a law")
     parts, at = stream[at], at + 1
     terms: list[float | None] = [None, None]
@@ -61,7 +61,7 @@ def parse_law(stream: bytes, at: int, unit: float) -> tuple[Law, bool, int]:
             if at + 8 > len(stream):
                 raise FormatError(f"the stream ends at {len(stream)}, in a law")
             (term,) = struct.unpack_from("<d", stream, at)
-            if not -MOST <= term <= MOST:  # FAST-53, LOSS-36
+            if not -MOST <= term <= MOST:  # FAST-53
                 raise FormatError(f"an offset or shift of {term!r}")
             terms[place], at = term, at + 8
     return Law(unit, *terms), bool(parts & RESTS), at

@@ -22,7 +22,7 @@ _STEPS = 24  # of Euclid's algorithm
 def of_multiples(multiples: Ints, unit: float) -> Ints:
     """The ordinals of the binary32 that are nearest to ``multiples * unit``."""
     with np.errstate(over="ignore"):
-        values = (multiples * np.float64(unit)).astype("<f4")  # LOSS-13
+        values = (multiples * np.float64(unit)).astype("<f4")
     return BINARY32.ordinals_of_bits(values.view("<u4"))
 
 
@@ -41,7 +41,7 @@ def find_multiples(ordinals: Ints) -> tuple[float, Ints] | None:
     if guess * MOST < sizes[-1]:
         return None
     unit = _within_rounding(sizes, guess)
-    if unit > GREATEST:  # LOSS-12
+    if unit > GREATEST:
         return None
     multiples = np.rint(values / unit).astype(np.int64)
     return (unit, multiples) if (of_multiples(multiples, unit) == ordinals).all() else None

@@ -31,7 +31,7 @@ def fill(
             continue
         before = abs(codes[t]) - 1
         q = truncated(float(before) / float(shifts)) if before < EXACT else before // shifts
-        value = float(2 * q + 1) * float(1 << before - q * shifts) * unit  # LOSS-33
+        value = float(2 * q + 1) * float(1 << before - q * shifts) * unit
         mantissa, power = decimal(value, power, digits, tens, powers)
         if mantissa == 0:
             out[t] = PRINTED

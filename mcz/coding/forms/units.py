@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.coding.forms.count_search import find_counts
 from mcz.coding.forms.counts import parse_law
-from mcz.coding.forms.lattice import COUNTS, MULTIPLES, PRODUCTS, WITH_UNIT, has_binary32
+from mcz.coding.forms.ids import COUNTS, MULTIPLES, PRODUCTS, WITH_UNIT, has_binary32
 from mcz.coding.forms.multiples import find_multiples, of_multiples
 from mcz.coding.forms.products import find_products, of_products
 from mcz.errors import FormatError
@@ -72,12 +72,12 @@ def parse_mapping(
     if form == COUNTS:
         law, rests, at = parse_law(stream, at, unit)
         return law.ordinals, rests, at
-    if grid.kind != GridKind.GENERAL:  # FAST-49, LOSS-32
+    if grid.kind != GridKind.GENERAL:  # FAST-49
         raise FormatError(f"form {form} on the grid {grid.kind.name}")
     if at >= len(stream):
         raise FormatError(f"the stream ends at {at}, before the shifts of a unit")
     shifts, at = stream[at], at + 1
-    if not 1 <= shifts <= MAX_SHIFTS:  # FAST-50, LOSS-34
+    if not 1 <= shifts <= MAX_SHIFTS:  # FAST-50
         raise FormatError(f"form {form}: {shifts} shifts")
     return partial(of_products, unit=unit, shifts=shifts, grid=grid), False, at
 
@@ -86,6 +86,6 @@ def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
     if at + 8 > len(stream):
         raise FormatError(f"the stream ends at {len(stream)}, in a unit")
     (unit,) = struct.unpack_from("<d", stream, at)
-    if not 2.0**-200 <= unit <= 2.0**80:  # FAST-47, LOSS-12
+    if not 2.0**-200 <= unit <= 2.0**80:  # FAST-47
         raise FormatError(f"a unit of {unit!r}")
     return unit, at + 8

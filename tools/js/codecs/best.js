@@ -1,41 +1,33 @@
 // SPEC.md, "Codec 2: best".
 
 import { ByteReader } from "../bytes.js";
-import { RangeDecoder, clamp } from "../entropy.js";
+import { RangeDecoder, bits } from "../entropy.js";
 import { Refused } from "../errors.js";
-import { CODED, MULTIPLES, PRODUCTS, COUNTS, withRests } from "../heads.js";
+import { hasUnit } from "../forms.js";
+import { numbersOf } from "../fast-numbers.js";
 import { setHalves } from "../int64.js";
-import { SignalDecoder } from "../ordinal-streams.js";
 import { Learner, bounded } from "../regressions.js";
-import { restart } from "../start-models.js";
-import { BitDecoder, CodedChannel, guessed } from "./lossless.js";
+import { Residuals, side } from "../residuals.js";
+import { RiceReader } from "../rice.js";
+import { restart, startModels } from "../start-models.js";
+import { SegmentDecoder, checkSize, ordinalsOf } from "./fast.js";
 
 export const id = 2;
 export const name = "best";
 export const version = 0;
 
-const AS_CODEC_1 = 0;
-const LINKED = 1;
+const AS_FAST = 0;
 const ECHOED = 2;
-const MAX_UNIT = 44;
-const MAX_OTHERS = 8;
-const MAX_LINKS = 4096;
-
-// The first context of each kind of bit; residuals have the mixers from 0 on.
-const ZERO = 0;
-const MINUS = 2;
-const DOWN = 4;
-const RESIDUALS = 17;
-
+const MAX_REFERENCES = 8;
+const MAX_IN_ALL = 4096;
+const WORK = 64; // references x rows that a byte pays for
+const SPARE = 1024; // bytes that are given
+const LINEAR_REFERENCES = 6;
+const FIRST_ROWS = 8; // in which the blend is not asked
+const REACH = 64; // units that a level is counted in
 const LIMIT = 2 ** 20;
-const TWO_44 = 2 ** 44;
-const EIGHT_OR_NINE = 13107;
-
-const CODEC = {
-  name,
-  rules: { hasProducts: true, hasCounts: true },
-  decoder: (ordinals) => new BitDecoder(ordinals),
-};
+const TWO_31 = 2 ** 31;
+const COUNT_BITS = 4; // of the number of references
 
 /**
  * Opens a signal.
@@ -46,34 +38,291 @@ const CODEC = {
  * @throws {Refused}
  */
 export function open(header, layout) {
-  if (header.length !== 0) throw new Refused("best: the header is not empty");
+  if (header.length !== 0) throw new Refused("best: the header is not empty"); // BEST-01
   if (layout.nResolutions !== 1) throw new Refused(`best: ${layout.nResolutions} resolutions`);
+  if (layout.groups.length > 1) throw new Refused(`best: ${layout.groups.length} groups`); // BEST-02
+  const [model] = startModels("best_start.json");
+  const learned = model.copy();
+  const fresh = () => {
+    restart(learned, model);
+    return learned;
+  };
   return {
     decodes: "ordinals",
     alone: true,
-    decode: (segments) => new BestDecoder(layout, segments).decode(),
+    decode: (segments) => decodeSegments(layout, segments, fresh),
   };
 }
 
-class BestDecoder extends SignalDecoder {
-  constructor(layout, segments) {
-    super(CODEC, layout, segments);
-    this.linked = new LinkedDecoder(this.ordinals);
-    this.echoed = new LinkedDecoder(this.ordinals, readEchoes);
+/** The ordinals of all rows of some segments, row after row; `fresh` gives a model to begin with. */
+function decodeSegments({ groups, grids }, segments, fresh) {
+  const ordinals = ordinalsOf(segments, grids.length);
+  let first = 0;
+  for (const segment of segments) {
+    checkSize(segment, grids.length);
+    const end = first + segment.nRows * grids.length;
+    const own = ordinals.subarray(first, end);
+    first = end;
+    if (groups.length === 0) continue;
+    const [[stream]] = segment.streams;
+    const method = stream[0];
+    if (!(method <= ECHOED)) throw new Refused(`best: method ${method}`); // BEST-03
+    const rest = { ...segment, streams: [[stream.subarray(1)]] };
+    const decoder =
+      method === AS_FAST
+        ? new SegmentDecoder(rest, groups, grids, own)
+        : new PredictedDecoder(rest, groups, grids, own, { method, model: fresh() });
+    decoder.decode();
+  }
+  return ordinals;
+}
+
+/** Fast and slow scale and sides of what was coded of a channel. */
+class Memory {
+  constructor(scale) {
+    this.fast = scale;
+    this.slow = scale;
+    this.side1 = 0;
+    this.side2 = 0;
   }
 
-  decoderOf(reader) {
-    const method = reader.u8();
-    if (method > ECHOED) reader.refuse(`method ${method}`);
-    if (method === AS_CODEC_1) return this.bits;
-    return method === LINKED ? this.linked : this.echoed;
+  learn(e) {
+    const size = 16 * Math.abs(e); // fits no 32 bits: floor in the place of >>
+    this.fast += Math.floor((size - this.fast) / 2);
+    this.slow += Math.floor((size - this.slow) / 32);
+    this.side2 = this.side1;
+    this.side1 = side(e);
+  }
+}
+
+/** A coded channel as it is predicted; `first`: its lead in row 0. */
+class Predicted {
+  constructor({ scale, first, taps, law, restScale }, references) {
+    this.memory = new Memory(scale);
+    this.rests = law?.hasRests ? new Memory(restScale) : null;
+    this.unit = 2 ** (bits(scale >> 4) + 2); // U
+    this.references = references;
+    this.taps = taps;
+    this.first = first;
+    this.last = first;
+    this.differences = new Int32Array(4);
+    this.steps = new Float64Array(5); // of this row, and of those before it
+    this.level = 0;
+    this.levelBefore = 0;
+    const n = references.length;
+    this.linear = new Learner(4 + 2 * Math.min(n, LINEAR_REFERENCES), 0.95, 0.01);
+    this.quadratic = new Learner(3 + n + (n * (n + 1)) / 2, 0.998, 0.001);
+    this.blend = new Learner(3, 0.98, 0.01);
   }
 
-  decodeBits(group, nRows, firstRow) {
-    if (group.bits !== this.bits && !group.heads.some(({ kind }) => kind === CODED)) {
-      group.reader.refuse("no channel is coded");
+  nextRow() {
+    this.steps.copyWithin(1, 0, 4);
+    this.steps[0] = 0;
+    this.levelBefore = this.level;
+  }
+
+  setLinear() {
+    const { steps, references } = this;
+    const { features } = this.linear;
+    for (let lag = 1; lag <= 4; lag++) features[lag - 1] = steps[lag];
+    const m = Math.min(references.length, LINEAR_REFERENCES);
+    for (let i = 0; i < m; i++) {
+      features[4 + i] = references[i].steps[0];
+      features[4 + m + i] = references[i].steps[1];
     }
-    super.decodeBits(group, nRows, firstRow);
+  }
+
+  setQuadratic() {
+    const { steps, references } = this;
+    const { features } = this.quadratic;
+    const n = references.length;
+    for (let lag = 1; lag <= 3; lag++) features[lag - 1] = steps[lag];
+    let at = 3 + n;
+    for (let i = 0; i < n; i++) {
+      const one = references[i];
+      features[3 + i] = one.steps[0];
+      for (let j = i; j < n; j++) {
+        const two = references[j];
+        features[at++] = (one.level * two.level - one.levelBefore * two.levelBefore) * REACH;
+      }
+    }
+  }
+
+  /** The step that is expected in row r, in units. BEST-17 */
+  guess(r) {
+    this.setLinear();
+    this.setQuadratic();
+    const { features } = this.blend;
+    const [t0, t1, t2, t3] = this.taps;
+    const [d0, d1, d2, d3] = this.differences;
+    const near = (Math.imul(t0, d0) + Math.imul(t1, d1)) | 0;
+    const far = (Math.imul(t2, d2) + Math.imul(t3, d3)) | 0;
+    features[0] = this.linear.expect();
+    features[1] = this.quadratic.expect();
+    features[2] = bounded(((16 + near + far) >> 5) / this.unit);
+    return r < FIRST_ROWS ? features[2] : this.blend.expect();
+  }
+
+  /** Takes in the lead of a row. */
+  move(lead) {
+    const { unit, last, first, differences } = this;
+    this.steps[0] = Math.min(Math.max((lead - last) / unit, -LIMIT), LIMIT);
+    this.level = (lead - first) / (REACH * unit);
+    differences.copyWithin(1, 0, 3);
+    differences[0] = lead - last;
+    this.last = lead;
+  }
+
+  /** Learns from row r; c is its number. */
+  learn(r, c, guess) {
+    const [step] = this.steps;
+    const { features } = this.blend;
+    this.linear.learn(r, step, features[0]);
+    this.linear.solve();
+    this.quadratic.learn(r, step, features[1]);
+    if ((r + c) % 2 === 0) this.quadratic.solve();
+    this.blend.learn(r, step, guess);
+    this.blend.solve();
+  }
+}
+
+/** Decodes a segment whose leads are predicted. */
+class PredictedDecoder extends SegmentDecoder {
+  constructor(segment, groups, grids, ordinals, { method, model }) {
+    super(segment, groups, grids, ordinals);
+    this.hasEchoes = method === ECHOED;
+    this.model = model;
+    this.most = WORK * (segment.streams[0][0].length + 1 + SPARE);
+  }
+
+  findParents({ reader, coded }) {
+    if (coded.length === 0) reader.refuse("no channel is coded"); // BEST-04
+    if (coded.some(({ parent }) => parent !== null)) reader.refuse("a parent"); // BEST-05
+  }
+
+  decodeResiduals({ reader, coded }) {
+    const size = reader.varint();
+    const part = new ByteReader(reader.take(size), `${reader.what}, residuals`);
+    this.echoes = this.hasEchoes ? readEchoes(part, coded, this.nRows) : null;
+    this.coder = new RangeDecoder(part.rest());
+    this.kind = new Residuals(this.model);
+    this.rests = new Int32Array(this.leads.length);
+    this.decodeLeads(this.channelsOf(coded));
+    this.coder.finish(part.what); // BEST-07
+  }
+
+  /** The coded channels with their references. BEST-08 */
+  channelsOf(coded) {
+    const { coder } = this;
+    const channels = [];
+    let total = 0;
+    for (const [c, head] of coded.entries()) {
+      const n = c === 0 ? 0 : coder.number(COUNT_BITS);
+      total += n;
+      if (n > MAX_REFERENCES) throw new Refused(`best: ${n} references of a channel`); // BEST-09
+      if (total > MAX_IN_ALL) throw new Refused(`best: more than ${MAX_IN_ALL} references`); // BEST-11
+      const references = Array.from({ length: n }, () => {
+        const o = coder.number(bits(c - 1));
+        if (o >= c) throw new Refused(`best: channel ${c} refers to ${o}`); // BEST-10
+        return channels[o];
+      });
+      channels.push(new Predicted(head, references));
+    }
+    if ((coded.length + total) * this.nRows > this.most) {
+      throw new Refused("best: more references than its bytes pay for"); // BEST-12
+    }
+    return channels;
+  }
+
+  decodeLeads(channels) {
+    const width = channels.length;
+    for (let r = 0; r < this.nRows; r++) {
+      this.near = 0;
+      this.other = 3;
+      if (r > 0) for (const channel of channels) channel.nextRow();
+      for (let c = 0; c < width; c++) {
+        const channel = channels[c];
+        const at = r * width + c;
+        if (channel.rests !== null) this.rests[at] = this.rest(channel.rests); // BEST-13
+        if (r === 0) this.leads[at] = channel.first;
+        else if (this.echoes?.[at]) this.repeat(channel, at);
+        else this.lead(channel, r, c, at);
+      }
+    }
+  }
+
+  miss({ fast, slow, side1, side2 }) {
+    return this.kind.decode(this.coder, false, fast, slow, this.near, side1, side2, this.other);
+  }
+
+  rest(memory) {
+    const e = this.miss(memory);
+    if (e !== (e | 0)) throw new Refused(`best: a rest of ${e}`); // BEST-14
+    memory.learn(e);
+    return e;
+  }
+
+  /** Decodes the lead of a channel in row r. BEST-15 */
+  lead(channel, r, c, at) {
+    const { memory, last, unit } = channel;
+    const guess = channel.guess(r);
+    const place = Math.floor(last + guess * unit + 0.5);
+    const e = this.miss(memory);
+    const lead = Math.min(Math.max(place, -TWO_31), TWO_31 - 1) + e;
+    if (lead !== (lead | 0)) throw new Refused(`best: a lead of ${lead}`); // BEST-16
+    this.near = (this.near + bits(16 * Math.abs(e)) - bits(memory.slow)) >> 1;
+    memory.learn(e);
+    this.other = memory.side1;
+    this.leads[at] = lead;
+    channel.move(lead);
+    channel.learn(r, c, guess);
+  }
+
+  /** Takes the lead that an echo repeats. BEST-24 */
+  repeat(channel, at) {
+    const place = this.echoes[at];
+    const lead = this.leads[Math.abs(place) - 1];
+    this.leads[at] = place < 0 ? ~lead : lead;
+    channel.move(this.leads[at]);
+  }
+
+  predict() {
+    // Leads are there.
+  }
+
+  decodeTails({ reader, coded }) {
+    const tails = new RiceReader(reader.rest(), `${reader.what}, tails`);
+    const numbers = coded.map((head) => numbersOf(head, this.ordinals));
+    const width = coded.length;
+    const rest = { code: () => this.rests[this.at] }; // in the place of tails
+    for (let at = 0; at < this.leads.length; at++) {
+      const c = at % width;
+      const index = this.indexOf(coded, at);
+      if (this.echoes?.[at] && !hasUnit(coded[c].form)) {
+        this.repeatOrdinal(coded, index, this.echoes[at]);
+      } else {
+        this.at = at;
+        numbers[c].set(index, this.leads[at], coded[c].law ? rest : tails);
+      }
+    }
+    tails.finish();
+  }
+
+  /** The index of the ordinal of a place in leads. */
+  indexOf(coded, at) {
+    const row = Math.floor(at / coded.length);
+    return row * this.nChannels + coded[at % coded.length].column;
+  }
+
+  /** Takes the ordinal that an echo repeats; of a channel in units it is the lead. */
+  repeatOrdinal(coded, index, place) {
+    const at = Math.abs(place) - 1;
+    const from = 2 * this.indexOf(coded, at);
+    const isLead = hasUnit(coded[at % coded.length].form);
+    const low = isLead ? this.leads[at] : this.halves[from];
+    const high = isLead ? low >> 31 : this.halves[from + 1];
+    if (place < 0) setHalves(this.halves, index, ~low, ~high);
+    else setHalves(this.halves, index, low, high);
   }
 }
 
@@ -83,31 +332,28 @@ class BestDecoder extends SignalDecoder {
  * @returns {Float64Array} of each number of the coded channels, row after row: 0, or 1 + the place
  *     that it repeats, less than 0 for the other sign
  */
-function readEchoes(reader, heads, nRows) {
+function readEchoes(reader, coded, nRows) {
   const count = reader.varint();
-  const width = heads.length;
+  const width = coded.length;
   let left = nRows * width;
-  if (count < 1 || count > left) reader.refuse(`${count} echoes`);
+  if (count < 1 || count > left) reader.refuse(`${count} echoes`); // BEST-19
   const table = new Float64Array(left);
   for (let i = 0; i < count; i++) {
-    const row = reader.varint();
-    const rows = reader.varint();
-    const channel = reader.varint();
-    const channels = reader.varint();
-    const lag = reader.varint();
-    const source = reader.varint();
+    const [row, rows, channel, channels, lag, source] = Array.from({ length: 6 }, () =>
+      reader.varint(),
+    );
     const flags = reader.u8();
-    if (rows < 1 || row + rows > nRows) reader.refuse(`an echo in rows from ${row} on`);
-    if (lag < 1 || lag > row) reader.refuse(`an echo in row ${row} of ${lag} rows before`);
+    if (rows < 1 || row + rows > nRows) reader.refuse(`an echo in rows from ${row} on`); // BEST-20
+    if (lag < 1 || lag > row) reader.refuse(`an echo in row ${row} of ${lag} rows before`); // BEST-21
     for (const first of [channel, source]) {
-      const own = heads.slice(first, first + channels);
-      if (channels < 1 || own.length !== channels || own.some(isNoOrdinal)) {
-        reader.refuse(`an echo of ${channels} channels from ${first} on`);
+      const own = coded.slice(first, first + channels);
+      if (channels < 1 || own.length !== channels || own.some(({ law }) => law?.hasRests)) {
+        reader.refuse(`an echo of ${channels} channels from ${first} on`); // BEST-22
       }
     }
-    if (flags > 1) reader.refuse(`flags ${flags} of an echo`);
+    if (flags > 1) reader.refuse(`flags ${flags} of an echo`); // BEST-23
     left -= rows * channels;
-    if (left < 0) reader.refuse("more echoes than there are numbers");
+    if (left < 0) reader.refuse("more echoes than there are numbers"); // BEST-19
     for (let r = row; r < row + rows; r++) {
       for (let c = 0; c < channels; c++) {
         const place = (r - lag) * width + source + c + 1;
@@ -116,242 +362,4 @@ function readEchoes(reader, heads, nRows) {
     }
   }
   return table;
-}
-
-/** Whether what is coded of a channel are no ordinals. */
-function isNoOrdinal({ form, restsOf }) {
-  return Boolean(restsOf) || [MULTIPLES, PRODUCTS, COUNTS].includes(form);
-}
-
-/** The coded channels with their links. */
-function readLinks(reader, heads) {
-  const channels = [];
-  let total = 0;
-  for (const head of heads) {
-    const unit = reader.u8();
-    const seen = reader.u8();
-    if (unit > MAX_UNIT) reader.refuse(`a unit of 2^${unit}`);
-    const n = seen & 15;
-    if (n > MAX_OTHERS) reader.refuse(`a channel looks at ${n} others`);
-    const others = [];
-    for (let i = 0; i < n; i++) {
-      const other = reader.varint();
-      if (other >= channels.length) reader.refuse(`channel ${channels.length} looks at ${other}`);
-      others.push(channels[other]);
-    }
-    total += n;
-    channels.push(new LinkedChannel(head, unit, unit + (seen >> 4), others));
-  }
-  if (total > MAX_LINKS) reader.refuse(`${total} links`);
-  return channels;
-}
-
-/** A coded channel, the others that it looks at, and its regressions. */
-class LinkedChannel extends CodedChannel {
-  constructor(head, unit, reach, others) {
-    super(head);
-    this.stepUnit = 2 ** unit; // U
-    this.reach = 2 ** reach; // R
-    this.others = others;
-    this.steps = new Float64Array(5); // of this row, and of those before it
-    this.level = 0;
-    this.levelBefore = 0;
-    this.first = 0;
-    const n = others.length;
-    this.nearby = new Learner(4 + 2 * Math.min(n, 6), 0.95, 0.01);
-    this.bent = new Learner(3 + n + (n * (n + 1)) / 2, 0.998, 0.001);
-    this.final = new Learner(3, 0.98, 0.01);
-  }
-
-  nextRow() {
-    this.steps.copyWithin(1, 0, 4);
-    this.levelBefore = this.level;
-  }
-
-  /** Sets the features of NEARBY. */
-  lookNearby() {
-    const { steps, others } = this;
-    const { features } = this.nearby;
-    for (let lag = 1; lag <= 4; lag++) features[lag - 1] = steps[lag];
-    const m = Math.min(others.length, 6);
-    for (let i = 0; i < m; i++) {
-      features[4 + i] = others[i].steps[0];
-      features[4 + m + i] = others[i].steps[1];
-    }
-  }
-
-  /** Sets the features of BENT. */
-  lookBent() {
-    const { steps, others } = this;
-    const { features } = this.bent;
-    const ratio = this.reach / this.stepUnit;
-    for (let lag = 1; lag <= 3; lag++) features[lag - 1] = steps[lag];
-    let at = 3;
-    for (const other of others) features[at++] = other.steps[0];
-    others.forEach((one, i) => {
-      for (const other of others.slice(i)) {
-        const step = one.level * other.level - one.levelBefore * other.levelBefore;
-        features[at++] = step * ratio;
-      }
-    });
-  }
-
-  /** The step that is expected in row r, in units. */
-  guess(r) {
-    this.lookNearby();
-    this.lookBent();
-    this.final.features[0] = this.nearby.expect();
-    this.final.features[1] = this.bent.expect();
-    const p = bounded((this.predict() - this.last) / this.stepUnit);
-    this.final.features[2] = p;
-    return r < 8 ? p : this.final.expect();
-  }
-
-  /** Takes in what followed `last` in row r; c is its number among the coded channels. */
-  learn(r, c, guess, last) {
-    if (r === 0) {
-      this.first = this.last;
-      return;
-    }
-    const step = Math.min(Math.max((this.last - last) / this.stepUnit, -LIMIT), LIMIT);
-    this.steps[0] = step;
-    this.level = (this.last - this.first) / this.reach;
-    const due = r < 64 ? r % 2 === 0 : (r + c) % 4 === 0;
-    this.nearby.learn(r, step, this.final.features[0], true);
-    this.bent.learn(r, step, this.final.features[1], due);
-    this.final.learn(r, step, guess, true);
-  }
-}
-
-/** Decodes the coded channels of a group in a segment. */
-class LinkedDecoder extends BitDecoder {
-  /**
-   * @param {BigInt64Array} ordinals where they go
-   * @param {(reader: ByteReader, heads: object[], nRows: number) => ?Float64Array} echoesOf reads
-   *     the echoes in front of the links
-   */
-  constructor(ordinals, echoesOf = () => null) {
-    super(ordinals, "best_start.json", [RESIDUALS, 0]);
-    this.echoesOf = echoesOf;
-  }
-
-  decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
-    const reader = new ByteReader(data, what);
-    const every = withRests(heads);
-    this.echoes = this.echoesOf(reader, every, nRows);
-    const channels = readLinks(reader, every);
-    restart(this.model, this.startModel);
-    this.coder = new RangeDecoder(reader.rest());
-    this.decode(channels, nRows, nChannels, firstIndex);
-    this.coder.finish(what);
-  }
-
-  decode(channels, nRows, nChannels, firstIndex) {
-    for (let r = 0; r < nRows; r++) {
-      this.near = 0;
-      this.other = 3;
-      for (const channel of channels) channel.nextRow();
-      channels.forEach((channel, c) => {
-        const echo = this.echoes?.[r * channels.length + c];
-        if (echo) {
-          this.echo(channels, channel, r, Math.abs(echo) - 1, echo < 0, nChannels, firstIndex);
-          return;
-        }
-        const { last, stepUnit } = channel;
-        const guess = channel.guess(r);
-        const predicted = clamp(Math.floor(last + guess * stepUnit + 0.5), -TWO_44, TWO_44);
-        this.number(channel, firstIndex + r * nChannels + channel.column, predicted);
-        this.other = channel.side1;
-        channel.learn(r, c, guess, last);
-      });
-    }
-  }
-
-  /** Takes the number at a place for that of a channel in row r. */
-  echo(channels, channel, r, place, minus, nChannels, firstIndex) {
-    const row = Math.floor(place / channels.length);
-    const { column } = channels[place % channels.length];
-    const o = this.ordinals[firstIndex + row * nChannels + column];
-    this.ordinals[firstIndex + r * nChannels + channel.column] = minus ? -1n - o : o;
-    channel.steps[0] = 0;
-  }
-
-  number(channel, index, predicted) {
-    if (channel.isPlain) this.plainOf(channel, index, predicted);
-    else this.digits(channel, index, clamp(predicted, -channel.limit, channel.limit));
-  }
-
-  /** A number in classes, counted in units of its last digit. */
-  digits(channel, index, predicted) {
-    const { fast, slow, powers, nDigits, limit } = channel;
-    const s = Math.abs(predicted);
-    const bound = Math.min(s + Math.floor(slow / 2), limit);
-    const u = Math.max(guessed(channel, bound) - nDigits, 0);
-    const power = powers[u];
-    const h = Math.floor((s + Math.floor(power / 2)) / power);
-    const f = Math.floor(fast / power);
-    const g = Math.floor(slow / power);
-    const q = (predicted < 0 ? -h : h) + this.residual(channel, false, f, g);
-    if (q === 0) this.small(channel, index, predicted, u);
-    else this.large(channel, index, predicted, u, q);
-  }
-
-  /** A number below the unit. */
-  small(channel, index, predicted, u) {
-    const { coder, model } = this;
-    const zero = model.adaptive(coder, ZERO + (channel.last === 0 ? 1 : 0));
-    const minus = model.adaptive(coder, MINUS + (predicted < 0 ? 1 : 0));
-    if (zero) {
-      this.remember(channel, 0, predicted);
-      setHalves(this.halves, index, -minus, -minus);
-      return;
-    }
-    let t = 0;
-    while (model.adaptive(coder, DOWN + t)) {
-      t++;
-      if (t > 12) throw new Refused("best: a number more than 4095 classes below the unit");
-    }
-    const c = u - (t === 0 ? 0 : 2 ** (t - 1) + coder.number(t - 1));
-    const lead = channel.decimal ? this.digit() : 1;
-    const m = lead * channel.least + this.below(channel, channel.nDigits - 1);
-    if (m < channel.least) throw new Refused("best: a mantissa that begins with 0");
-    this.accept(channel, index, predicted, minus === 1, c, m);
-  }
-
-  /** A number of q units. */
-  large(channel, index, predicted, u, q) {
-    const { powers, nDigits } = channel;
-    const count = Math.abs(q);
-    const c = guessed(channel, count) + u;
-    const j = c - nDigits - u;
-    let m;
-    if (j >= 0) {
-      if (count % powers[j] !== 0) throw new Refused(`best: ${q} units of a greater class`);
-      m = count / powers[j];
-    } else {
-      m = count * powers[-j] + this.below(channel, -j);
-    }
-    this.accept(channel, index, predicted, q < 0, c, m);
-  }
-
-  accept(channel, index, predicted, minus, c, m) {
-    const k = c - channel.width + channel.top;
-    if (!(k >= 0 && k <= channel.top)) {
-      throw new Refused(`best: class ${k} of 0 to ${channel.top}`);
-    }
-    this.take(channel, index, minus, k, m, predicted);
-  }
-
-  digit() {
-    const { coder } = this;
-    return coder.decode(EIGHT_OR_NINE) ? 8 + coder.number(1) : coder.number(3);
-  }
-
-  /** n digits, each as likely as any. */
-  below(channel, n) {
-    if (!channel.decimal) return this.coder.number(n);
-    let found = 0;
-    for (let i = 0; i < n; i++) found += this.digit() * channel.powers[i];
-    return found;
-  }
 }

@@ -60,7 +60,7 @@ function decodeSegments({ groups, grids }, segments) {
 }
 
 /** Room for the ordinals of segments. */
-function ordinalsOf(segments, nChannels) {
+export function ordinalsOf(segments, nChannels) {
   const nRows = segments.reduce((sum, segment) => sum + segment.nRows, 0);
   return new BigInt64Array(nRows * nChannels);
 }
@@ -76,7 +76,8 @@ function decodeInto(ordinals, segments, groups, grids) {
   }
 }
 
-function checkSize({ nFrames, nRows }, nChannels) {
+/** Refuses a segment that is larger than any. */
+export function checkSize({ nFrames, nRows }, nChannels) {
   const isTooLong = nRows > MAX_ROWS && nFrames > 1;
   if (isTooLong || nRows * nChannels > MAX_VALUES) {
     throw new Refused(`fast: a segment of ${nRows} rows of ${nChannels} channels`); // FAST-18
@@ -84,7 +85,7 @@ function checkSize({ nFrames, nRows }, nChannels) {
 }
 
 /** Decodes the rows of one segment. */
-class SegmentDecoder {
+export class SegmentDecoder {
   /**
    * @param {object} segment with its streams
    * @param {number[][]} groups the columns of each

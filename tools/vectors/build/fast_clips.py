@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.coding.fast.head_kernels import TAP_UNIT, scale_of
 from mcz.coding.forms.counts import Law
-from mcz.coding.forms.lattice import Lattice, form_of_grid
+from mcz.coding.forms.ids import form_of_grid
 from mcz.numbers import Grid
 from mcz.schema import varint
 from tools.vectors.build import fast_heads
@@ -160,7 +160,7 @@ def _lane(coded: Coded, grid: Grid, numbers: list[int]) -> _Lane:
     lattice[tail.REST] = scale_of(coded.rest_scale) if coded.rests else -1
     head = fast_heads.CodedHead(
         form,
-        Lattice(base, digits, coded.drop, top),
+        fast_heads.Lattice(base, digits, coded.drop, top),
         coded.form is not None,
         fields,
         scale=coded.scale,

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.forms.lattice import Lattice
 from mcz.schema import varint
 
 CODED, CONSTANT, COPY, STEPS = range(4)  # bits 0 and 1 of ``kind``
@@ -20,6 +19,16 @@ TINY, HAS_PARENT, HAS_EXCEPTIONS, OWN_FORM = 16, 32, 64, 128
 FITTED = 3
 
 Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """How ordinals of a channel are split: base 0 plain, else classes of mantissas."""
+
+    base: int
+    digits: int
+    drop: int = 0
+    top: int = 0
 
 
 @dataclass(slots=True)

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded, Segment
-from mcz.codecs.lossless.best_streams import Link
-from mcz.coding.forms.lattice import form_of_grid
+from mcz.coding.forms.ids import form_of_grid
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
 from tools.vectors.build import (
     best_clips,
     fast_clips,
-    lossless_clips,
 )
 from tools.vectors.build.edits import raw_stream
 from tools.vectors.build.random_parts import (
@@ -205,7 +203,7 @@ def clip_of_ordinals(chance: Chance, name: str) -> Clip:
     codec = replace(
         by_name("fast" if name == SPELLED else name), encode=encode, parameters=raw.CODEC.parameters
     )
-    return Clip(codec, motion, grouping)
+    return Clip(codec, motion, "all" if name == "best" else grouping)
 
 
 Streams = Callable[[Chance, Any, Sequence[Grid], Ints, dict[int, int]], tuple[bytes, ...]]
@@ -239,30 +237,29 @@ def _raw_streams(
 def _best_streams(
     chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
 ) -> tuple[bytes, ...]:
-    """Streams of ``_heads``, with any links."""
-    every = _heads(chance, layout, grids, block, copies)
-    streams = []
+    """Streams with any references."""
+    _heads(chance, layout, grids, block, copies)  # what follows is drawn as when best had these
+    references: list[list[int]] = []
+    method = 0
     for group in layout.groups:
-        links = [_link(chance, channel) for channel in range(len(group))]
-        own = [layout.grids[channel] for channel in group]
-        heads, method = [every[channel] for channel in group], int(chance.random() < 0.8)
-        made = best_clips.build_stream(block[:, list(group)], own, heads, links, method=method)
-        streams.append(made)
-    return tuple(streams)
+        references += [_references(chance, channel) for channel in range(len(group))]
+        method |= int(chance.random() < 0.8)
+    args = block, tuple(grids), layout.grids, references
+    return tuple(best_clips.build_stream(*args, method=method) for _ in layout.groups)
 
 
-def _link(chance: Chance, channel: int) -> Link:
-    seen = [chance.randrange(channel) for _ in range(chance.randrange(9))] if channel else []
-    unit = chance.randrange(45)
-    return Link(unit, unit + chance.randrange(16), tuple(seen))
+def _references(chance: Chance, channel: int) -> list[int]:
+    found = [chance.randrange(channel) for _ in range(chance.randrange(9))] if channel else []
+    chance.randrange(45), chance.randrange(16)  # as when channels had units
+    return found
 
 
 def _heads(
     chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
-) -> list[lossless_clips.Head]:
+) -> list[Drawn | fast_clips.Constant | fast_clips.Copy]:
     """Constants, copies where the ordinals allow it, and coded channels with any taps."""
     place = {c: (g, k) for g, group in enumerate(layout.groups) for k, c in enumerate(group)}
-    heads: list[lossless_clips.Head] = []
+    heads: list[Drawn | fast_clips.Constant | fast_clips.Copy] = []
     for c in range(layout.n_channels):
         column = block[:, c]
         twin = copies.get(c)
@@ -307,7 +304,7 @@ def _fast_streams(
     return fast_clips.streams_of(layout, block, _with_parents(own, layout, place, heads))
 
 
-def _lane(own: Chance, made: lossless_clips.Coded, column: Ints, form: int) -> fast_clips.Coded:
+def _lane(own: Chance, made: Drawn, column: Ints, form: int) -> fast_clips.Coded:
     """A coded channel of fast, with perhaps an exception."""
     numbers, row = column.tolist(), own.randrange(len(column))
     exceptions: tuple[tuple[int, int], ...] = ()
@@ -347,15 +344,21 @@ def _with_parents(
     return found
 
 
-def _coded(chance: Chance, form: int | None) -> lossless_clips.Coded:
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """What is drawn of the head of a coded channel; ``form`` None: that of the grid."""
+
+    form: int | None
+    scale: int
+    taps: tuple[int, ...]
+
+
+def _coded(chance: Chance, form: int | None) -> Drawn:
     wild = chance.random() < 0.2
     taps = [chance.randrange(-511, 512) if wild else chance.randrange(-9, 40) for _ in range(8)]
-    return lossless_clips.Coded(
-        form,
-        scale=chance.choice((0, 3, 8, 40, 77, 172)),
-        from_last=chance.randrange(2),
-        taps=tuple(taps[: chance.randrange(9)]),
-    )
+    scale = chance.choice((0, 3, 8, 40, 77, 172))
+    chance.randrange(2)  # what follows is as it was when heads had this bit
+    return Drawn(form, scale, tuple(taps[: chance.randrange(9)]))
 
 
 _WRITERS: dict[str, Streams] = {

@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 MOST = 2**40  # of an integer that a lossy codec codes
 SPELLED = "fast, forms told"  # fast, whose heads may say the form that their grid has
 OLDER = ("raw", SPELLED, *"mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online".split())
-NAMES = (*(name for name in OLDER if name != SPELLED), "best", "posewave", "fast", "lossless")
+NAMES = (*(name for name in OLDER if name != SPELLED), "best", "posewave", "fast")
 LETTERS = "abc\u00e4\u00df 0\u03c9\U0001f6b6\ufeff"
 
 

@@ -71,7 +71,7 @@ test("what is no motion file is told", async () => {
 });
 
 const CODECS =
-  "awt best dwt fast lossless lsdt-clip lsdt-frame mdtt mrdwt online pca pca-rdo posewave qbc raw".split(" ");
+  "awt best dwt fast lsdt-clip lsdt-frame mdtt mrdwt online pca pca-rdo posewave qbc raw".split(" ");
 
 /** Some files of the conformance suite of a codec. */
 const vectorsOf = (codec) =>

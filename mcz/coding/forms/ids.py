@@ -1,0 +1,34 @@
+"""The ids of forms: those with a unit, and that which a grid has by its kind.
+
+SPEC.md, "Codec 1: fast", is normative.
+"""
+
+from __future__ import annotations
+
+from mcz.numbers import Grid, GridKind, printed_base
+
+MULTIPLES = 32  # integers that are multiplied by a unit, to binary32
+PRODUCTS = 33  # odd numbers, shifts and a unit, to a decimal grid
+COUNTS = 34  # integers that a law makes binary32 numbers, and rests
+WITH_UNIT = MULTIPLES, PRODUCTS, COUNTS
+BINARY_24, BINARY_53 = 88, 117  # classes of so many binary digits
+
+
+def form_of_grid(grid: Grid) -> int:
+    """The form of a channel whose head does not say it."""
+    if grid.kind == GridKind.PRINTED:
+        return form_of_grid(printed_base(grid))
+    if grid.kind == GridKind.GENERAL:
+        return grid.digits
+    if grid.kind in (GridKind.TEXT64, GridKind.BINARY64):
+        return BINARY_53
+    if grid.kind in (GridKind.TEXT32, GridKind.BINARY32, GridKind.VAX_F):
+        return BINARY_24
+    return 0
+
+
+def has_binary32(grid: Grid) -> bool:
+    """Whether ordinals of the grid are those of BINARY32, which forms 32 and 34 give."""
+    return grid.kind == GridKind.BINARY32 or (
+        grid.kind == GridKind.PRINTED and printed_base(grid).kind == GridKind.TEXT32
+    )
