@@ -42,7 +42,7 @@ RESIDUALS = 0, 0  # first context and mixer
 
 
 class Rests(NamedTuple):
-    """What counts are off, (rows, channels), and first scales, -1 of a channel without rests."""
+    """Rests of counts, (rows, channels), and first scales, -1 of a channel without rests."""
 
     values: Words2
     scales: Ints

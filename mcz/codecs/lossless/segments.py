@@ -1,4 +1,4 @@
-"""How long segments of the lossless codecs are."""
+"""The length of segments, as a parameter of the lossless codecs."""
 
 from __future__ import annotations
 

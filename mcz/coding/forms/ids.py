@@ -28,7 +28,7 @@ def form_of_grid(grid: Grid) -> int:
 
 
 def has_binary32(grid: Grid) -> bool:
-    """Whether ordinals of the grid are those of BINARY32, which forms 32 and 34 give."""
+    """Tell grids whose ordinals are those of BINARY32, which forms 32 and 34 give."""
     return grid.kind == GridKind.BINARY32 or (
         grid.kind == GridKind.PRINTED and printed_base(grid).kind == GridKind.TEXT32
     )

@@ -67,7 +67,7 @@ def next_unit(
 def count_open(
     values: Floats, ordinals: Ints, unit: float, tens: Floats, powers: Floats, digits: int
 ) -> int:
-    """How many multiples of a unit are to be printed; -1 where another has another ordinal."""
+    """Count the multiples of a unit to be printed; -1 where another has another ordinal."""
     power = left = 0
     for row in range(len(values)):
         size = np.rint(abs(values[row]) / unit)
