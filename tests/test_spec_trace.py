@@ -16,7 +16,7 @@ def test_ordinals_are_those_that_the_text_says() -> None:
     assert leads == list(spec_trace.ORDINALS[1:])
     said = " ".join(SPEC.split("## A traced stream\n")[1].split("<!--")[0].split())
     assert ", ".join(f"{one} {two}" for one, two in spec_trace.ORDINALS) + ". The" in said
-    assert spec_trace.STREAM.hex(" ").upper() in said
+    assert f"The stream is ``` {spec_trace.STREAM.hex(' ').upper()} ```" in said
 
 
 def test_lines_of_the_text_are_those_of_the_decoder() -> None:

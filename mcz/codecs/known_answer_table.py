@@ -109,17 +109,17 @@ ANSWERS = {
     ),
     "posewave": KnownAnswer(
         0, "all",
-        "03010000cdcc4c3d000040400888910209000004000306020000",
+        "03010000cdcc4c3d000040404888910209000004000306020000",
         (
             (
-                "00ff7775f1dcd878f9da143a75ccf7a0f33b144f6fe3f550cbb74f5463e9c0bbb165f88117c3"
-                "cf75f887"
+                "00ff7775f1dcd878f9da143293523e66796beffc76de903286eaaa5fb196ed6c35dcd8f2dd84"
+                "3df7cd12"
             ),
-            "08014ffe61fdc0471a001e6e27231391998b25e93f35ddb5c8f11e669b",
-            "904876623047fce0fa9ac7e8c4dd24cbeebd7601000aca012b636057a8",
-            "16b37577d2972f69e96cb352559aba97b3c75b",
+            "06d7daedceb9b7dfec873098c005a890aa2bbafd4f07c192c376e107",
+            "abbf97ab72aba38ff76116ea176ae654b506b8c8fe48fc74a78f56e315",
+            "195a098e4f617b6122c7796b95b8ccf0d0b5",
         ),
-        "7aa0e2a7e1752e17771eeaba367dc71bf7c1ff4c4cce8e2b09f76adb2bb20ddc",
+        "f0718572ce7234851409f20a67ace319ec9b0c8c3b94acc23b52d6fe953b8274",
     ),
     "mrdwt": KnownAnswer(
         0, "channel",

@@ -21,6 +21,7 @@ export class Holder {
    */
   constructor({ rounds, points }, { joints }, metric, kept, greatest) {
     Object.assign(this, { rounds, metric, kept });
+    metric.stiffen(1);
     this.limits = greatest.map((step) => MOST_STEPS * step);
     this.points = points.map(({ joint, tail }) => {
       const path = [];

@@ -40,10 +40,15 @@ export class Pyramid {
     return level === 0 ? lengths[nDetails] : Math.floor(lengths[nDetails - level] / 2);
   }
 
+  /** The root of how many frames a coefficient of a level bears on. */
+  root(level) {
+    const k = level === 0 ? this.nDetails : this.depth(level) - 1;
+    return 2 ** (k >> 1) * (k % 2 === 0 ? 1 : ROOT_2);
+  }
+
   /** The step of a level: that of its rows whose exponent is 0. */
   step(level) {
-    const k = level === 0 ? this.nDetails : this.depth(level) - 1;
-    return this.greatest / (2 ** (k >> 1) * (k % 2 === 0 ? 1 : ROOT_2));
+    return this.greatest / this.root(level);
   }
 }
 
@@ -88,6 +93,7 @@ export class Walk {
     const { kept, pose, metric, expected, moved, below, above } = this;
     const n = kept.length;
     const step = this.pyramid.step(0);
+    this.stiffen(0);
     const y = new Float64Array(n);
     const signal = new Float64Array(rows.length);
     for (let at = 0; at < rows.length; this.nRows++) {
@@ -126,6 +132,11 @@ export class Walk {
     this.signal = join(this.signal, detail, this.kept.length);
   }
 
+  /** Makes the metric that of a level. */
+  stiffen(level) {
+    if (this.metric.spread > 0) this.metric.stiffen(this.pyramid.root(level));
+  }
+
   /** Poses halfway from each approximation to the next. */
   setPoses(level, nRows) {
     const { signal } = this;
@@ -144,6 +155,7 @@ export class Walk {
     const { kept, pose, poses, metric, posesLevel } = this;
     const n = kept.length;
     const step = this.pyramid.step(level);
+    this.stiffen(level);
     const lastPose = poses.length / n - 1;
     const y = new Float64Array(n);
     let factor = null;

@@ -174,11 +174,11 @@ export class PoseMetric {
    * @param {import("./skel.js").Skeleton} skeleton
    * @param {number[]} kept the columns of its kept channels, ascending
    * @param {ArrayLike<number>} reg of each kept channel what is added to the diagonal
-   * @param {{radius: number, kappa: number, weights?: number[], orders?: ArrayLike<number>,
-   *   whole?: boolean}} shell its radius, its share, the weights and axis orders of joints, and
-   *   whether whole turns are in the metric
+   * @param {{radius: number, kappa: number, spread: number, weights?: number[],
+   *   orders?: ArrayLike<number>, whole?: boolean}} shell its radius, its share, that of the
+   *   spread, the weights and axis orders of joints, and whether whole turns are in the metric
    */
-  constructor(skeleton, kept, reg, { radius, kappa, weights, orders = [], whole = false }) {
+  constructor(skeleton, kept, reg, { radius, kappa, spread, weights, orders = [], whole = false }) {
     const { joints, channels, angleUnit, intrinsic } = skeleton;
     this.nKept = kept.length;
     this.whole = whole;
@@ -187,7 +187,9 @@ export class PoseMetric {
     this.isPlain =
       angleUnit === UNKNOWN_UNIT &&
       (channels.some(isRotation) || (whole && channels.some(isVector)) || joints.some(hasAxis));
-    this.reg = Float64Array.from(reg, (r) => clamp(r, LEAST_REG, GREATEST_REG));
+    this.usualReg = reg;
+    this.stiffen(1);
+    this.spread = spread;
     this.numbers = new Map(kept.map((of, number) => [of, number]));
     const points = joints.map((joint) => pointsOf(joint, pointSet(skeleton)));
     const nPoints = points.reduce((sum, own) => sum + own.length, 0);
@@ -218,6 +220,13 @@ export class PoseMetric {
     this.axes = new Float64Array(9 * joints.length);
     this.inertia = new Float64Array(10 * joints.length);
     this.motions = new Float64Array(6 * this.nKept);
+  }
+
+  /** Takes so many times what is added to the diagonal. */
+  stiffen(factor) {
+    this.reg = Float64Array.from(this.usualReg, (r) =>
+      clamp(r * factor, LEAST_REG, GREATEST_REG),
+    );
   }
 
   movesOf({ channels, firstColumn }, above) {
@@ -302,9 +311,23 @@ export class PoseMetric {
           motions[m + 4] * f[4] +
           motions[m + 5] * f[5];
       }
+      if (this.spread > 0) entries[starts[c + 1] - 1] += this.spreadOf(c);
     }
     this.eliminate(entries);
     return entries;
+  }
+
+  /** What is added to the diagonal of a channel, by what its joint moves. */
+  spreadOf(c) {
+    const { inertia, motions, origins, spread } = this;
+    const [k, o, m] = [10 * this.jointOf[c], 3 * this.jointOf[c], 6 * c];
+    const [x, y, z] = [origins[o], origins[o + 1], origins[o + 2]];
+    const q = x * x + y * y + z * z;
+    const u = x * inertia[k + 1] + y * inertia[k + 2] + z * inertia[k + 3];
+    const sum = inertia[k + 4] + inertia[k + 5] + inertia[k + 6];
+    const t = Math.max(sum + 2 * (inertia[k] * q) - 4 * u, 0);
+    const [u0, u1, u2] = [motions[m], motions[m + 1], motions[m + 2]];
+    return spread * (u0 * u0 + u1 * u1 + u2 * u2) * t;
   }
 
   /** The place of a joint's origin, 0, or of one of its tails, from 1, along its B. */

@@ -21,6 +21,7 @@ from mcz.codecs.posewave.header import (
     MAX_FINE,
     NAME,
     REFINING,
+    SPREADS,
     WHOLE_TURNS,
     Header,
     build_header,
@@ -46,20 +47,21 @@ Floats = NDArray[np.float64]
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
 RADIUS_CM = 3.0  # of the shell, as ACL measures it
 PROPORTION = 1 / 30  # of the shell to the skeleton where the unit is unknown: 3 cm of 90 cm
-GREATEST_DEGREES, GREATEST_CM = 4.0, 20.0  # steps beyond which the metric says nothing any more
+GREATEST_DEGREES = 4.0  # a step beyond which the metric says nothing any more, of fine steps
 SHELL = 8  # sixteenths
+FINE_SPREAD, COARSE_SPREAD = 2, 3  # octaves above 2^-10
 COARSE_CM = 0.065  # a step from which on the second start table is nearer
 SHARE_OF_CONSTANT = 0.25  # of a step: how far a constant channel may move points
 SPREAD_CM = 2.0  # a step of so much would be as large as a plain channel spreads
 SAMPLED_FRAMES = 128  # where it is measured
 FINE_CM = 0.08  # a step below which first poses are told more exactly
 SPATIAL = (*ROTATION_KINDS, *POSITION_KINDS)
-LEVELS = (2, 3, 4, 5)  # that are tried
+LEVELS = ((0.06, (2, 3, 4, 5)), (0.1, (3, 4, 5)), (math.inf, (4, 5, 6, 7)))  # tried below a step
 TRIAL_FRAMES = 2048
 SAMPLED = 8  # every so many frames an error is measured in a trial
 EXCHANGE = 0.75  # how fast bytes fall as errors rise, in logarithms: where a trial is better
-STEPS_CM = 0.01, 0.3  # between these steps the weight of a bit goes from the first to the second
-RATE_WEIGHTS = 0.09, 0.2
+STEPS_CM = 0.01, 0.045  # between these steps the weight of a bit goes from the first to the second
+RATE_WEIGHTS = 0.09, 0.14
 USUAL = (0.0047, 0.03, 0.1, 0.28, 1.0), (0.01, 0.048, 0.1, 0.19, 0.5)  # steps, mean errors
 MEAN_TO_BOUND = 0.22  # the mean error with which a bound takes the fewest bytes
 STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
@@ -96,7 +98,7 @@ def choose(source: SignalSource, params: Params) -> Choice:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]
     fields["levels"] = params["levels"]
     if fields["levels"] is None:
-        fields["levels"] = best_levels(source, skeleton, fields, weights)
+        fields["levels"] = best_levels(source, skeleton, fields, weights, step_cm)
     fields["borrowing"] = min(1, fields["levels"])
     fields["contacts"], keeper = _contacts(source, params, step / step_cm)
     return Choice(build_header(**fields), weights, keeper)
@@ -182,11 +184,11 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
         "flags": WHOLE_TURNS if has_whole_turns(skeleton) else 0,
         "step": step,
         "radius": RADIUS_CM * in_cm,
-        "shell": SHELL,
-        "rotation": code_of(GREATEST_DEGREES * degree),
-        "position": code_of(GREATEST_CM * in_cm),
+        "shell": SHELL + SPREADS * (FINE_SPREAD if step_cm < 0.1 else COARSE_SPREAD),
+        "rotation": code_of(greatest_degrees(step_cm) * degree),
+        "position": code_of(greatest_cm(step_cm) * in_cm),
         "first": first,
-        "constant": _halvings(skeleton, step, in_cm) - first,
+        "constant": _halvings(skeleton, step, step_cm) - first,
         "plain": [],
         "weights": [],
         "orders": [],
@@ -194,9 +196,23 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
     }
 
 
-def _halvings(skeleton: Skeleton, step: float, in_cm: float) -> int:
+def greatest_degrees(step_cm: float) -> float:
+    """The greatest step of an angle, which grows with coarse steps."""
+    if step_cm < 0.1:
+        return GREATEST_DEGREES
+    usual = GREATEST_DEGREES * math.pow(step_cm / 0.05, 0.6)
+    return usual * (1.0 if step_cm < 0.15 else min(max(math.pow(step_cm / 0.4, 0.4), 1.0), 1.5))
+
+
+def greatest_cm(step_cm: float) -> float:
+    """The same of a position."""
+    return greatest_degrees(step_cm) * (5.0 if step_cm < 0.1 else 0.5)
+
+
+def _halvings(skeleton: Skeleton, step: float, step_cm: float) -> int:
     """From the greatest steps to those with which a constant channel moves no point by a step."""
-    moved = max(GREATEST_CM * in_cm, math.radians(GREATEST_DEGREES) * reach(skeleton))
+    degrees = greatest_degrees(step_cm)
+    moved = max(greatest_cm(step_cm) * step / step_cm, math.radians(degrees) * reach(skeleton))
     needed = min(max(moved / (SHARE_OF_CONSTANT * step), 1.0), 2.0**MAX_FINE)
     return max(math.ceil(math.log2(needed)), 6)
 
@@ -241,12 +257,15 @@ def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> Setting
     }
 
 
-def best_levels(source: SignalSource, skeleton: Skeleton, fields: Params, weights: Weights) -> int:
+def best_levels(
+    source: SignalSource, skeleton: Skeleton, fields: Params, weights: Weights, step_cm: float
+) -> int:
     """How many levels make the beginning of the clip smallest for what they get wrong."""
     layout = source.layout
     n_frames = min(TRIAL_FRAMES, layout.n_frames, layout.most_frames)
-    if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(LEVELS):
-        return min(LEVELS)
+    tried = next(levels for step, levels in LEVELS if step_cm < step)
+    if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(tried):
+        return min(tried)
     values = FrameReader(NAME, source).next(n_frames)
     orders = Orders(fields["orders"], skeleton)
     coded = orders.coded(values)
@@ -262,7 +281,7 @@ def best_levels(source: SignalSource, skeleton: Skeleton, fields: Params, weight
         error = distortion(header, skeleton, values[::SAMPLED], found)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 
-    return min(LEVELS, key=score)
+    return min(tried, key=score)
 
 
 def distortion(header: Header, skeleton: Skeleton, values: Floats, found: Floats) -> float:

@@ -46,7 +46,7 @@ Floats = NDArray[np.float64]
 NAME = "posewave"
 MAX_LEVELS = 8
 MAX_FINE = 24
-WHOLE_SHARE = 16
+WHOLE_SHARE, SPREADS = 16, 32  # of ``shell``
 REFINING, WHOLE_TURNS = 1, 2  # of ``flags``
 
 
@@ -71,7 +71,9 @@ class PosewaveHeader(Record):
         bounded(Float32l, 0, 2.0**60), "of the shell, in length units, 0 to 2^60"
     )  # PWAVE-10
     shell: int = field(
-        bounded(Int8ul, 0, WHOLE_SHARE), "share of the shell in the metric, in sixteenths"
+        Checked(Int8ul, lambda n: n % SPREADS <= WHOLE_SHARE),
+        "bits 0-4: share of the shell in the metric, in sixteenths; "
+        "5-7: spread, in octaves; 0: none",
     )  # PWAVE-11
     rotation: int = field(Int8ul, "step code of the greatest step of a rotation channel")
     position: int = field(Int8ul, "step code of the greatest step of a position channel")
@@ -121,6 +123,7 @@ class Header:
     step: float
     radius: float
     shell: float
+    spread: float
     greatest: Floats
     first: Floats
     constant: Floats
@@ -208,7 +211,8 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         whole=whole,
         step=fields.step,
         radius=fields.radius,
-        shell=fields.shell / WHOLE_SHARE,
+        shell=fields.shell % SPREADS / WHOLE_SHARE,
+        spread=_spread(fields.shell // SPREADS),
         greatest=greatest,
         first=first,
         constant=first * 2.0**-fields.constant,
@@ -218,6 +222,10 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         exact_groups=tuple(fields.exact),
         contacts=parse_contacts(fields.contacts, skeleton, NAME),
     )
+
+
+def _spread(octaves: int) -> float:
+    return 2.0 ** (octaves - 10) if octaves else 0.0
 
 
 def _exact(groups: Sequence[int], layout: Layout) -> NDArray[np.bool_]:

@@ -5,6 +5,7 @@ SPEC.md, "Pose metric", is normative.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cache
 from types import ModuleType
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.posewave.header import Header
+from mcz.codecs.posewave.skeleton_plan import bounded_regularization, make_plan
 from mcz.motion import Skeleton
 
 Floats = NDArray[np.float64]
@@ -43,20 +45,27 @@ class Metric:
     def __init__(
         self, header: Header, skeleton: Skeleton, kept: NDArray[np.bool_], still: Floats
     ) -> None:
-        from mcz.codecs.posewave.skeleton_plan import make_plan
-
         self.kept, self.still = np.flatnonzero(kept), still
         ratios = header.step / header.greatest[kept]
+        self.regularization: Floats = ratios * ratios
         self.plan = make_plan(
             skeleton,
             kept,
-            ratios * ratios,
+            self.regularization,
             radius=header.radius,
             kappa=header.shell,
+            spread=header.spread,
             joint_weights=header.weights,
             orders=header.orders,
             whole=header.whole,
         )
+
+    def stiffened(self, factor: float) -> Metric:
+        """The metric with ``factor`` times what is added to the diagonal by the greatest steps."""
+        found = copy(self)
+        stiffer = bounded_regularization(self.regularization * factor)
+        found.plan = self.plan._replace(regularization=stiffer)
+        return found
 
     def factors(self, poses: Floats) -> Floats:
         """Those of ``poses``, (n_poses, n_kept): (n_poses, n_entries)."""

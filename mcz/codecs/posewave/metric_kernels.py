@@ -62,6 +62,8 @@ def factor_rows(
         place_joints(plan, values, first, batch, lanes)
         gather_inertia(plan, axes, origins, inertia, lanes)
         _measure(plan, motions, inertia, force, entries, lanes)
+        if plan.spread > 0.0:
+            _stiffen(plan, motions, inertia, origins, entries, lanes)
         _eliminate(plan, batch, entries, pivots, width, lanes)
         for at in range(n_kept * width):
             pivots[at] = inverse_root(pivots[at])
@@ -96,6 +98,24 @@ def _measure(
                     + motions[other, 4, p] * force[4, p]
                     + motions[other, 5, p] * force[5, p]
                 )
+
+
+def _stiffen(
+    plan: Plan, motions: Floats3, inertia: Floats3, origins: Floats3, entries: Floats2, lanes: int
+) -> None:
+    """Add to the diagonal of each turn a share of the inertia of all that its joint moves."""
+    for number in range(len(plan.joints)):
+        joint, last = plan.joints[number], plan.starts[number + 1] - 1
+        if joint != PLAIN:
+            moved, place, turn = inertia[joint], origins[joint + 1], motions[number]
+            for p in range(lanes):
+                x, y, z = place[0, p], place[1, p], place[2, p]
+                squared = x * x + y * y + z * z
+                along = x * moved[1, p] + y * moved[2, p] + z * moved[3, p]
+                whole = moved[4, p] + moved[5, p] + moved[6, p]
+                whole = max((whole + 2.0 * (moved[0, p] * squared)) - 4.0 * along, 0.0)
+                x, y, z = turn[0, p], turn[1, p], turn[2, p]
+                entries[last, p] += (plan.spread * (x * x + y * y + z * z)) * whole
 
 
 def _force(inertia: Floats2, motion: Floats2, force: Floats2, lanes: int) -> None:

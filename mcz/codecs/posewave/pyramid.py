@@ -36,10 +36,10 @@ class Pyramid:
         lengths, depth = self.lengths, self.depth(level)
         return lengths[-1] if level == 0 else lengths[depth - 1] // 2
 
-    def step(self, level: int, step: float) -> float:
-        """The quantizer step of a level: all coefficients weigh alike, were they orthonormal."""
+    def root(self, level: int) -> float:
+        """The root of how many frames a coefficient bears on: what makes all weigh alike."""
         octaves = self.depth(level) - (level > 0)
-        return step / (float(2 ** (octaves // 2)) * (ROOT_2 if octaves % 2 else 1.0))
+        return float(2 ** (octaves // 2)) * (ROOT_2 if octaves % 2 else 1.0)
 
     def exponents(self, level: int, refinement: Ints) -> Ints:
         """The exponent of each row: the greatest that ``refinement`` asks of frames it bears on.

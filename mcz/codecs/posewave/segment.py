@@ -117,9 +117,7 @@ def encode_coded(
     found = walk.values()
     if header.contacts and kept.any():
         held = walk.held(header.contacts)
-        (contacts or Keeper()).encode(
-            header.contacts, walk.metric.plan, held, stream, values, found
-        )
+        (contacts or Keeper()).encode(header.contacts, walk.usual.plan, held, stream, values, found)
     streams.append(stream.finish())
     empty = [b""] * (header.levels - pyramid.n_details)
     return (streams[0], *empty, *streams[1:]), found
@@ -165,7 +163,7 @@ def decode_segment(
     values = walk.values()
     if held and len(streams) > pyramid.n_details:
         assert header.contacts is not None
-        plan = walk.metric.plan
+        plan = walk.usual.plan
         decode_contacts(header.contacts, plan, held, stream, values, f"{where}: contacts")
     return orders.values(values, notes)
 

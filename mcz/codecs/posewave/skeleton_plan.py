@@ -56,7 +56,7 @@ class Plan(NamedTuple):
     quaternion has four of them, of the axis QUATERNION, a rotation vector three, of VECTOR.
     Of kept channels: ``joints`` (n_kept,), -1 for a plain one; ``starts`` (n_kept + 1,), its row in
     ``path`` (n_entries,): the channels from the first of its block down to itself, as numbers among
-    the kept; ``regularization`` (n_kept,).
+    the kept; ``regularization`` (n_kept,). ``spread`` stiffens each turn by what its joint moves.
     ``n_channels`` are those of the skeleton.
     """
 
@@ -73,6 +73,7 @@ class Plan(NamedTuple):
     starts: Ints
     path: Ints
     regularization: Floats
+    spread: float
     rule: Rule
     n_channels: int
 
@@ -93,6 +94,7 @@ def make_plan(
     *,
     radius: float,
     kappa: float = 0.5,
+    spread: float = 0.0,
     joint_weights: Floats | None = None,
     orders: Sequence[int] = (),
     whole: bool = False,
@@ -101,7 +103,8 @@ def make_plan(
 
     ``regularization`` (n_kept,) is added to the diagonal; of a plain channel it is the diagonal.
     ``radius`` of the shell is in length units, ``kappa`` the shell's part of the whole,
-    ``joint_weights`` (n_joints,) multiply what a joint has of both. ``orders`` (n_joints,), or
+    ``spread`` times what a turn would move, were it about an axis across, is added to its diagonal.
+    ``joint_weights`` (n_joints,) multiply what a joint has of all these. ``orders`` (n_joints,), or
     none, are codes of axis orders. ``whole``: quaternions and rotation vectors turn.
 
     All but positions and what turns are plain. The pose takes scales as 1 and lengths as 0. All
@@ -124,7 +127,6 @@ def make_plan(
     if has_kinematics(skeleton, whole):
         moving |= {column for column, _ in moves}
     joints, starts, path = _rows(skeleton, numbers, int(np.count_nonzero(kept)), moving)
-    least, greatest = LEAST_REGULARIZATION, GREATEST_REGULARIZATION
     return Plan(
         parents=skeleton.parents,
         changes=_floats(map(_change, _aboves(skeleton, frames), frames), 3, 3),
@@ -138,12 +140,16 @@ def make_plan(
         joints=_ints(joints),
         starts=_ints(starts),
         path=_ints(path),
-        regularization=np.array(
-            [min(max(float(r), least), greatest) for r in regularization], np.float64
-        ),
+        regularization=bounded_regularization(regularization),
+        spread=float(spread),
         rule=rule,
         n_channels=skeleton.n_channels,
     )
+
+
+def bounded_regularization(given: Floats) -> Floats:
+    """What may stand on a diagonal."""
+    return np.clip(given, LEAST_REGULARIZATION, GREATEST_REGULARIZATION)
 
 
 def limited(value: float) -> float:

@@ -57,7 +57,8 @@ class Walk:
         """``first`` (n_channels,) is the pose before the first; channels not ``kept`` keep it."""
         self.header, self.pyramid, self.still = header, pyramid, first
         self.kept = np.flatnonzero(kept)
-        self.metric = Metric(header, skeleton, kept, first)
+        self.usual = Metric(header, skeleton, kept, first)
+        self.metric = self._metric_of(0)  # that of the level at hand
         self.poses = self.approx = np.zeros((0, len(self.kept)))
         self.lanes = kernels().lanes_of(self.metric.plan, 1)
         self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
@@ -77,12 +78,18 @@ class Walk:
     def held(self, contacts: Contacts) -> Held:
         """The points of contacts, as they hang from the kept channels."""
         greatest = self.header.greatest[self.kept]
-        return make_held(contacts, self.metric.plan, self.kept, greatest)
+        return make_held(contacts, self.usual.plan, self.kept, greatest)
+
+    def _metric_of(self, level: int) -> Metric:
+        """That of a level: the coarser it is, the less do its poses say of the frames between."""
+        if not self.header.spread:
+            return self.usual
+        return self.usual.stiffened(self.pyramid.root(level))  # PWAVE-21, PWAVE-22
 
     def steps(self, level: int, exponents: Ints) -> Floats:
         """The step of each row, (n_rows, 1)."""
         halved: Floats = np.ldexp(1.0, -exponents).astype(np.float64)
-        return self.pyramid.step(level, self.header.step) * halved[:, None]
+        return self.header.step / self.pyramid.root(level) * halved[:, None]
 
     def code_coarsest(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """Level 0, a row at a time: ``code`` gives what a decoder will have of it."""
@@ -122,6 +129,7 @@ class Walk:
         n_rows = pyramid.rows(level)
         if pyramid.depth(level) > pyramid.borrowing:  # PWAVE-22
             self.poses, self.level = between(self.approx, n_rows), level
+        self.metric = self._metric_of(level)
         found: Ints = np.minimum(np.arange(n_rows) >> (level - self.level), len(self.poses) - 1)
         return found
 

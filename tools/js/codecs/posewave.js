@@ -23,6 +23,7 @@ const WHOLE_TURNS = 2;
 
 const MAX_LEVELS = 8;
 const MAX_SHELL = 16;
+const SPREADS = 32;
 const MAX_FINE = 24;
 const MAX_START = 1;
 const MAX_ORDER = 6;
@@ -79,7 +80,11 @@ function readHeader(bytes, skeleton, groups) {
   if (!(step >= 1 / GREATEST_LENGTH && step <= GREATEST_LENGTH)) reader.refuse(`a step of ${step}`);
   const radius = reader.f32();
   if (!(radius >= 0 && radius <= GREATEST_LENGTH)) reader.refuse(`a radius of ${radius}`);
-  const kappa = upTo(reader, MAX_SHELL, "sixteenths") / MAX_SHELL;
+  const shares = reader.u8();
+  const shell = shares % SPREADS;
+  if (shell > MAX_SHELL) reader.refuse(`${shell} sixteenths`);
+  const kappa = shell / MAX_SHELL;
+  const spread = shares < SPREADS ? 0 : 2 ** (Math.floor(shares / SPREADS) - 10);
   const steps = [stepOf(reader.u8()), stepOf(reader.u8())];
   const first = upTo(reader, MAX_FINE, "halvings");
   const constant = upTo(reader, MAX_FINE, "halvings");
@@ -100,7 +105,7 @@ function readHeader(bytes, skeleton, groups) {
   const firstStep = greatest.map((x) => x * 2 ** -first);
   const constantStep = firstStep.map((x) => x * 2 ** -constant);
   return {
-    ...{ levels, borrowing, start, refining, whole, step, radius, kappa, weights, orders },
+    ...{ levels, borrowing, start, refining, whole, step, radius, kappa, spread, weights, orders },
     axisOrders: new AxisOrders(skeleton, orders),
     ...{ kinds, greatest, firstStep, constantStep, exactGroups },
     exactColumns: new Set(exactGroups.flatMap((g) => groups[g])),
