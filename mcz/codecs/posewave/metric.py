@@ -54,11 +54,10 @@ class Metric:
             self.regularization,
             radius=header.radius,
             kappa=header.shell,
-            spread=header.spread,
             joint_weights=header.weights,
             orders=header.orders,
             whole=header.whole,
-        )
+        )._replace(spread=header.spread)
 
     def stiffened(self, factor: float) -> Metric:
         """The metric with ``factor`` times what is added to the diagonal by the greatest steps."""

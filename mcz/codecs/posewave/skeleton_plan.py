@@ -94,7 +94,6 @@ def make_plan(
     *,
     radius: float,
     kappa: float = 0.5,
-    spread: float = 0.0,
     joint_weights: Floats | None = None,
     orders: Sequence[int] = (),
     whole: bool = False,
@@ -103,8 +102,7 @@ def make_plan(
 
     ``regularization`` (n_kept,) is added to the diagonal; of a plain channel it is the diagonal.
     ``radius`` of the shell is in length units, ``kappa`` the shell's part of the whole,
-    ``spread`` times what a turn would move, were it about an axis across, is added to its diagonal.
-    ``joint_weights`` (n_joints,) multiply what a joint has of all these. ``orders`` (n_joints,), or
+    ``joint_weights`` (n_joints,) multiply what a joint has of both. ``orders`` (n_joints,), or
     none, are codes of axis orders. ``whole``: quaternions and rotation vectors turn.
 
     All but positions and what turns are plain. The pose takes scales as 1 and lengths as 0. All
@@ -141,7 +139,7 @@ def make_plan(
         starts=_ints(starts),
         path=_ints(path),
         regularization=bounded_regularization(regularization),
-        spread=float(spread),
+        spread=0.0,
         rule=rule,
         n_channels=skeleton.n_channels,
     )
