@@ -40,7 +40,7 @@ MOST_STEPS = 6
 FINER = 0.85  # from one step to the next
 MARGIN = 0.3  # octaves that are added to what a frame misses
 Limits = Sequence[tuple[str, float]]  # a joint or a group of joints, and its limit in cm
-QUALITY, WEIGHTS = "quality", "weights"
+QUALITY, WEIGHTS, LIKE = "quality", "weights", "like"
 MOST_WEIGHINGS = 8
 OVER = 1.15  # by how much more a weight grows than the square of what is missed
 MOST_WEIGHT = 2.0**24
@@ -65,10 +65,13 @@ class Trials:
         self.motion, self.codec, self.params, self.profile = motion, codec, params, profile
         self.alone = replace(motion, signals=motion.signals[:1])
         self.others = 0.0  # bytes of the further signals, which no dial changes
+        self.kept: JsonObject = {}  # what the first trial has chosen for all
 
     def given(self, more: Params) -> Trials:
-        """Trials with more parameters."""
-        return Trials(self.motion, self.codec, {**self.params, **more}, self.profile)
+        """Trials with more parameters, and what was chosen before."""
+        found = Trials(self.motion, self.codec, {**self.params, **more}, self.profile)
+        found.kept = self.kept
+        return found
 
     def __call__(self, target: Target, setting: float) -> float:
         """The figure of ``target`` at a setting of the dial."""
@@ -113,10 +116,13 @@ class Trials:
     def _written(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ContactWarning)  # that of the clip itself counts
-            params = {**self.params, **found}
+            params = {**self.params, **self.kept, **found}
             data = file_in_memory(Prepared(motion), self.codec, params, self.profile)
         container = Container(open_source(data), max_decoded=2**53)
-        return container, Clip(container, container.directory.clips[motion.name])
+        clip = Clip(container, container.directory.clips[motion.name])
+        if self.codec.has(LIKE):
+            self.kept.setdefault(LIKE, clip.signals[0].header)
+        return container, clip
 
     def _measure(self, motion: Motion, target: Target, found: Params) -> float:
         container, clip = self._written(motion, found)

@@ -81,7 +81,7 @@ def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Fou
         found, remarks = _with_quality(codec, target, trial, limits)
     else:
         found, remarks = _meet(codec, target, trial)
-    return {**params, **found}, remarks
+    return {**params, **trial.kept, **found}, remarks
 
 
 def _check_preset(codec: Codec, params: Params, options: Params, targets: Params) -> None:

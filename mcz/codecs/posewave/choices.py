@@ -24,6 +24,7 @@ from mcz.codecs.posewave.header import (
     SPREADS,
     WHOLE_TURNS,
     Header,
+    PosewaveHeader,
     build_header,
     has_whole_turns,
     parse_header,
@@ -39,6 +40,7 @@ from mcz.hints import Hint
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
 from mcz.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.schema import parse
 from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
@@ -93,10 +95,11 @@ def choose(source: SignalSource, params: Params) -> Choice:
     groups = partition(skeleton, params)
     fields["exact"] = groups[1] if groups else ()
     exact = {channel for group in fields["exact"] for channel in source.layout.groups[group]}
-    fields["orders"] = choose_orders(source, exact)
+    like = None if params.get("like") is None else parse(PosewaveHeader, params["like"], NAME)
+    fields["orders"] = like.orders if like else choose_orders(source, exact)
     if params.get("weights") is not None:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]
-    fields["levels"] = params["levels"]
+    fields["levels"] = like.levels if like else params["levels"]
     if fields["levels"] is None:
         fields["levels"] = best_levels(source, skeleton, fields, weights, step_cm)
     fields["borrowing"] = min(1, fields["levels"])

@@ -265,6 +265,7 @@ CODEC = Codec(
             joint_words,
         ),
         Parameter("weights", None, "weight of each joint", np.asarray, inner=True),
+        Parameter("like", None, "a header whose levels and orders are kept", bytes, inner=True),
         Parameter("refinement", None, "octaves of each frame", np.asarray, inner=True),
         SEGMENT_FRAMES_PARAMETER,
     ),
