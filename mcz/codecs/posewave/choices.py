@@ -58,13 +58,16 @@ SPREAD_CM = 2.0  # a step of so much would be as large as a plain channel spread
 SAMPLED_FRAMES = 128  # where it is measured
 FINE_CM = 0.08  # a step below which first poses are told more exactly
 SPATIAL = (*ROTATION_KINDS, *POSITION_KINDS)
-LEVELS = ((0.06, (2, 3, 4, 5)), (0.1, (3, 4, 5)), (math.inf, (4, 5, 6, 7)))  # tried below a step
+LEVELS = ((0.06, (2, 3, 4, 5)), (0.2, (3, 4, 5, 6)), (math.inf, (4, 5, 6, 7)))  # tried below a step
 TRIAL_FRAMES = 2048
 SAMPLED = 8  # every so many frames an error is measured in a trial
 EXCHANGE = 0.75  # how fast bytes fall as errors rise, in logarithms: where a trial is better
 STEPS_CM = 0.01, 0.045  # between these steps the weight of a bit goes from the first to the second
 RATE_WEIGHTS = 0.09, 0.14
-USUAL = (0.0047, 0.03, 0.1, 0.28, 1.0), (0.01, 0.048, 0.1, 0.19, 0.5)  # steps, mean errors
+USUAL = (  # steps, mean errors
+    (0.0055, 0.03, 0.065, 0.14, 0.28, 0.56, 1.1, 2.2),
+    (0.01, 0.046, 0.079, 0.13, 0.205, 0.32, 0.55, 0.9),
+)
 MEAN_TO_BOUND = 0.22  # the mean error with which a bound takes the fewest bytes
 STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
 COARSEST_WEIGHT = 0.12  # of a bit at level 0, whose errors later rows are predicted from
