@@ -180,6 +180,12 @@ def test_speeds_and_memory_are_of_the_codec(case: Case) -> None:
     assert cpu_seconds(lambda: None) > 0
 
 
+def test_speeds_of_a_file_of_mcz(samples: Path, tmp_path: Path) -> None:
+    path = tmp_path / "walk.mcz"
+    mcz.encode(samples / "walk.bvh", path, unit="cm")
+    assert speeds(Case(str(path)), Variant("raw"), {})["parse_fps"] > 0
+
+
 def test_a_second_run_comes_from_the_cache(
     case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,19 +6,16 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import mcz
-from mcz.bench.cases import Case, Loaded, Variant, load
+from mcz.bench.cases import Case, Variant, load
 from mcz.codecs import by_name
 from mcz.codecs.contract import Encoded, Request, Segment, Span, model_finder
 from mcz.container.limits import BASE
-from mcz.formats import format_of
 from mcz.kinematics import SHELL_CM
 from mcz.metrics.comparison import NO_CONTACTS
 from mcz.motion import Motion
 from mcz.reading.sizes import clip_ratios, clip_sizes
-from mcz.reading.source_files import read_source
 from mcz.types import JsonObject, Params
 from mcz.writing.clip_writer import file_in_memory
 from mcz.writing.planning import prepare
@@ -128,7 +125,7 @@ def speeds(case: Case, variant: Variant, params: Params) -> Record:
 
     data = write_file(motion, variant.codec, given)
     seconds = {
-        "parse": cpu_seconds(lambda: _parse(case, loaded)),
+        "parse": cpu_seconds(lambda: mcz.read(case.path, unit=case.unit)),
         "encode": cpu_seconds(encode),
         "decode": cpu_seconds(decode),
         "write": cpu_seconds(lambda: write_file(motion, variant.codec, given)),
@@ -177,10 +174,3 @@ def work_of(
             )
 
     return encode, decode
-
-
-def _parse(case: Case, loaded: Loaded) -> Motion:
-    path = Path(case.path)
-    source_format = format_of(path, loaded.data)
-    skeleton = loaded.motion.skeleton if source_format.wants_skeleton else None
-    return read_source(path, source_format, skeleton, loaded.data)
