@@ -146,7 +146,7 @@ def make_plan(
 
 
 def bounded_regularization(given: Floats) -> Floats:
-    """What may stand on a diagonal."""
+    """Regularization within the range that factors can take."""
     return np.clip(given, LEAST_REGULARIZATION, GREATEST_REGULARIZATION)
 
 

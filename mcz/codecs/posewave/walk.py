@@ -81,7 +81,7 @@ class Walk:
         return make_held(contacts, self.usual.plan, self.kept, greatest)
 
     def _metric_of(self, level: int) -> Metric:
-        """That of a level: the coarser it is, the less do its poses say of the frames between."""
+        """Metric of a level; coarse ones are stiffer, as their poses say less of frames between."""
         if not self.header.spread:
             return self.usual
         return self.usual.stiffened(self.pyramid.root(level))  # PWAVE-21, PWAVE-22
