@@ -25,7 +25,8 @@ import numpy as np
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton, kernels
 from mcz.codecs import CODECS
-from mcz.coding.forms.counts import BINARY32, Law
+from mcz.coding.forms.counts import Law
+from mcz.coding.forms.ids import BINARY32
 from mcz.coding.forms.products import DEGREE, of_products
 from mcz.formats import bvh
 from mcz.numbers import Grid, GridKind
@@ -137,9 +138,11 @@ def encode_clips() -> None:
 
 
 def encode_counts() -> None:
-    """Encode what a converter counted, but for a few numbers that its law is off."""
+    """Encode what a converter counted, but for a few numbers that its law is off; as decimals."""
     counts = 32768 + np.random.default_rng(3).integers(-40, 41, 300).cumsum()
     ordinals = Law(10 / 65535, -0.31).ordinals(counts)
+    printed = Grid(GridKind.GENERAL, 6)
+    save_channel(printed.values(Law(10 / 65535).ordinals(counts, printed)), printed)
     ordinals[::7] += 1
     save_channel(BINARY32.values(ordinals), BINARY32)
 

@@ -1,7 +1,7 @@
 // SPEC.md, "Codec 1: fast", "Tails" and "Units": the ordinals of leads.
 
-import { COUNTS, MULTIPLES, PLAIN, PRODUCTS, classesOf, ordinalOfCount, productOf } from "./forms.js";
-import { binary32Ordinal } from "./grids.js";
+import { COUNTS, MULTIPLES, PLAIN, PRODUCTS, classesOf, numberOfCount, productOf } from "./forms.js";
+import { GENERAL, binary32Ordinal } from "./grids.js";
 import { halvesOf, setHalves, setInteger } from "./int64.js";
 import { ordinalOf } from "./ordinals.js";
 import { nextScale } from "./rice.js";
@@ -43,15 +43,16 @@ function takeDecimal(reader, n) {
  */
 export function numbersOf(head, ordinals) {
   const halves = halvesOf(ordinals);
+  const isGeneral = head.grid.kind === GENERAL;
   switch (head.form) {
     case PLAIN:
       return new PlainNumbers(head, halves);
     case MULTIPLES:
-      return new Multiples(head, halves);
+      return isGeneral ? new GeneralMultiples(head, ordinals) : new Multiples(head, halves);
     case PRODUCTS:
       return new Products(head, ordinals);
     case COUNTS:
-      return new Counts(head, halves);
+      return isGeneral ? new GeneralCounts(head, ordinals) : new Counts(head, halves);
     default:
       return new ClassNumbers(head, halves);
   }
@@ -88,6 +89,20 @@ class Multiples {
   }
 }
 
+/** Multiples on a decimal grid. */
+class GeneralMultiples {
+  constructor({ unit, grid }, ordinals) {
+    this.unit = unit;
+    this.grid = grid;
+    this.ordinals = ordinals;
+    this.hasTails = false;
+  }
+
+  set(index, lead) {
+    this.ordinals[index] = ordinalOf(this.grid, Math.fround(lead * this.unit)); // FAST-48
+  }
+}
+
 class Products {
   constructor(head, ordinals) {
     this.head = head;
@@ -109,13 +124,28 @@ class Counts {
   }
 
   set(index, lead, reader) {
-    let ordinal = ordinalOfCount(this.head, lead); // FAST-54
-    if (this.hasTails) {
-      const rest = reader.code(this.scale);
-      this.scale = nextScale(this.scale, rest);
-      ordinal += rest;
-    }
-    setInteger(this.halves, index, ordinal);
+    const ordinal = binary32Ordinal(numberOfCount(this.head, lead)); // FAST-54
+    setInteger(this.halves, index, ordinal + this.takeRest(reader));
+  }
+
+  takeRest(reader) {
+    if (!this.hasTails) return 0;
+    const rest = reader.code(this.scale);
+    this.scale = nextScale(this.scale, rest);
+    return rest;
+  }
+}
+
+/** Counts on a decimal grid. */
+class GeneralCounts extends Counts {
+  constructor(head, ordinals) {
+    super(head, null);
+    this.ordinals = ordinals;
+  }
+
+  set(index, lead, reader) {
+    const ordinal = ordinalOf(this.head.grid, numberOfCount(this.head, lead)); // FAST-54
+    this.ordinals[index] = ordinal + BigInt(this.takeRest(reader));
   }
 }
 

@@ -8,7 +8,6 @@ import {
   TEXT64,
   VAX_F,
   baseOf,
-  binary32Ordinal,
 } from "./grids.js";
 
 export const CODED = 0;
@@ -134,11 +133,10 @@ export function productOf({ unit, shifts }, code) {
   return code < 0 ? -size : size;
 }
 
-/** The ordinal of what a count says. */
-export function ordinalOfCount({ unit, law }, count) {
+/** The number that a count says, a binary32. */
+export function numberOfCount({ unit, law }, count) {
   let x = count * unit;
   if (law.offset !== null) x += law.offset;
   x = Math.fround(x);
-  if (law.shift !== null) x += law.shift;
-  return binary32Ordinal(x);
+  return law.shift === null ? x : Math.fround(x + law.shift);
 }

@@ -14,14 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.forms.ids import form_of_grid, has_binary32
+from mcz.coding.forms.ids import BINARY32, form_of_grid, has_binary32, unit_grid
 from mcz.coding.forms.products import tiny_limit
 from mcz.coding.forms.units import find_units
-from mcz.numbers import Grid
+from mcz.numbers import Grid, GridKind
+from mcz.numbers.tokens import TENS
 
 if TYPE_CHECKING:
     from mcz.coding.fast.survey_kernels import Channels, CodedLanes
 
+Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
 FEWEST_ROWS = 32  # for which parents are looked for
@@ -81,8 +83,9 @@ class StreamBuilder:
         self.grids = tuple(signal_grids[number] for number in self.numbers.tolist())
         self.forms = _forms(self.grids)
         pairs = list(zip(self.grids, self.clip_grids, strict=True))
-        limits = {pair: _unit_limit(*pair) for pair in dict.fromkeys(pairs)}
-        self.unit_limits = np.array([limits[pair] for pair in pairs], np.int64)
+        limits = {pair: (_unit_limit(*pair), _digits(*pair)) for pair in dict.fromkeys(pairs)}
+        both = np.array([limits[pair] for pair in pairs], np.int64).reshape(-1, 2)
+        self.unit_limits, self.digits = np.ascontiguousarray(both.T)
 
     def build(self, ordinals: Ints, grids: tuple[Grid, ...]) -> tuple[bytes, ...]:
         """The streams of a segment, ``ordinals`` (rows, channels); ``grids``: those in force."""
@@ -130,7 +133,7 @@ class StreamBuilder:
         """Code channels in units where they can be; their rests, and the fields of all units."""
         head, _, survey, plan, _, _ = kernels()
         plans = channels.plans
-        tried = (plans[:, head.KIND] == head.CODED) & (plans[:, survey.MOST] < self.unit_limits)
+        tried = self._find_candidates(channels)
         rests: dict[int, Ints] = {}
         fields = b""
         for n in np.flatnonzero(tried).tolist():
@@ -152,6 +155,19 @@ class StreamBuilder:
             plans[n, [head.FIELDS, survey.FIELDS_END]] = len(fields), len(fields) + len(own)
             fields += own
         return rests, fields
+
+    def _find_candidates(self, channels: Channels) -> Bools:
+        """The channels that are worth a closer look."""
+        head, _, survey, _, _, _ = kernels()
+        is_coded = channels.plans[:, head.KIND] == head.CODED
+        is_small = channels.plans[:, survey.MOST] < self.unit_limits
+        others = (is_coded & ~is_small & (self.digits > 0)).astype(np.int64)
+        if others.any():
+            from mcz.coding.forms.count_kernels import clear_hopeless  # on first use
+
+            clear_hopeless(channels.ordinals, self.numbers, self.digits, TENS, others)
+        found: Bools = (is_coded & is_small) | (others > 0)
+        return found
 
     def _find_leads(self, channels: Channels) -> CodedLanes:
         """The coded channels, split into leads and tails; these take the place of their columns."""
@@ -177,7 +193,12 @@ def _forms(grids: Sequence[Grid]) -> Ints:
 
 
 def _unit_limit(grid: Grid, clip_grid: Grid) -> int:
-    """The magnitude below which ``in_units`` may find a unit."""
+    """The magnitude below which ``find_units`` may find a unit."""
     if has_binary32(grid):
-        return ANY
+        return ANY if unit_grid(clip_grid) == BINARY32 else 0
     return tiny_limit(grid) if grid == clip_grid else 0
+
+
+def _digits(grid: Grid, clip_grid: Grid) -> int:
+    """The digits of a grid on which counts may be found by a test of their own, else 0."""
+    return grid.digits if grid == clip_grid and grid.kind == GridKind.GENERAL else 0

@@ -11,7 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.forms.counts import BINARY32, MOST, Law
+from mcz.coding.forms.counts import MOST, Law
+from mcz.coding.forms.ids import BINARY32
+from mcz.coding.forms.rounding import bounds, spacing
+from mcz.numbers import Grid, GridKind, values_of
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -19,15 +22,18 @@ Line = tuple[float, float]  # what a count is, and what 0 is
 
 LEAST_UNIT, MOST_COUNT = 2.0**-200, 2.0**40
 FEWEST = 9  # distinct values that show a law
+VANISHING = -(2.0**-200)  # an offset that makes -0 of the count 0, and changes nothing else
 COARSE = 8  # multiples of a unit that all lie so far apart may be counts of a greater one
 _QUANTILES = np.array([0, 0.05, 0.1, 0.2, 0.35, 0.5])  # of gaps: one may be the unit
 _SOME = 128  # gaps that are looked at first
 _NEAR = 8  # units that a gap may have to tell something
 _REACHES = 8 * 4.0 ** np.arange(24)  # units on both sides of the middle, one after the other
+_PARTS = 1, 2, 3  # of the least of few gaps
 _OFF = 0.15  # of a unit, on average: beyond, there is no law
 _SHARP = 0.02  # of a unit, the median: then the greatest unit is the one
 _TRIMS, _FAR = 3, 4.0  # rounds that leave out what is off by so many times the median
 _ROUNDS = 25  # to bring the greatest distance from a line down
+_HALVINGS = 40  # of an interval that the unit is in
 _HOPELESS = 4.0  # times the slack, at first
 _BIT_OF_A_REST = 1.3  # what the entropy coder takes for one
 _MARGIN = 64  # bits that a law must save
@@ -47,26 +53,33 @@ class Counted:
         return 8 * len(self.law.fields(rests=True)) + _BIT_OF_A_REST * float(sizes.sum())
 
 
-def find_counts(ordinals: Ints, multiples: tuple[float, Ints] | None) -> Counted | None:
-    """The law that saves bits for a column of the grid BINARY32, its counts and rests, or None.
+def find_counts(
+    ordinals: Ints, grid: Grid, multiples: tuple[float, Ints] | None = None
+) -> Counted | None:
+    """The law that saves bits for a column of a grid, its counts and rests, or None.
 
-    ``multiples``: a unit of which all are multiples, and these, where there is one.
+    ``grid``: BINARY32 or GENERAL. ``multiples``: a unit of which all are multiples, and these,
+    where there is one.
     """
     if multiples is not None and not _lie_apart(multiples[1]):
         return None
-    if ordinals.max() > BINARY32.limit or ordinals.min() < -1 - BINARY32.limit:
+    if ordinals.max() > grid.limit or ordinals.min() < -1 - grid.limit:
         return None
-    values = BINARY32.values(ordinals)
-    if not np.isfinite(values).all():
+    different = np.unique(ordinals)
+    numbers = np.ravel(values_of(different[:, None], (grid,)))
+    if not np.isfinite(numbers).all():
         return None
-    distinct = np.unique(values)
-    line = find_line(distinct)
+    if grid.kind == GridKind.GENERAL and np.abs(numbers[[0, -1]]).max() > MOST:
+        return None
+    distinct = np.unique(numbers)
+    line = find_line(distinct, grid)
     if line is None:
         return None
-    best = _cheapest(_laws(values, distinct, line), ordinals)
+    values = numbers[np.searchsorted(different, ordinals)]
+    best = _cheapest(_laws(values, distinct, grid, line), ordinals, grid)
     if best is None:
         return None
-    fine = _spacing(values, best.law.unit) if multiples is None else multiples[0]
+    fine = spacing(values, grid, best.law.unit) if multiples is None else multiples[0]
     return best if _saves(best, values, fine) else None
 
 
@@ -82,11 +95,11 @@ def _saves(found: Counted, values: Floats, fine: Floats | float) -> bool:
     return bool(saved.sum() > found.cost() + _MARGIN)
 
 
-def _cheapest(laws: Iterable[tuple[Law, Ints]], ordinals: Ints) -> Counted | None:
+def _cheapest(laws: Iterable[tuple[Law, Ints]], ordinals: Ints, grid: Grid) -> Counted | None:
     """The law that costs least, or the first without rests."""
     best, least = None, np.inf
     for law, counts in laws:
-        found = Counted(law, counts, ordinals - law.ordinals(counts))
+        found = Counted(law, counts, ordinals - law.ordinals(counts, grid))
         cost = found.cost()
         if cost < least:
             best, least = found, cost
@@ -95,24 +108,29 @@ def _cheapest(laws: Iterable[tuple[Law, Ints]], ordinals: Ints) -> Counted | Non
     return best
 
 
-def _spacing(values: Floats, least: float = 2.0**-126) -> Floats:
-    """The spacing of binary32 numbers at values, those below ``least`` taken for it."""
-    sizes = np.maximum(np.abs(values), least).astype("<f4")
-    return np.asarray(np.spacing(sizes), np.float64)
-
-
-def find_line(distinct: Floats) -> Line | None:
+def find_line(distinct: Floats, grid: Grid) -> Line | None:
     """The line that sorted numbers lie on, nearly, as whole numbers of a unit, or None."""
-    if len(distinct) < FEWEST:
-        return None
     gaps = np.diff(distinct)
-    gaps = gaps[gaps > 4 * _spacing(distinct[[0, -1]]).max()]
+    if len(distinct) < FEWEST:
+        return _line_of_few(distinct, gaps) if grid.kind == GridKind.GENERAL else None
+    gaps = gaps[gaps > 4 * spacing(distinct[[0, -1]], grid).max()]
     if len(gaps) < FEWEST - 1:
         return None
     lines = (_grown(distinct, unit) for unit in _guesses(gaps))
     found = [line for line in lines if line is not None]
     sharp = [line for line in found if np.median(_distances(distinct, line)) < _SHARP]
     return max(sharp) if sharp else min(found, key=lambda line: _off(distinct, line), default=None)
+
+
+def _line_of_few(distinct: Floats, gaps: Floats) -> Line | None:
+    """The line from the first of a few numbers on, by a part of the least gap between them."""
+    for parts in _PARTS if len(gaps) else ():
+        line = float(gaps.min()) / parts, float(distinct[0])
+        if line[0] >= LEAST_UNIT and gaps.max() < MOST_COUNT * line[0]:
+            fitted = _fit(np.rint((distinct - line[1]) / line[0]), distinct)
+            if fitted is not None and _distances(distinct, fitted).max() < _SHARP:
+                return fitted
+    return None
 
 
 def _guesses(gaps: Floats) -> list[float]:
@@ -190,15 +208,52 @@ def _closest(counts: Floats, values: Floats, slack: Floats) -> Line | None:
     return best
 
 
-def _laws(values: Floats, distinct: Floats, line: Line) -> Iterator[tuple[Law, Ints]]:
+def _within(distinct: Floats, few: Floats, grid: Grid, line: Line) -> Line:
+    """A line that rounds to all values at counts, or nearly so where there is none.
+
+    How far apart the offsets of a unit may lie is concave in the unit.
+    """
+    some = distinct != 0  # no sum but by chance
+    sizes, (low, high) = distinct[some], bounds(np.abs(distinct[some]), grid)
+    low, high = np.where(sizes < 0, (-high, -low), (low, high))
+    middle = float(np.rint(few.mean()))
+    counts = few[some] - middle
+    if len(sizes) < 2 or np.ptp(counts) == 0:
+        return line
+    reach = _HOPELESS * float((high - low).max()) / float(np.ptp(counts))
+    least, most = line[0] - reach, line[0] + reach
+    for _ in range(_HALVINGS):
+        unit = (least + most) / 2
+        above, below = high - unit * counts, low - unit * counts
+        first, last = int(np.argmin(above)), int(np.argmax(below))
+        if above[first] >= below[last]:
+            break
+        if counts[first] < counts[last]:
+            least = unit
+        else:
+            most = unit
+    return unit, float(above[first] + below[last]) / 2 - unit * middle
+
+
+def _laws(values: Floats, distinct: Floats, grid: Grid, line: Line) -> Iterator[tuple[Law, Ints]]:
     """Laws to try, with the counts of all values."""
-    distinct, few, line = _trimmed(distinct, line)
+    zeros = values == 0
+    zero_offset = VANISHING if 2 * np.signbit(values[zeros]).sum() > zeros.sum() else None
+    distinct, few, line = _trimmed(distinct, grid, line)
     unit, offset = line
     counts = np.rint((values - offset) / unit).astype(np.int64)
-    half = _spacing(distinct) / 2
-    yield from _without_offset(distinct, few, line, counts)
-    for fitted in (line, _closest(few, distinct, half)):
-        if fitted is not None and _usable(*fitted):
+    moved = _zero_of(line)
+    if moved is not None:
+        for unit in _units_alone(distinct, few + moved, grid):
+            yield Law(unit, zero_offset), counts + moved
+    if grid.kind == GridKind.GENERAL:
+        for fitted in (_within(distinct, few, grid, line), line):
+            if _usable(*fitted):
+                yield Law(*fitted), counts
+        return
+    closest = _closest(few, distinct, spacing(distinct, grid) / 2)
+    for fitted in (line, closest) if closest else (line,):
+        if _usable(*fitted):
             yield Law(*fitted), counts
     off = np.abs(distinct - unit * few - offset)
     sizes = float(off.max()), float(np.quantile(off, 0.9))
@@ -209,13 +264,16 @@ def _laws(values: Floats, distinct: Floats, line: Line) -> Iterator[tuple[Law, I
             yield law, counts
 
 
-def _trimmed(distinct: Floats, line: Line) -> tuple[Floats, Floats, Line]:
+def _trimmed(distinct: Floats, grid: Grid, line: Line) -> tuple[Floats, Floats, Line]:
     """The values that are not far off, their counts, and the line through them."""
     few = np.rint((distinct - line[1]) / line[0])
     kept, kept_few = distinct, few
     for _ in range(_TRIMS):
         off = np.abs(distinct - line[0] * few - line[1])
-        near = off <= _FAR * np.median(off)
+        far = np.full(len(off), _FAR * np.median(off))
+        if grid.kind == GridKind.GENERAL:
+            far = np.maximum(far, spacing(distinct, grid))  # rounding that differs by size
+        near = off <= far
         kept, kept_few = distinct[near], few[near]
         line = _fit(kept_few, kept) or line
     return kept, kept_few, line
@@ -225,20 +283,30 @@ def _usable(unit: float, *terms: float) -> bool:
     return LEAST_UNIT <= unit <= MOST and all(abs(term) <= MOST for term in terms)
 
 
-def _without_offset(
-    distinct: Floats, few: Floats, line: Line, counts: Ints
-) -> Iterator[tuple[Law, Ints]]:
-    """A law whose count 0 is 0, where a line says nearly that."""
+def _zero_of(line: Line) -> int | None:
+    """The count that 0 nearly has on a line, if it is near one."""
     unit, offset = line
     zero = np.rint(offset / unit)
     if abs(offset / unit - zero) > _OFF or abs(zero) > MOST_COUNT:
-        return
-    few = few + zero
-    for weights in (few, few / _spacing(distinct) ** 2):  # errors of one size; of last places
+        return None
+    return int(zero)
+
+
+def _units_alone(distinct: Floats, few: Floats, grid: Grid) -> Iterator[float]:
+    """Units of laws without an offset, for counts of distinct values."""
+    if grid.kind == GridKind.GENERAL:
+        some = few != 0
+        low, high = bounds(np.abs(distinct[some]), grid)
+        sizes = np.abs(few[some])
+        least, most = float((low / sizes).max(initial=0)), float((high / sizes).min(initial=MOST))
+        if LEAST_UNIT <= least <= most <= MOST:
+            yield (least + most) / 2
+            return
+    for weights in (few, few / spacing(distinct, grid) ** 2):  # errors of one size; of last places
         square = float(weights @ few)
         unit = float(weights @ distinct) / square if square > 0 else 0.0
         if _usable(unit):
-            yield Law(unit), counts + int(zero)
+            yield unit
 
 
 def _rounded_law(distinct: Floats, few: Floats, unit: float, step: float) -> Law | None:
@@ -246,7 +314,7 @@ def _rounded_law(distinct: Floats, few: Floats, unit: float, step: float) -> Law
     span = float(distinct[-1] - distinct[0])
     if not 0 < step < unit / 2 or span > step * 2.0**21:
         return None
-    finest = float(distinct[np.argmin(_spacing(distinct))])
+    finest = float(distinct[np.argmin(spacing(distinct, BINARY32))])
     steps = np.rint((distinct - finest) / step)
     if np.median(np.abs(distinct - finest - steps * step)) > step / 8:
         return None

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.coding.forms.ids import BINARY32
+from mcz.coding.forms.rounding import ordinals_of_binary32
 from mcz.errors import FormatError
-from mcz.numbers import Grid, GridKind
+from mcz.numbers import Grid
 
 Ints = NDArray[np.int64]
 
-BINARY32 = Grid(GridKind.BINARY32)
 OFFSET, SHIFT, RESTS = 1, 2, 4  # bits of ``parts``
 MOST = 2.0**80  # an offset or a shift: sums are then finite in binary32
 
@@ -32,15 +33,15 @@ class Law:
     offset: float | None = None
     shift: float | None = None
 
-    def ordinals(self, counts: Ints) -> Ints:
-        """The ordinals of counts on the grid BINARY32."""
+    def ordinals(self, counts: Ints, grid: Grid = BINARY32) -> Ints:
+        """The ordinals of counts on ``grid``, which is BINARY32 or GENERAL."""
         values = counts * np.float64(self.unit)
         if self.offset is not None:
             values = values + self.offset
         rounded = values.astype("<f4")
         if self.shift is not None:
             rounded = (rounded.astype(np.float64) + self.shift).astype("<f4")
-        return BINARY32.ordinals_of_bits(rounded.view("<u4"))
+        return ordinals_of_binary32(rounded, grid)
 
     def fields(self, *, rests: bool) -> bytes:
         """``unit``, ``parts`` and what they say is there."""

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from mcz.numbers import Grid, GridKind, printed_base
 
-MULTIPLES = 32  # integers that are multiplied by a unit, to binary32
+MULTIPLES = 32  # integers that are multiplied by a unit
 PRODUCTS = 33  # odd numbers, shifts and a unit, to a decimal grid
-COUNTS = 34  # integers that a law makes binary32 numbers, and rests
+COUNTS = 34  # integers that a law makes numbers, and rests
 WITH_UNIT = MULTIPLES, PRODUCTS, COUNTS
+BINARY32 = Grid(GridKind.BINARY32)
 BINARY_24, BINARY_53 = 88, 117  # classes of so many binary digits
 
 
@@ -27,8 +28,13 @@ def form_of_grid(grid: Grid) -> int:
     return 0
 
 
+def unit_grid(clip_grid: Grid) -> Grid:
+    """The grid whose ordinals forms 32 and 34 give, by that of the channel in CLIP."""
+    return clip_grid if clip_grid.kind == GridKind.GENERAL else BINARY32
+
+
 def has_binary32(grid: Grid) -> bool:
-    """Tell grids whose ordinals are those of BINARY32, which forms 32 and 34 give."""
+    """Tell grids whose ordinals are those of BINARY32."""
     return grid.kind == GridKind.BINARY32 or (
         grid.kind == GridKind.PRINTED and printed_base(grid).kind == GridKind.TEXT32
     )

@@ -1,4 +1,4 @@
-"""Channels whose binary32 values are whole multiples of a unit: integers scaled by some recorder.
+"""Channels whose values are whole multiples of a unit: integers scaled by some recorder.
 
 ``of_multiples`` is normative (SPEC.md, "Codec 1: fast", form 32); finding a unit is not.
 """
@@ -8,22 +8,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.numbers import Grid, GridKind
+from mcz.coding.forms.ids import BINARY32
+from mcz.coding.forms.rounding import ordinals_of_binary32
+from mcz.numbers import Grid
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
-BINARY32 = Grid(GridKind.BINARY32)
 MOST = 2**20  # units in a value: beyond, the multiples take as many bits as the mantissas
 GREATEST = 2.0**80  # unit that a head may have
 _STEPS = 24  # of Euclid's algorithm
 
 
-def of_multiples(multiples: Ints, unit: float) -> Ints:
-    """The ordinals of the binary32 that are nearest to ``multiples * unit``."""
+def of_multiples(multiples: Ints, unit: float, grid: Grid = BINARY32) -> Ints:
+    """The ordinals on ``grid`` of the binary32 that are nearest to ``multiples * unit``."""
     with np.errstate(over="ignore"):
         values = (multiples * np.float64(unit)).astype("<f4")
-    return BINARY32.ordinals_of_bits(values.view("<u4"))
+    return ordinals_of_binary32(values, grid)
 
 
 @np.errstate(over="ignore")  # numbers near the greatest

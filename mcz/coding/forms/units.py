@@ -13,11 +13,19 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.forms.count_search import find_counts
-from mcz.coding.forms.counts import parse_law
-from mcz.coding.forms.ids import COUNTS, MULTIPLES, PRODUCTS, WITH_UNIT, has_binary32
+from mcz.coding.forms.count_search import Counted, find_counts
+from mcz.coding.forms.counts import Law, parse_law
+from mcz.coding.forms.ids import (
+    BINARY32,
+    COUNTS,
+    MULTIPLES,
+    PRODUCTS,
+    WITH_UNIT,
+    has_binary32,
+    unit_grid,
+)
 from mcz.coding.forms.multiples import find_multiples, of_multiples
-from mcz.coding.forms.products import find_products, of_products
+from mcz.coding.forms.products import find_products, is_tiny, of_products
 from mcz.errors import FormatError
 from mcz.numbers import Grid, GridKind
 
@@ -47,17 +55,30 @@ def find_units(column: Ints, grid: Grid, *, every: bool = True) -> InUnits | Non
     """
     if has_binary32(grid):
         found = find_multiples(column)
-        law = find_counts(column, found) if every else None
+        law = find_counts(column, BINARY32, found) if every else None
         if law is not None:
-            rests = law.rests if law.rests.any() else None
-            return InUnits(COUNTS, law.law.fields(rests=rests is not None), law.counts, rests)
+            return _in_counts(law)
         if found is not None:
             return InUnits(MULTIPLES, struct.pack("<d", found[0]), found[1])
-    products = find_products(column, grid) if every else None
-    if products is not None:
+    if not every or grid.kind != GridKind.GENERAL:
+        return None
+    if is_tiny(column, grid):
+        products = find_products(column, grid)
+        if products is None:
+            return None
         unit, shifts, codes = products
         return InUnits(PRODUCTS, struct.pack("<dB", unit, shifts), codes)
-    return None
+    law = find_counts(column, grid)
+    if law is None:
+        return None
+    if law.law == Law(law.law.unit) and not law.rests.any():  # a byte less
+        return InUnits(MULTIPLES, struct.pack("<d", law.law.unit), law.counts)
+    return _in_counts(law)
+
+
+def _in_counts(found: Counted) -> InUnits:
+    rests = found.rests if found.rests.any() else None
+    return InUnits(COUNTS, found.law.fields(rests=rests is not None), found.counts, rests)
 
 
 def parse_mapping(
@@ -68,10 +89,10 @@ def parse_mapping(
         return None, False, at
     unit, at = _parse_unit(stream, at)
     if form == MULTIPLES:
-        return partial(of_multiples, unit=unit), False, at
+        return partial(of_multiples, unit=unit, grid=unit_grid(grid)), False, at
     if form == COUNTS:
         law, rests, at = parse_law(stream, at, unit)
-        return law.ordinals, rests, at
+        return partial(law.ordinals, grid=unit_grid(grid)), rests, at
     if grid.kind != GridKind.GENERAL:  # FAST-49
         raise FormatError(f"form {form} on the grid {grid.kind.name}")
     if at >= len(stream):
