@@ -244,8 +244,8 @@ def _laws(values: Floats, distinct: Floats, grid: Grid, line: Line) -> Iterator[
     counts = np.rint((values - offset) / unit).astype(np.int64)
     moved = _zero_of(line)
     if moved is not None:
-        for unit in _units_alone(distinct, few + moved, grid):
-            yield Law(unit, zero_offset), counts + moved
+        for alone in _units_alone(distinct, few + moved, grid):
+            yield Law(alone, zero_offset), counts + moved
     if grid.kind == GridKind.GENERAL:
         for fitted in (_within(distinct, few, grid, line), line):
             if _usable(*fitted):

@@ -1,6 +1,6 @@
 """Binary32 numbers on the grid of a channel: their ordinals, and what grids keep of them.
 
-``ordinals_of_binary32`` is normative (SPEC.md, "Codec 1: fast", "Units"); the rest serves encoders.
+``ordinals_of_binary32`` is normative (SPEC.md, "Codec 1: fast"); the rest serves encoders.
 """
 
 from __future__ import annotations
