@@ -10,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz.coding.fast.decoder import Shape, read_alone
+from mcz.coding.fast.encoder import StreamBuilder
 from mcz.coding.forms.count_search import VANISHING, find_counts
 from mcz.coding.forms.counts import Law
-from mcz.coding.forms.ids import COUNTS, MULTIPLES
+from mcz.coding.forms.ids import BINARY32, COUNTS, MULTIPLES
 from mcz.coding.forms.rounding import bounds
 from mcz.coding.forms.units import find_units
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
@@ -73,6 +75,17 @@ def test_few_values_show_a_law(values: list[float]) -> None:
 def test_numbers_beyond_binary32_are_no_counts() -> None:
     column = SIX.ordinals(np.resize([1e300, -1e300, 0, 2e300], 200))[0]
     assert find_counts(column, SIX) is None
+
+
+@pytest.mark.parametrize("grids", [(SIX, BINARY32), (BINARY32, SIX), (SIX, SIX)])
+def test_the_grid_in_the_clip_counts(grids: tuple[Grid, Grid]) -> None:
+    """Ordinals of another grid in force come back, too."""
+    counts = np.random.default_rng(1).integers(-400, 401, 600)
+    in_clip, in_force = grids
+    ordinals = Law(0.1221).ordinals(counts, in_force)[:, None]
+    streams = StreamBuilder([in_clip], [[0]]).build(ordinals, (in_force,))
+    shape = Shape([in_clip], [[0]])
+    np.testing.assert_array_equal(read_alone(shape, streams[0], len(counts)), ordinals)
 
 
 @given(st.floats(1e-30, 1e30), st.integers(5, 9))

@@ -30,6 +30,7 @@ def hidden() -> dict[str, tuple[Grid, np.ndarray, int]]:
     random = np.random.default_rng(3)
     walk = 32768 + random.integers(-40, 41, 500).cumsum()
     few, some = random.integers(-2000, 2000, 500), random.integers(-500, 500, 500)
+    near = walk - 32768
     moved = Law(VOLT, -0.31).ordinals(walk)
     off = moved.copy()
     off[::7] += 1
@@ -40,6 +41,8 @@ def hidden() -> dict[str, tuple[Grid, np.ndarray, int]]:
         "moved counts": (BINARY32, moved, 465),
         # Once rounded between 4 and 8, once more near 0.
         "twice moved": (BINARY32, Law(VOLT, 0.0, -5.0087).ordinals(walk), 475),
+        # Between counts, near 0: a law without an offset is tried before, and does not fit.
+        "beside zero": (BINARY32, Law(VOLT, 2.9925230965, -2.9923552871).ordinals(near), 475),
         "shifted": (BINARY32, Law(7.6296273e-08, None, -0.0024).ordinals(walk), 475),
         "thirds": (BINARY32, Law(1 / 3, 1e4).ordinals(walk), 465),
         "off by a little": (BINARY32, off, 585),
