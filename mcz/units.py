@@ -1,7 +1,8 @@
-"""Length units by name, in centimeters, and axes that point up: what a caller may say of a file."""
+"""Length units by name, in centimeters, axes that point up, ratios of units of one quantity."""
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -67,3 +68,31 @@ def facing(
     except MotionError as error:  # parallel axes
         raise OptionError(str(error)) from None
     return skeleton if axes_of(found) == axes_of(skeleton) else replace(found, source=None)
+
+
+def _quantities() -> dict[str, tuple[str, float]]:
+    """Units of physical quantities -> what they measure, and how much of it."""
+    found = {unit: ("length", size / 100) for unit, size in UNIT_CM.items()}
+    found |= {"deg": ("angle", math.pi / 180), "°": ("angle", math.pi / 180), "rad": ("angle", 1.0)}
+    found |= {"Nmm": ("moment", 1e-3), "Ncm": ("moment", 1e-2), "nt": ("N", 1.0)}
+    found |= {"ntmm": ("moment", 1e-3), "g": ("acceleration", 9.80665), "m/s2": ("acceleration", 1)}
+    prefixes = {"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}
+    for base in ("V", "N", "Nm", "W", "Pa", "Hz", "s"):
+        found |= {p + base: ("moment" if base == "Nm" else base, f) for p, f in prefixes.items()}
+    return found
+
+
+_QUANTITIES = _quantities()
+
+
+def unit_ratio(unit: str, other: str) -> float | None:
+    """The size of ``unit`` in ``other``; None where they do not measure the same.
+
+    >>> unit_ratio("mV", "V"), unit_ratio("N.m", "Nmm"), unit_ratio("mV", "N")
+    (0.001, 1000.0, None)
+    """
+    plain, wanted = (re.sub(r"[\s.*·]", "", text) for text in (unit, other))
+    if plain == wanted:
+        return 1.0
+    (what, size), (same, whole) = (_QUANTITIES.get(u, (u, 1.0)) for u in (plain, wanted))
+    return size / whole if what == same else None

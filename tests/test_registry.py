@@ -108,7 +108,9 @@ def test_roles() -> None:
 def test_metrics() -> None:
     motion = sample.acclaim_walk()
     ours = compare(motion, motion).entries()
-    assert set(ours) | {"signal.NAME.mse"} == set(by("id", "metrics"))
+    assert set(ours) | {
+        f"signal.NAME.{figure}" for figure in ("mse", "max_error", "mean_error")
+    } == set(by("id", "metrics"))
 
 
 def test_bases() -> None:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from importlib import import_module
@@ -28,6 +28,7 @@ __all__ = [
     "likely_formats",
     "recording_of",
     "wants_skeleton",
+    "with_analog_scales",
 ]
 
 HEAD_BYTES = 2**20
@@ -245,6 +246,12 @@ def recording_of(source: Source | None) -> Any:
     if source is None or read is None:
         return None
     return read(source.format, source.template, source.detail)
+
+
+def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | None:
+    """``source``, a C3D, with other scales of analog channels; None where it states none."""
+    found: Source | None = _of("c3d_recording", "with_analog_scales")(source, scales)
+    return found
 
 
 def arrays_of(source: Source | None, signals: Sequence[str]) -> list[JsonObject] | None:

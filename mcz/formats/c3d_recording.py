@@ -6,8 +6,8 @@ All of it is in the header and the parameter section, which the template of a cl
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,12 +16,14 @@ from mcz.formats.c3d_layout import Layout, parse_layout
 from mcz.formats.c3d_outputs import groups_of, unit_of
 from mcz.formats.c3d_parameters import (
     BLOCK,
+    FLOAT,
     MAX_BLOCKS,
     Parameters,
     decoded,
     names_of,
     parse_parameters,
 )
+from mcz.motion import Source
 from mcz.numbers.scaling import Scaling
 
 Vector = tuple[float, float, float]
@@ -145,6 +147,25 @@ def recording_of(layout: Layout) -> Recording:
         tuple(_platforms(parameters)),
         _zero_frames(parameters),
     )
+
+
+def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | None:
+    """``source`` with other scales of analog channels; None where it does not state theirs."""
+    layout = parse_layout(source.format, source.template, source.detail)
+    parameters, head = _parameters(layout), bytearray(layout.head)
+    places: list[int] = []
+    number = 1
+    while stated := parameters.get("ANALOG", f"SCALE{number}" if number > 1 else "SCALE"):
+        if stated.type != FLOAT or head[stated.at : stated.at + len(stated.data)] != stated.data:
+            return None
+        places += range(stated.at, stated.at + len(stated.data), 4)
+        number += 1
+    if max(scales, default=0) >= len(places):
+        return None
+    for channel, scale in scales.items():
+        head[places[channel] : places[channel] + 4] = layout.order.build_real(scale)
+    template, detail = replace(layout, head=bytes(head)).build()
+    return replace(source, template=template, detail=detail)
 
 
 def _parameters(layout: Layout) -> Parameters:

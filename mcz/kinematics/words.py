@@ -10,6 +10,7 @@ from mcz.kinematics.feet import feet_of
 from mcz.motion import Skeleton
 
 GROUPS = {
+    "all": "",
     "hands": r"hand|wrist|finger|thumb|index|middle|ring|pinky",
     "head": r"head|neck|eye|jaw",
     "arms": r"clavicle|collar|shoulder|humerus|arm|radius|elbow|hand|wrist|finger|thumb",

@@ -14,7 +14,7 @@ from mcz.metrics.alike import common_unit, extent, rows_of, same_channels, same_
 from mcz.metrics.comparison import Comparison
 from mcz.metrics.places import PlaceErrors
 from mcz.metrics.sums import ChannelErrors, Number, Values, times
-from mcz.motion import Motion, Signal
+from mcz.motion import Motion, Signal, Skeleton
 
 BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
 
@@ -102,7 +102,7 @@ def _blocks(original: Motion, decoded: Motion) -> Iterator[tuple[int, Values, Va
         yield start * a.samples_per_frame, rows_of(a, start, stop), rows_of(b, start, stop)
 
 
-def _named(motion: Motion) -> dict[str, Signal]:
+def named_signals(motion: Motion) -> dict[str, Signal]:
     """The further signals by role, or name; ``#n`` behind it from the second of one on."""
     found: dict[str, Signal] = {}
     seen: dict[str, int] = {}
@@ -116,16 +116,22 @@ def _named(motion: Motion) -> dict[str, Signal]:
 def _further_signals(original: Motion, decoded: Motion, notes: list[str]) -> dict[str, Number]:
     """The MSE of every signal that both have beside the motion."""
     figures: dict[str, Number] = {}
-    left, right = _named(original), _named(decoded)
+    left, right = named_signals(original), named_signals(decoded)
     for name in dict.fromkeys([*left, *right]):
         a, b = left.get(name), right.get(name)
         if a is None or b is None or a.values.shape != b.values.shape:
             notes.append(f"signal {name!r} is not in both, or of another shape")
             continue
-        errors = ChannelErrors(original.skeleton, a)
-        step = max(1, BLOCK // max(1, a.n_channels * a.samples_per_frame))
-        for start in range(0, a.n_frames, step):
-            stop = min(a.n_frames, start + step)
-            errors.add(rows_of(a, start, stop), rows_of(b, start, stop))
-        figures[name] = errors.mse
+        figures[name] = signal_errors(original.skeleton, a, b).mse
     return figures
+
+
+def signal_errors(skeleton: Skeleton, original: Signal, decoded: Signal) -> ChannelErrors:
+    """The errors of a signal of the same shape."""
+    errors = ChannelErrors(skeleton, original)
+    step = max(1, BLOCK // max(1, original.n_channels * original.samples_per_frame))
+    for start in range(0, original.n_frames, step):
+        stop = min(original.n_frames, start + step)
+        with np.errstate(all="ignore"):  # what overflows is no figure
+            errors.add(rows_of(original, start, stop), rows_of(decoded, start, stop))
+    return errors

@@ -39,7 +39,8 @@ class ChannelErrors:
     def __init__(self, skeleton: Skeleton, signal: Signal) -> None:
         self._skeleton, self._channels = skeleton, signal.channels
         self._n = self.mismatched = 0
-        self._squares, self._raw = 0.0, 0.0
+        self._squares, self._raw, self._sum = 0.0, 0.0, 0.0
+        self._greatest = -1.0
 
     def add(self, left: Values, right: Values) -> None:
         valid = np.isfinite(left) & np.isfinite(right)
@@ -51,6 +52,8 @@ class ChannelErrors:
         self.mismatched += int((np.isfinite(left) ^ np.isfinite(right)).sum())
         self._squares += float(np.sum(difference**2))
         self._raw += float(np.sum(raw**2))
+        self._sum += float(np.sum(np.abs(difference)))
+        self._greatest = max(self._greatest, float(np.abs(difference).max(initial=0.0)))
 
     @property
     def mse(self) -> Number:
@@ -59,6 +62,15 @@ class ChannelErrors:
     @property
     def mse_raw(self) -> Number:
         return mean_of(self._raw, self._n)
+
+    @property
+    def mean(self) -> Number:
+        """The mean of the absolute differences."""
+        return mean_of(self._sum, self._n)
+
+    @property
+    def greatest(self) -> Number:
+        return mean_of(self._greatest, 1) if self._n else None
 
 
 class Distances:

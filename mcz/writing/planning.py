@@ -28,6 +28,7 @@ from mcz.reading.source_info import stating_rate
 from mcz.schema import MAX_COUNT, build
 from mcz.types import JsonObject, Params
 from mcz.units import axes_of
+from mcz.writing.signal_bounds import of_codec
 from mcz.writing.signal_source import MemorySource, as_stored, group_kind, settle
 
 BESIDE = "fast"  # the codec of all signals but the motion, where that one is lossy
@@ -62,7 +63,8 @@ def prepare(
     ``skeletons`` are those of ``Prepared``, of the motion as it is given. Raises OptionError where
     positions have no meaning, MotionError where there are none.
     """
-    options, skeletons = codec.options(params), skeletons or (StoredSkeleton(motion.skeleton),)
+    options = codec.options(of_codec(params))
+    skeletons = skeletons or (StoredSkeleton(motion.skeleton),)
     if not wants_positions(codec, options, motion.skeleton):
         return Prepared(motion, skeletons)
     check_bones(motion.skeleton, f"codec {codec.name}, of positions,")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from operator import itemgetter
 
 import numpy as np
@@ -23,6 +24,7 @@ from mcz.motion import Motion
 from mcz.types import JsonObject, Params, Progress
 from mcz.writing.clip_writer import Amend, write_plan
 from mcz.writing.planning import Prepared, asked, check_bones, plan_clip
+from mcz.writing.signal_bounds import of_codec, with_bounds
 from mcz.writing.trials import QUALITY, REFINEMENT, Limits, Target, Trials, bounded, weighted
 
 PRESET = "preset"
@@ -53,8 +55,10 @@ def write_motion(
     Returns what the quality record says, ``amend`` has the last word on it; None where there is
     none. Raises OptionError where a target cannot be met or has no meaning for this clip.
     """
-    found, remarks = tuned(prepared.motion, codec, params, writer.profile)
-    plan = plan_clip(prepared, codec, found, writer.profile)
+    motion, bounded_signals = with_bounds(prepared.motion, codec, params)
+    found, remarks = tuned(motion, codec, of_codec(params), writer.profile)
+    plan = plan_clip(replace(prepared, motion=motion), codec, found, writer.profile)
+    remarks |= bounded_signals
     return write_plan(writer, plan, progress, remarks=remarks, amend=amend)
 
 

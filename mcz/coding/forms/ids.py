@@ -34,7 +34,7 @@ def unit_grid(clip_grid: Grid) -> Grid:
 
 
 def has_binary32(grid: Grid) -> bool:
-    """Tell grids whose ordinals are those of BINARY32."""
-    return grid.kind == GridKind.BINARY32 or (
+    """Tell grids whose ordinals are those of BINARY32; those of VAX_F are, of a quarter of it."""
+    return grid.kind in (GridKind.BINARY32, GridKind.VAX_F) or (
         grid.kind == GridKind.PRINTED and printed_base(grid).kind == GridKind.TEXT32
     )

@@ -1,0 +1,18 @@
+"""The size of one channel in codec ``fast``, by which an encoder compares grids."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.coding.fast.encoder import StreamBuilder
+from mcz.numbers import Grid
+
+BLOCK_ROWS = 1024
+
+
+def channel_bytes(ordinals: NDArray[np.int64], grid: Grid) -> int:
+    """The bytes of the streams of a channel, (n_rows,), that is coded alone."""
+    builder, starts = StreamBuilder([grid], [[0]]), range(0, len(ordinals), BLOCK_ROWS)
+    blocks = (ordinals[start : start + BLOCK_ROWS, None] for start in starts)
+    return sum(len(builder.build(block, (grid,))[0]) for block in blocks)
