@@ -141,6 +141,78 @@ def test_bytes_fall_by_what_the_bound_leaves_out(name: str) -> None:
     assert (saved > 3.0).all() and (saved[1:] < 3.7).all()
 
 
+def chain_of(*kinds: str, angle_unit: str = "rad") -> mcz.Skeleton:
+    joints = (
+        mcz.Joint(
+            f"j{j}",
+            j - 1,
+            (0.0, 0.0, 20.0 * (j > 0)),
+            channels=tuple(mcz.Channel(k, "" if k else f"q{i}") for i, k in enumerate(kinds)),
+        )
+        for j in range(3)
+    )
+    return mcz.Skeleton(tuple(joints), unit_cm=1.0, angle_unit=angle_unit)
+
+
+SKELETONS = {
+    "plain": chain_of("", "", ""),
+    "angles": chain_of("rz", "rx", "ry", angle_unit="deg"),
+    "quaternions": chain_of("qw", "qx", "qy", "qz"),
+    "vectors": chain_of("vx", "vy", "vz"),
+    "positions": chain_of("tx", "ty", "tz"),
+}
+
+
+def moving(rng: Rng, name: str, n: int) -> np.ndarray:
+    """Smooth courses of 3 joints, (n, channels), with a little noise."""
+    skeleton = SKELETONS[name]
+    phases = np.arange(n)[:, None] * rng.uniform(0.02, 0.1, skeleton.n_channels)
+    courses = np.sin(phases + rng.uniform(0, 6, skeleton.n_channels))
+    courses += rng.normal(size=courses.shape) * 10.0 ** rng.uniform(-5, -2)
+    if name == "quaternions":
+        parts = courses.reshape(n, 3, 4) + np.array([1.5, 0, 0, 0])
+        return (parts / np.linalg.norm(parts, axis=2, keepdims=True)).reshape(n, 12)
+    return courses * {"angles": 60.0, "positions": 30.0}.get(name, 1.0)
+
+
+@pytest.mark.parametrize("name", SKELETONS)
+@pytest.mark.parametrize("target", ["max_error", "mean_error"])
+def test_channels_of_the_motion_keep_a_bound(name: str, target: str) -> None:
+    skeleton = SKELETONS[name]
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        values = moving(rng, name, 100)
+        bound = float(values.std() * 10.0 ** rng.uniform(-3.5, -1))
+        motion = mcz.Motion(skeleton, (mcz.Signal(values),), Fraction(60), name="moving")
+        stream = io.BytesIO()
+        mcz.write(motion, stream, "lossy", **{target: bound})
+        with mcz.open(stream.getvalue()) as file:
+            clip = file.only_clip()
+            errors = np.abs(clip.motion().values - values)
+            assert clip.quality is not None and clip.quality[f"param.{target}"] == str(bound)
+            reached = float(clip.quality["target_reached"])
+        measured = errors.max() if target == "max_error" else errors.mean(axis=0).max()
+        assert measured <= bound and measured == pytest.approx(reached)
+        assert measured > bound / 10
+
+
+def test_a_bound_of_channels_has_units() -> None:
+    motion = mcz.Motion(
+        chain_of("tx", "rz", angle_unit="deg"),
+        (mcz.Signal(np.cumsum(np.random.default_rng(0).normal(size=(60, 6)), axis=0)),),
+        Fraction(60),
+    )
+    found = io.BytesIO()
+    mcz.write(motion, found, "lossy", max_error="0.2deg,0.5mm")
+    with mcz.open(found.getvalue()) as file:
+        errors = np.abs(file.only_clip().motion().values - motion.values).max(axis=0)
+    assert (errors <= [0.05, 0.2] * 3).all()
+    for text, message in (("1mm", "channel rz is in deg"), ("0", "which no lossy channel keeps")):
+        with pytest.raises(mcz.OptionError, match=message):
+            mcz.write(motion, io.BytesIO(), "lossy", max_error=text)
+    mcz.write(motion, io.BytesIO(), "mrdwt", mean_error=0.5)  # other codecs search their dial
+
+
 def volts(unit: str = "V") -> tuple[mcz.Channel, ...]:
     return (mcz.Channel("", "biceps", unit),)
 

@@ -76,6 +76,18 @@ TARGETS = (
         number("kbps", 1e-9, 1e9),
     ),
     Parameter(
+        "mean_error",
+        None,
+        "at most this mean error of each channel of the motion, such as 0.1deg,1mm",
+        str,
+    ),
+    Parameter(
+        "max_error",
+        None,
+        "at most this error of each channel of the motion, in its own unit without one",
+        str,
+    ),
+    Parameter(
         "mean_error_cm",
         None,
         "at most this mean position error",

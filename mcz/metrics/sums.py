@@ -30,7 +30,10 @@ def times(value: Number, factor: Number) -> Number:
 
 def channel_errors(skeleton: Skeleton, signal: Signal, left: Values, right: Values) -> Values:
     """Absolute differences of the channels of ``signal``, less whole turns."""
-    return np.abs(without_turns(left - right, skeleton, signal.channels))
+    difference = without_turns(left - right, skeleton, signal.channels)
+    if signal.channels is None:
+        difference = -without_whole_turns(left, right, -difference, skeleton)
+    return np.abs(difference)
 
 
 class ChannelErrors:

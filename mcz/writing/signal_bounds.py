@@ -8,7 +8,6 @@ codes it exactly, so that a decoder needs nothing new.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +23,7 @@ from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.types import JsonObject, Params
-from mcz.units import unit_ratio
+from mcz.writing.channel_limits import limits_of
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -36,7 +35,6 @@ MOST_MULTIPLES = 2**19  # of a step in a number; beyond, fast may find no unit
 SHORT_BITS = 8  # of a unit of floats, few of whose multiples are rounded then
 TRIALS = 10
 NEAR = 0.97  # of a mean error that was asked for: near enough
-_BOUND = re.compile(r"([0-9.]+(?:[eE][-+]?[0-9]+)?) ?([^\s0-9.,].*)?")
 
 
 def of_codec(params: Params) -> JsonObject:
@@ -87,35 +85,7 @@ def _limits(skeleton: Skeleton, signal: Signal, key: str, asked: Params) -> Floa
     channels = skeleton.channels if signal.channels is None else signal.channels
     if key not in asked:
         return np.full(len(channels), math.inf)
-    bounds = [parse_bound(key, text) for text in str(asked[key]).split(",")]
-    found = []
-    for number, channel in enumerate(channels):
-        ratios = [(size, unit_ratio(unit, channel.unit) if unit else 1.0) for size, unit in bounds]
-        fitting = [size * ratio for size, ratio in ratios if ratio is not None]
-        if not fitting:
-            units = " and ".join(unit for _, unit in bounds)
-            raise OptionError(
-                f"{key}: channel {channel.label or number} is in {channel.unit or 'no unit'}, "
-                f"which {units} does not fit; several bounds may be given, such as 1N,10Nmm,0"
-            )
-        found.append(fitting[0])
-    return np.array(found)
-
-
-def parse_bound(key: str, text: str) -> tuple[float, str]:
-    """A bound and its unit, "" for the channel's own; raises OptionError.
-
-    >>> parse_bound("analog.max_error", "0.5 mV"), parse_bound("analog.max_error", "2")
-    ((0.5, 'mV'), (2.0, ''))
-    """
-    match = _BOUND.fullmatch(text.strip())
-    try:
-        size = float(match[1]) if match else math.nan
-    except ValueError:
-        size = math.nan
-    if match is None or not 0 <= size < math.inf:
-        raise OptionError(f"{key} is {text!r}, not a number and perhaps a unit, such as 0.5mV")
-    return size, match[2] or ""
+    return limits_of(skeleton, channels, key, asked[key])
 
 
 @dataclass(frozen=True, slots=True)

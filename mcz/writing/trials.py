@@ -6,6 +6,7 @@ steps where it is missed, ``weighted`` the mean errors of joints by what each of
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.kinematics import positions_of
 from mcz.kinematics.words import joints_of
 from mcz.metrics import Comparison, compare
+from mcz.metrics.sums import channel_errors
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.sizes import clip_sizes
@@ -34,10 +36,16 @@ Floats = NDArray[np.float64]
 BLOCK_FRAMES = 4096  # whose positions are in memory at a time
 
 REFINEMENT = "refinement"
+MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
 MOST_OCTAVES = 7
 MOST_ROUNDS = 10  # with one step
 MOST_STEPS = 6
 FINER = 0.85  # from one step to the next
+USUAL_STEP = 1.0  # of a bound of channels, whose steps follow from it
+MOST_CALIBRATIONS = 3
+MOST_MEANS, MOST_QUARTERS = 12, 100
+COMMON = 0.9  # of the frames have at most an error, in bounds, that is wanted within a range
+LEAST_COMMON, WANTED_COMMON, MOST_COMMON = 0.55, 0.75, 1.1
 MARGIN = 0.3  # octaves that are added to what a frame misses
 Limits = Sequence[tuple[str, float]]  # a joint or a group of joints, and its limit in cm
 QUALITY, WEIGHTS, LIKE = "quality", "weights", "like"
@@ -51,11 +59,13 @@ class Target:
     """What was asked for; the figure of that name must not exceed ``limit``.
 
     ``falls``: the figure falls as the files get smaller (a size), instead of rising (an error).
+    ``weights``, (n_channels,), multiply the errors of channels; None where it is none of those.
     """
 
     name: str
     limit: float
     falls: bool
+    weights: Floats | None = None
 
 
 class Trials:
@@ -87,10 +97,17 @@ class Trials:
             figure += self.others
         return figure
 
-    def frame_errors(self, found: Params) -> Floats:
-        """The greatest position error of each frame in cm with these parameters, (n_frames,)."""
+    def frame_errors(self, target: Target, found: Params) -> Floats:
+        """The greatest error of each frame with these parameters, (n_frames,).
+
+        It is that of positions in cm, unless ``target`` is one of channels.
+        """
         clip = self._written(self.alone, found)[1]
         unit, decoded = self.motion.skeleton.unit_cm, clip.motion()
+        if target.weights is not None:
+            errors = self._weighed_errors(target.weights, decoded)
+            known = np.where(np.isfinite(errors), errors, 0.0).reshape(self.motion.n_frames, -1)
+            return np.asarray(known.max(axis=1, initial=0.0))
         assert unit is not None
         greatest = np.zeros(self.motion.n_frames)
         for start in range(0, len(greatest), BLOCK_FRAMES):
@@ -113,6 +130,16 @@ class Trials:
         unit = self.motion.skeleton.unit_cm
         return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
 
+    def _weighed_errors(self, weights: Floats, decoded: Motion) -> Floats:
+        """The errors of channels times ``weights``, NaN where a value does not count."""
+        signal = self.alone.signals[0]
+        given, found = (
+            np.asarray(one.masked(), np.float64) for one in (signal, decoded.signals[0])
+        )
+        with np.errstate(all="ignore"):
+            errors: Floats = channel_errors(self.motion.skeleton, signal, given, found) * weights
+        return errors
+
     def _written(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ContactWarning)  # that of the clip itself counts
@@ -126,6 +153,12 @@ class Trials:
 
     def _measure(self, motion: Motion, target: Target, found: Params) -> float:
         container, clip = self._written(motion, found)
+        if target.weights is not None:
+            errors = self._weighed_errors(target.weights, clip.motion())
+            n = np.isfinite(errors).sum(axis=0) if target.name == MEAN_ERROR else 1
+            known = np.where(np.isfinite(errors), errors, 0.0)
+            sums = known.sum(axis=0) / np.maximum(n, 1)
+            return float((sums if target.name == MEAN_ERROR else known).max(initial=0.0))
         if not target.falls:
             figures = compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
             return _error(target, figures)
@@ -150,14 +183,14 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict
 
     Raises OptionError where none that was tried does.
     """
-    step = (dial.guess and dial.guess(target.name, target.limit)) or 1.0
-    step = min(max(step, dial.low), dial.high)
+    guessed = dial.guess and dial.guess(target.name, target.limit)
+    step = min(max(guessed or _first_step(dial, target, trial), dial.low), dial.high)
     for _ in range(MOST_STEPS):
         octaves: NDArray[np.int64] = np.zeros(trial.motion.n_frames, np.int64)
         for _ in range(MOST_ROUNDS):
             found = {dial.parameter: step, REFINEMENT: octaves}
             try:
-                errors = trial.frame_errors(found)
+                errors = trial.frame_errors(target, found)
             except MotionError as error:
                 text = f"{target.name} {target.limit:g} cannot be met: {error}"
                 raise OptionError(text) from error
@@ -168,6 +201,44 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict
         missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
         step = max(step * FINER, dial.low)
     raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
+
+
+def _first_step(dial: Dial, target: Target, trial: Trials) -> float:
+    """A step with which most frames keep the bound of their channels, and not by far."""
+    step = USUAL_STEP
+    for _ in range(MOST_CALIBRATIONS):
+        octaves = np.zeros(trial.motion.n_frames, np.int64)
+        errors = trial.frame_errors(target, {dial.parameter: step, REFINEMENT: octaves})
+        usual = float(np.quantile(errors, COMMON)) / target.limit if len(errors) else 0.0
+        if not usual or LEAST_COMMON <= usual <= MOST_COMMON:
+            break
+        step *= min(max(WANTED_COMMON / usual, 0.1), 10.0)
+    return step
+
+
+def averaged(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
+    """The coarsest step that keeps a mean error of channels, whose steps are quarters of octaves.
+
+    Raises OptionError where none that was tried does.
+    """
+    place, met, missed = 0, -MOST_QUARTERS, MOST_QUARTERS
+    reached, figure = math.inf, math.inf
+    for _ in range(MOST_MEANS):
+        try:
+            figure = trial(target, 2.0 ** (place / 4))
+        except MotionError as error:
+            raise OptionError(f"{target.name} {target.limit:g} cannot be met: {error}") from error
+        if figure <= target.limit:
+            met, reached = place, figure
+        else:
+            missed = place
+        if missed - met == 1:
+            break
+        quarters = math.floor(4 * math.log2(target.limit / figure)) if figure else MOST_QUARTERS
+        place = min(max(place + min(max(quarters, -16), 16), met + 1), missed - 1)
+    if reached == math.inf:
+        raise OptionError(f"{target.name} {target.limit:g} cannot be met: {figure:g} was reached")
+    return {dial.parameter: 2.0 ** (met / 4)}, {"target_reached": repr(reached)}
 
 
 def _refined(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:

@@ -22,12 +22,24 @@ from mcz.hints import Hint
 from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.types import JsonObject, Params, Progress
+from mcz.writing.channel_limits import limits_of, parse_bound
 from mcz.writing.clip_writer import Amend, write_plan
 from mcz.writing.planning import Prepared, asked, check_bones, plan_clip
 from mcz.writing.signal_bounds import of_codec, with_bounds
-from mcz.writing.trials import QUALITY, REFINEMENT, Limits, Target, Trials, bounded, weighted
+from mcz.writing.trials import (
+    MAX_ERROR,
+    MEAN_ERROR,
+    QUALITY,
+    REFINEMENT,
+    Limits,
+    Target,
+    Trials,
+    averaged,
+    bounded,
+    weighted,
+)
 
-PRESET = "preset"
+PRESET, LIMITS = "preset", "limits"
 GOAL = 0.985  # of a target: near enough to stop
 PROMISED = 0.97  # of a target: what is less is remarked upon
 MOST_TRIALS = 60
@@ -81,11 +93,13 @@ def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Fou
         return {**params}, {}
     target = _target(motion, codec.dial, options, targets) if targets else None
     trial = Trials(motion, codec, params, profile)
+    if target and target.weights is not None and codec.has(LIMITS):
+        trial = trial.given({LIMITS: target.limit / target.weights})
     if limits:
         found, remarks = _with_quality(codec, target, trial, limits)
     else:
         found, remarks = _meet(codec, target, trial)
-    return {**params, **trial.kept, **found}, remarks
+    return {**trial.params, **trial.kept, **found}, remarks
 
 
 def _check_preset(codec: Codec, params: Params, options: Params, targets: Params) -> None:
@@ -119,9 +133,12 @@ def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
     assert codec.dial is not None
     if target is None:
         return {}, {}
-    if target.name == "max_error_cm" and codec.has(REFINEMENT):
-        _check_places(trial.motion, codec.dial, target)
+    if target.name.startswith("max_error") and codec.has(REFINEMENT):
+        if target.weights is None:
+            _check_places(trial.motion, codec.dial, target)
         return bounded(codec.dial, target, trial)
+    if target.weights is not None and codec.has(LIMITS):
+        return averaged(codec.dial, target, trial)
     return _searched(codec.dial, target, trial)
 
 
@@ -161,9 +178,22 @@ def _target(motion: Motion, dial: Dial, options: Params, targets: Params) -> Tar
         raise OptionError(
             "kbps has no meaning: the frame rate is unknown or there are no frames", hint=Hint.RATE
         )
+    if name in (MAX_ERROR, MEAN_ERROR):
+        return _channel_target(motion, name, str(limit))
     if name.endswith("_cm"):
         _check_unit(motion, name)
     return Target(name, float(limit), falls=not name.endswith("_cm"))
+
+
+def _channel_target(motion: Motion, name: str, text: str) -> Target:
+    """A target of channels, in the unit of the first of its bounds."""
+    signal = motion.signals[0]
+    channels = motion.skeleton.channels if signal.channels is None else signal.channels
+    limits = limits_of(motion.skeleton, channels, name, text)
+    limit = parse_bound(name, text.split(",")[0])[0]
+    if not limit > 0 or not (limits > 0).all():
+        raise OptionError(f"{name} is {text!r}, which no lossy channel keeps")
+    return Target(name, limit, falls=False, weights=limit / limits)
 
 
 def search(

@@ -91,7 +91,11 @@ def choose(source: SignalSource, params: Params) -> Choice:
     step_cm = step * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))
     weights = weights_of(step_cm)
     fields = _fields(skeleton, step, step_cm)
-    fields |= _plain_steps(skeleton, _spreads(sample(source, SAMPLED_FRAMES)), step_cm)
+    limits = params.get("limits")
+    spreads = _spreads(sample(source, SAMPLED_FRAMES)) if limits is None else limits
+    fields |= _plain_steps(skeleton, spreads, step_cm, turning=limits is None)
+    if limits is not None:
+        fields |= _greatest_steps(skeleton, fields, limits, step_cm)
     octaves = params.get("refinement")
     if octaves is not None and np.any(octaves):
         fields["flags"] |= REFINING
@@ -233,8 +237,13 @@ def _spreads(rows: Floats) -> Floats:
     return found
 
 
-def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> Settings:
-    """Steps of channels that move nothing: a share of how far they spread, (n_channels,)."""
+def _plain_steps(
+    skeleton: Skeleton, spreads: Floats, step_cm: float, *, turning: bool = True
+) -> Settings:
+    """Steps of channels that move nothing: a share of how far they spread, (n_channels,).
+
+    ``turning``: those of quaternions that move something are steps of angles instead.
+    """
     share = step_cm / SPREAD_CM
     kinds = [channel.kind for channel in skeleton.channels]
 
@@ -244,10 +253,10 @@ def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> Setting
 
     moving = has_kinematics(skeleton, whole=True)
     spatial = (*ANGLE_KINDS, *POSITION_KINDS) if has_whole_turns(skeleton) else SPATIAL
-    turning = code_of(math.radians(GREATEST_DEGREES) / 2)  # of a part of a quaternion
+    of_quaternions = code_of(math.radians(GREATEST_DEGREES) / 2)
     plain = [
-        turning
-        if moving and kind in QUATERNION_KINDS
+        of_quaternions
+        if moving and turning and kind in QUATERNION_KINDS
         else code_of(float(spread) * share)
         if spread > 0
         else code_of(1.0)
@@ -261,6 +270,17 @@ def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> Setting
         "rotation": code(ANGLE_KINDS),
         "position": code(POSITION_KINDS),
     }
+
+
+def _greatest_steps(skeleton: Skeleton, fields: Params, limits: Floats, step_cm: float) -> Settings:
+    """Steps of angles and positions with which each channel keeps a limit, (n_channels,)."""
+    kinds = np.array([channel.kind for channel in skeleton.channels])
+    found = {}
+    for name, some in (("rotation", ANGLE_KINDS), ("position", POSITION_KINDS)):
+        own = limits[np.isin(kinds, some)]
+        if len(own):
+            found[name] = min(fields[name], code_of(float(own.min()) * step_cm / SPREAD_CM))
+    return found
 
 
 def best_levels(

@@ -266,6 +266,7 @@ CODEC = Codec(
         ),
         Parameter("weights", None, "weight of each joint", np.asarray, inner=True),
         Parameter("like", None, "a header whose levels and orders are kept", bytes, inner=True),
+        Parameter("limits", None, "bound of each channel", np.asarray, inner=True),
         Parameter("refinement", None, "octaves of each frame", np.asarray, inner=True),
         SEGMENT_FRAMES_PARAMETER,
     ),
