@@ -42,7 +42,8 @@ def reached(quality: Mapping[str, str]) -> str:
         if greatest is not None:
             frame, channel = (quality[f"max_channel_error_{word}"] for word in ("frame", "channel"))
             text += f", greatest error {_number(greatest)} (frame {frame}, {channel})"
-            text += "; no bound is kept for channels that place no point"
+            if "param.max_error" not in quality:
+                text += "; no bound is kept for channels that place no point"
     else:
         where = ", ".join(
             f"{word} {quality[f'max_position_error_{word}']}"
@@ -95,8 +96,10 @@ def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
         elif metric in DISTANCES:
             yield [key, _number(value), "units", _number(held.get(f"{key}_cm", "")), note]
         else:
-            squared = "channels, squared" if metric.rpartition(".")[2].startswith("mse") else ""
-            yield [key, _number(value), squared, "", note]
+            name = metric.rpartition(".")[2]
+            unit = "channels, squared" if name.startswith("mse") else ""
+            unit = "channels" if name in ("max_error", "mean_error") else unit
+            yield [key, _number(value), unit, "", note]
 
 
 def _where(held: Mapping[str, str], metric: str, what: str) -> str:

@@ -61,6 +61,11 @@ class Dial:
     guess: Callable[[str, float], float | None] | None = None
 
 
+def _bounds(text: Any) -> str:
+    """Bounds of channels, which are read where the units of these are known."""
+    return str(text)
+
+
 # What a caller may ask for instead of setting the dial of a codec; None: not asked for.
 TARGETS = (
     Parameter(
@@ -78,14 +83,14 @@ TARGETS = (
     Parameter(
         "mean_error",
         None,
-        "at most this mean error of each channel of the motion, such as 0.1deg,1mm",
-        str,
+        "at most this mean error of each channel of the motion",
+        in_range("0.1, or 0.1deg,1mm", _bounds),
     ),
     Parameter(
         "max_error",
         None,
-        "at most this error of each channel of the motion, in its own unit without one",
-        str,
+        "at most this error of each channel of the motion",
+        in_range("0.1, or 0.1deg,1mm", _bounds),
     ),
     Parameter(
         "mean_error_cm",
