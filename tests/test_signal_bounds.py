@@ -276,6 +276,15 @@ def test_the_motion_may_stay_exact() -> None:
     assert 0 < float(record["signal.emg.max_error"]) <= 0.3
 
 
+def test_a_clip_may_have_no_motion() -> None:
+    motion = mcz.Motion(mcz.Skeleton(()), (mcz.Signal(np.empty((16, 0))), emg("mV")), Fraction(100))
+    stream = io.BytesIO()
+    mcz.write(motion, stream, "lossy", **{"emg.mean_error": "50uV"})
+    with mcz.open(stream.getvalue()) as file:
+        errors = np.abs(file.only_clip().motion().signals[1].values - motion.signals[1].values)
+    assert 0 < errors.mean() <= 0.05
+
+
 def test_what_is_coarser_than_the_bound_stays() -> None:
     values = np.random.default_rng(3).integers(-50, 50, (4096, 1)) * 0.5
     signal = mcz.Signal(values, (Grid(GridKind.BINARY32),), "emg", 256, channels=volts())
@@ -320,3 +329,26 @@ def test_a_restored_file_keeps_the_bound(processor: int, size: int, tmp_path: Pa
         errors = np.abs(given.values - signals["analog"].values)
         assert (errors.max(axis=0) <= [5, 60, 0.01]).all() and errors.max() > 0
         assert signals["analog"].grids == given.grids
+
+
+def test_a_text_loses_decimals(tmp_path: Path) -> None:
+    rng, n = np.random.default_rng(4), 40
+    forces, gaps = rng.normal(size=2 * n).cumsum(), {7, 33}
+    lines = ["Devices", "200", ",,Plate", "Frame,Sub Frame,Fx", ",,N"]
+    cells = ["" if row in gaps else f"{force:.6f}" for row, force in enumerate(forces)]
+    lines += [f"{1 + row // 2},{row % 2},{cell}" for row, cell in enumerate(cells)]
+    lines += ["", "Trajectories", "100", ",,Head,,", "Frame,Sub Frame,X,Y,Z", ",,mm,mm,mm"]
+    lines += [f"{1 + k},0,{k}.25,{k % 7}.5,{k}.125" for k in range(n)]
+    source, target = tmp_path / "take.csv", tmp_path / "take.mcz"
+    source.write_text("\r\n".join(lines) + "\r\n", "utf-8")
+    role = next(s.role or s.name for s in mcz.read(source).signals[1:])
+    mcz.encode(source, target, codec="lossy", params={"step": 0.1, f"{role}.max_error": "0.02N"})
+    assert mcz.verify(target) == []
+    with mcz.open(target) as file:
+        text = file.only_clip().source_bytes().decode("utf-8")
+    found = [line.split(",")[2] for line in text.split("\r\n")[5 : 5 + 2 * n]]
+    assert [row for row, cell in enumerate(found) if not cell] == sorted(gaps)
+    known = [row for row in range(2 * n) if row not in gaps]
+    errors = [abs(Fraction(found[row]) - Fraction(cells[row])) for row in known]
+    assert 0 < max(errors) <= Fraction("0.02")
+    assert max(len(found[row].partition(".")[2]) for row in known) == 2

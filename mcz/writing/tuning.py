@@ -79,7 +79,8 @@ def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Fou
     options = codec.options(params)
     targets = asked(options)
     _check_preset(codec, params, options, targets)
-    if not targets and codec.promise and codec.dial and options[codec.dial.parameter] is None:
+    is_open = codec.dial is not None and options[codec.dial.parameter] is None
+    if not targets and codec.promise and is_open and motion.signals[0].n_channels:
         targets = codec.promise(options)
         if motion.skeleton.unit_cm is None:
             raise OptionError(
