@@ -79,9 +79,9 @@ def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Fou
     options = codec.options(params)
     targets = asked(options)
     _check_preset(codec, params, options, targets)
-    is_open = codec.dial is not None and options[codec.dial.parameter] is None
-    if not targets and codec.promise and is_open and motion.signals[0].n_channels:
-        targets = codec.promise(options)
+    promise = codec.promise if motion.signals[0].n_channels else None
+    if not targets and promise and codec.dial and options[codec.dial.parameter] is None:
+        targets = promise(options)
         if motion.skeleton.unit_cm is None:
             raise OptionError(
                 f"{codec.name}: a preset promises an error in cm, and the length unit is unknown, "
