@@ -132,7 +132,7 @@ def _coarser(
     of_c3d = recording_of(motion.source) is not None
     rescales = of_c3d and signal.role == "analog" and _states_scales(motion.source, given)
     found = [
-        _within(column, most, average, Room(motion.source is not None, of_c3d, rescales))
+        _within(column, most, average, SourceRules(motion.source is not None, of_c3d, rescales))
         for column, most, average in zip(given, greatest.tolist(), mean.tolist(), strict=True)
     ]
     scales = {c: new.scale for c, new in enumerate(found) if new.scale != given[c].scale}
@@ -190,15 +190,15 @@ def _columns(signal: Signal) -> Iterator[Column]:
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
-    """The part that a source has in the choice of grids."""
+class SourceRules:
+    """Restrictions that a source puts on grids."""
 
     has_source: bool
     of_c3d: bool
     rescales: bool
 
 
-def _within(column: Column, greatest: float, mean: float, room: Room) -> Column:
+def _within(column: Column, greatest: float, mean: float, rules: SourceRules) -> Column:
     """The column on the coarsest numbers within the bounds, or as it is where none is smaller."""
     unit = abs(column.scale * column.general)
     most = 2 * greatest
@@ -206,7 +206,7 @@ def _within(column: Column, greatest: float, mean: float, room: Room) -> Column:
     for _ in range(TRIALS):
         if not 0 < step < math.inf or not 0 < unit < math.inf or column.kept.all():
             break
-        found = _rounded(column, step, unit, room)
+        found = _rounded(column, step, unit, rules)
         reached = math.inf if found is None else _mean_error(column, found, greatest)
         if found is not None and reached < math.inf and reached <= mean * (1 - 1e-9):
             if reached >= least:
@@ -239,20 +239,20 @@ def is_within(given: Floats, found: Floats, bound: float) -> Bools:
         return np.asarray((np.abs(error) < bound) | at_bound)
 
 
-def _rounded(column: Column, step: float, unit: float, room: Room) -> Column | None:
+def _rounded(column: Column, step: float, unit: float, rules: SourceRules) -> Column | None:
     """The column on numbers ``step`` apart, in its unit; None where there are none such."""
     kind, numbers, own = column.grid.kind, column.numbers, step / unit
     with np.errstate(all="ignore"):
         if kind in FLOATS:
             return _on_floats(column, column.grid, own)
-        if column.grid.is_text and (room.has_source or column.kept.any()):
+        if column.grid.is_text and (rules.has_source or column.kept.any()):
             digits = min(max(math.ceil(-math.log10(own) - 1e-9), 0), 22)
             grid = Grid(GridKind.FIXED, digits)
             return column.on(grid, grid.values(grid.ordinals(numbers)[0]))
         if kind == GridKind.INTEGER:
             own = 2 * math.floor(own / 2) + 1.0
-        if room.of_c3d:
-            return _rescaled(column, own) if room.rescales and kind == GridKind.INTEGER else None
+        if rules.of_c3d:
+            return _rescaled(column, own) if rules.rescales and kind == GridKind.INTEGER else None
         own *= 1 - 2.0**-40 if kind != GridKind.INTEGER else 1  # for the rounding of products
         if column.kept.any() and kind != GridKind.INTEGER:
             return _on_floats(column, Grid(GridKind.BINARY32), own)
