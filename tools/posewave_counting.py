@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.posewave import decision_kernels, rows, segment
 from mcz.codecs.posewave.model import Start, make_model
+from mcz.codecs.posewave.priors import Prior
 from mcz.codecs.posewave.state import N_OPINIONS, Model
 from mcz.coding import mixing
 
@@ -54,7 +55,7 @@ class Counting:
         segment.fresh_coder = lambda start: tripled(fresh(start))
         rows.make_model = self.make_model
 
-    def make_model(self, classes: Ints, start: Start, coder: Ints) -> Model:
-        model = make_model(classes, start, coder)
+    def make_model(self, classes: Ints, start: Start, coder: Ints, prior: Prior | None) -> Model:
+        model = make_model(classes, start, coder, prior)
         self.model = model._replace(slots=tripled(model.slots))
         return self.model

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,9 +30,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import mcz
-from mcz.angles import unwrap
-from mcz.codecs.contract import Layout
 from mcz.codecs.posewave import choices, segment
 from mcz.codecs.posewave.header import parse_header
 from mcz.codecs.posewave.model import N_SECOND, Start, start_of, start_tables
@@ -49,9 +46,8 @@ from mcz.codecs.posewave.state import (
     Model,
 )
 from mcz.coding import mixing
-from mcz.kinematics import reach
-from mcz.motion import Motion, Skeleton
 from tools.posewave_counting import Counting
+from tools.training_clips import Piece, pieces_of, read, step_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -66,8 +62,6 @@ btk-data: Gait PiG_Motion3_FF; ezc3d-testfiles: Qualisys Vicon; c3d.org/sample_1
 """
 SETS = (0.0035, 0.006, 0.011, 0.022, 0.045), (0.08, 0.13, 0.22, 0.36, 0.5)  # steps in cm
 PIECES = (0, 360), (0, 1000), (800, 1500)  # frames
-LEAST_FRAMES = 200  # of a piece behind the first
-MOST_NUMBERS = 120_000  # of a piece: one of many channels is cut short
 COUNTS = np.array([0, 1, 2, 3, 4, 6, 9, 13, 18, 26, 38, 55, 80, 120, 180, 250])
 SPREAD = 0.02  # how much likelier a count is than one e times as far from 1, squared
 N_SOME = 0.8  # bits that stand for what similar contexts have seen
@@ -75,51 +69,6 @@ FITTINGS = 3
 SEED = 1
 EARLY_SHARE = 0.4  # of the steps that a piece is coded with in a round before the last
 PER_LINE = 192
-USUAL_CM = 90.0  # of a skeleton whose unit is unknown, as the codec takes it
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Some frames of a clip; what the encoder takes for a source. ``levels``: chosen, by step."""
-
-    layout: Layout
-    frames: Floats
-    levels: dict[float, int]
-
-    def values(self, first: int, stop: int) -> Floats:
-        return self.frames[first:stop]
-
-    def valid(self, first: int, stop: int) -> None:
-        return None
-
-    @property
-    def skeleton(self) -> Skeleton:
-        assert self.layout.skeleton is not None
-        return self.layout.skeleton
-
-
-def pieces_of(motion: Motion) -> Iterator[Piece]:
-    skeleton = motion.skeleton
-    assert skeleton is not None
-    values = unwrap(np.asarray(motion.values, np.float64), skeleton)
-    fill(values)
-    channels = tuple(range(values.shape[1]))
-    ends = set()
-    for first, stop in PIECES:
-        stop = min(stop, len(values), first + MOST_NUMBERS // len(channels))
-        if (first, stop) in ends or (first and stop - first < LEAST_FRAMES):
-            continue
-        ends.add((first, stop))
-        layout = Layout(stop - first, (channels,), skeleton=skeleton)
-        yield Piece(layout, values[first:stop], {})
-
-
-def fill(values: Floats) -> None:
-    """Go straight through the gaps of markers, in place."""
-    frames = np.arange(len(values))
-    for column in values.T:
-        known = np.isfinite(column)
-        column[:] = np.interp(frames, frames[known], column[known]) if known.any() else 0.0
 
 
 class Seen:
@@ -286,10 +235,6 @@ def levels_of(piece: Piece, steps: Sequence[float]) -> int:
     return piece.levels[middle]
 
 
-def step_of(skeleton: Skeleton, step_cm: float) -> float:
-    return step_cm if skeleton.unit_cm else step_cm * reach(skeleton) / USUAL_CM
-
-
 def train(
     pieces: Sequence[Piece], steps: Sequence[float], start: Start, share: float
 ) -> dict[str, Any]:
@@ -324,15 +269,10 @@ def written(document: dict[str, Any]) -> str:
     return f'{{\n "counts": {json.dumps(document["counts"])},\n "sets": [\n{tables}\n ]\n}}\n'
 
 
-def read(name: str) -> Motion:
-    path, _, skeleton = name.partition(":")
-    return mcz.read(path, skeleton=skeleton) if skeleton else mcz.read(path)
-
-
 COUNTING = Counting()
 
 if __name__ == "__main__":
-    given = [piece for name in sys.argv[3:] for piece in pieces_of(read(name))]
+    given = [piece for name in sys.argv[3:] for piece in pieces_of(read(name), PIECES)]
     starts = list(start_tables())
     for share in (*(EARLY_SHARE,) * (int(sys.argv[2]) - 1), 1.0):
         document = {"counts": COUNTS.tolist(), "sets": []}

@@ -27,7 +27,7 @@ TABLES = {
     "pca-rdo": ("window_start.json", BASES),
     "online": ("online_start.json", BASES),
     "best": ("best_start.json",),
-    "posewave": ("posewave_start.json",),
+    "posewave": ("posewave_start.json", "posewave_priors.json"),
     "fast": (),
 }
 

@@ -8,6 +8,7 @@ const MEMORY = 0.996;
 const NOISE = 0.1;
 const PRIOR = 2;
 const CARRIED = 40;
+const SEEN = 25;
 
 const LANES = 32;
 const TAP_MEMORY = 0.98;
@@ -30,6 +31,26 @@ export class AcrossChannels {
     this.count = 0;
     /** What is foretold of each channel of a row. */
     this.means = new Float64Array(nChannels);
+  }
+
+  /**
+   * Begins with a prior.
+   *
+   * @param {import("./pose-prior.js").Prior} prior of all channels
+   * @param {ArrayLike<number>} kept channels
+   */
+  learnt({ lower, variances }, kept) {
+    const { starts } = this;
+    for (let block = 0; block + 1 < starts.length; block++) {
+      for (let c = starts[block]; c < starts[block + 1]; c++) {
+        const at = block * BLOCK + c - starts[block];
+        this.variances[at] = variances[kept[c]];
+        for (let d = c + 1; d < starts[block + 1]; d++) {
+          this.columns[at * BLOCK + d - starts[block]] = lower[kept[d]][kept[c]];
+        }
+      }
+    }
+    this.count = SEEN;
   }
 
   /** Lets a level begin with what the coarser ones have taught. */

@@ -68,18 +68,21 @@ class Level {
 /** Decodes the rows of one level after the other. */
 export class RowDecoder {
   /**
+   * @param {{classes: Uint8Array, refining: boolean, prior: object}} header classes of all channels,
+   *   whether rows have exponents, and a prior or null
+   * @param {ArrayLike<number>} kept channels
    * @param {import("./entropy.js").Model} small of single bits, which the head has used
    * @param {import("./pose-start.js").Start} start
-   * @param {Uint8Array} classes of the kept channels
-   * @param {boolean} refining whether rows have exponents
    */
-  constructor(small, start, classes, refining) {
-    const n = classes.length;
-    this.refining = refining;
+  constructor(header, kept, small, start) {
+    const n = kept.length;
+    const classes = Uint8Array.from(kept, (c) => header.classes[c]);
+    this.refining = header.refining;
     this.n = n;
     this.small = small;
     this.opinions = startOpinions(start, classes);
     this.across = new AcrossChannels(n);
+    if (header.prior !== null) this.across.learnt(header.prior, kept);
     this.inTime = new InTime(n, start.taps);
     this.sizes = new Sizes(classes, start);
     this.told = new Float64Array(6);

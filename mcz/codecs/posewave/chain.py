@@ -91,7 +91,6 @@ class Chain:
         header = self.header
         pyramid = Pyramid(n_frames, 0, 0)
         walk = Walk(header, self.skeleton, pyramid, head.moving, head.values(header))
-        classes = self._classes[head.moving]
-        rows = RowCoder(classes, header.start, coding.coder, NAME, refining=header.refining)
+        rows = RowCoder(header, self._classes, head.moving, coding.coder, NAME)
         rows.begin(0, pyramid.kind(0), n_frames, coding)
         return walk, rows

@@ -22,7 +22,9 @@ from mcz.codecs.posewave.header import (
     NAME,
     REFINING,
     SPREADS,
+    START_TABLES,
     WHOLE_TURNS,
+    AxisOrderFields,
     Header,
     PosewaveHeader,
     build_header,
@@ -31,6 +33,7 @@ from mcz.codecs.posewave.header import (
 )
 from mcz.codecs.posewave.order_choices import choose_orders
 from mcz.codecs.posewave.orders import N_NOTES, Orders
+from mcz.codecs.posewave.priors import number_of
 from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
@@ -103,7 +106,11 @@ def choose(source: SignalSource, params: Params) -> Choice:
     fields["exact"] = groups[1] if groups else ()
     exact = {channel for group in fields["exact"] for channel in source.layout.groups[group]}
     like = None if params.get("like") is None else parse(PosewaveHeader, params["like"], NAME)
-    fields["orders"] = like.orders if like else choose_orders(source, exact)
+    fields["orders"] = (
+        like.orders
+        if like
+        else [AxisOrderFields(joint=j, code=c) for j, c in choose_orders(source, exact).items()]
+    )
     if params.get("weights") is not None:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]
     fields["levels"] = like.levels if like else params["levels"]
@@ -149,7 +156,8 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
     step_cm = own * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))
     fields = _fields(skeleton, own, step_cm)
     fields |= _plain_steps(skeleton, np.ones(skeleton.n_channels), step_cm)
-    fields |= {"start": 1, "levels": 0, "borrowing": 0}
+    fields |= {"levels": 0, "borrowing": 0}
+    fields["start"] = 1 + START_TABLES * number_of(skeleton)
     if bound_cm is not None:
         fields["flags"] |= REFINING
     return Choice(build_header(**fields), weights_of(step_cm))
@@ -190,7 +198,7 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
     degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
     first = 2 if step_cm <= FINE_CM else 0
     return {
-        "start": 0 if step_cm < COARSE_CM else 1,
+        "start": (0 if step_cm < COARSE_CM else 1) + START_TABLES * number_of(skeleton),
         "flags": WHOLE_TURNS if has_whole_turns(skeleton) else 0,
         "step": step,
         "radius": RADIUS_CM * in_cm,
@@ -293,7 +301,7 @@ def best_levels(
     if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(tried):
         return min(tried)
     values = FrameReader(NAME, source).next(n_frames)
-    orders = Orders(fields["orders"], skeleton)
+    orders = Orders({order.joint: order.code for order in fields["orders"]}, skeleton)
     coded = orders.coded(values)
     no_notes = np.zeros((-(-n_frames // SAMPLED), len(orders.places), N_NOTES), np.int64)
 

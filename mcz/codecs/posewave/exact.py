@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout, Request, SignalSource, Span
-from mcz.codecs.posewave.header import NAME, PosewaveHeader, build_header
+from mcz.codecs.posewave.header import NAME, START_TABLES, PosewaveHeader, build_header
 from mcz.codecs.segments import gather
 from mcz.coding.fast.decoder import MOST_ROWS, MOST_VALUES, Shape, read_alone
 from mcz.coding.fast.encoder import StreamBuilder
@@ -83,6 +83,7 @@ def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int,
             f"are coded in one"
         )
     left = {"plain": [], "orders": [], "exact": list(range(len(groups)))}
+    left["start"] = fields.start % START_TABLES
     return build_header(**vars(fields) | left)
 
 

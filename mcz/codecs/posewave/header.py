@@ -5,7 +5,7 @@ SPEC.md, "Codec 3: posewave", is normative; the names below are its field names.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,6 +18,7 @@ from mcz.codecs.contract import Layout
 from mcz.codecs.posewave.contact_plan import Contacts, ContactsFields, parse_contacts
 from mcz.codecs.posewave.model import Start, start_tables
 from mcz.codecs.posewave.orders import N_ORDERS, check_orders
+from mcz.codecs.posewave.priors import Prior, priors
 from mcz.codecs.steps import code_of, ratio_of
 from mcz.errors import FormatError
 from mcz.motion import (
@@ -47,7 +48,15 @@ NAME = "posewave"
 MAX_LEVELS = 8
 MAX_FINE = 24
 WHOLE_SHARE, SPREADS = 16, 32  # of ``shell``
+START_TABLES = 16  # of ``start``: room for as many
 REFINING, WHOLE_TURNS = 1, 2  # of ``flags``
+
+
+class AxisOrderFields(Record):
+    """The axis order of a joint, in the header of posewave."""
+
+    joint: int = field(UVARINT, "joint that has it")
+    code: int = field(bounded(Int8ul, 1, N_ORDERS), "its axis order, 1 to 6")  # PWAVE-23
 
 
 class PosewaveHeader(Record):
@@ -58,7 +67,9 @@ class PosewaveHeader(Record):
         CheckedBeside(Int8ul, lambda n, fields: n <= fields.levels),
         "finest levels of details that take the metric of the next coarser one",
     )  # PWAVE-06
-    start: int = field(Int8ul, "start table of the model, 0 or 1")
+    start: int = field(
+        Int8ul, "bits 0-3: start table of the model, 0 or 1; 4-7: number of the prior; 0: none"
+    )
     flags: int = field(
         bounded(Int8ul, 0, 3),
         "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric",
@@ -92,9 +103,9 @@ class PosewaveHeader(Record):
     weights: list[int] = field(
         counted(Int8ul, 2**14), "of each joint the step code of its weight; none: all 1"
     )
-    orders: list[int] = field(
-        counted(Checked(Int8ul, lambda n: n < N_ORDERS), 2**14),
-        "of each joint the code of its axis order, 0 to 6; none: all 0",
+    orders: list[AxisOrderFields] = field(
+        counted(AxisOrderFields, 2**14),
+        "axis orders of joints that are not coded as their channels say",
     )
     exact: list[int] = field(
         counted(UVARINT, 2**14), "numbers of the groups whose channels are exact, ascending"
@@ -110,14 +121,15 @@ class Header:
 
     Arrays are by channel, but for ``weights`` (n_joints,): ``greatest`` steps and the step of the
     ``first`` value of a segment and of a ``constant``, in source units. ``whole``: quaternions and
-    rotation vectors turn in the metric, and the latter's channels are rotations. ``orders``: a code
-    of each joint, or none. ``exact`` (n_channels,): whether a channel is; ``exact_groups`` are
+    rotation vectors turn in the metric, and the latter's channels are rotations. ``orders``: codes
+    by joint. ``exact`` (n_channels,): whether a channel is; ``exact_groups`` are
     their groups.
     """
 
     levels: int
     borrowing: int
     start: Start
+    prior: Prior | None
     refining: bool
     whole: bool
     step: float
@@ -128,7 +140,7 @@ class Header:
     first: Floats
     constant: Floats
     weights: Floats
-    orders: tuple[int, ...]
+    orders: Mapping[int, int]
     exact: NDArray[np.bool_]
     exact_groups: tuple[int, ...]
     contacts: Contacts | None = None
@@ -141,7 +153,7 @@ class Header:
     @property
     def may_go_on(self) -> bool:
         """Whether a segment may go on where the one before it ended."""
-        rest = any(self.orders) or self.exact_groups or self.contacts
+        rest = self.orders or self.exact_groups or self.contacts
         return self.levels == 0 and not rest  # PWAVE-28
 
 
@@ -171,7 +183,8 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         )
     if layout.n_resolutions > fields.levels + 1:  # PWAVE-16
         raise FormatError(f"{NAME}: {layout.n_resolutions} resolutions, {fields.levels} levels")
-    start, last = fields.start, len(start_tables()) - 1
+    number, start = divmod(fields.start, START_TABLES)
+    last = len(start_tables()) - 1
     if start > last:  # PWAVE-07
         raise FormatError(f"{NAME}: start table {start}, the last is {last}")
     whole = bool(fields.flags & WHOLE_TURNS)
@@ -181,11 +194,10 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     for name, codes, due in (
         ("plain", fields.plain, n_plain),
         ("weights", fields.weights, skeleton.n_joints),
-        ("orders", fields.orders, skeleton.n_joints),
     ):
-        if len(codes) not in (0, due):  # PWAVE-13, PWAVE-14, PWAVE-15
+        if len(codes) not in (0, due):  # PWAVE-13, PWAVE-14
             raise FormatError(f"{NAME}: {len(codes)} of {name}, {due} are due")
-    check_orders(fields.orders, skeleton, NAME)
+    orders = _orders(fields.orders, skeleton)
     exact = _exact(fields.exact, layout)
     if fields.exact and fields.contacts:  # PWAVE-39
         raise FormatError(f"{NAME}: contacts beside exact channels")
@@ -207,6 +219,7 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         levels=fields.levels,
         borrowing=fields.borrowing,
         start=start_tables()[start],
+        prior=_prior(number, layout.n_channels),
         refining=bool(fields.flags & REFINING),
         whole=whole,
         step=fields.step,
@@ -217,11 +230,35 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         first=first,
         constant=first * 2.0**-fields.constant,
         weights=np.array([ratio_of(s) for s in fields.weights] or [1.0] * skeleton.n_joints),
-        orders=tuple(fields.orders),
+        orders=orders,
         exact=exact,
         exact_groups=tuple(fields.exact),
         contacts=parse_contacts(fields.contacts, skeleton, NAME),
     )
+
+
+def _prior(number: int, n_channels: int) -> Prior | None:
+    if not number:
+        return None
+    if number > len(priors()):  # PWAVE-41
+        raise FormatError(f"{NAME}: prior {number}, the last is {len(priors())}")
+    found = priors()[number - 1]
+    if len(found.variances) != n_channels:  # PWAVE-42
+        raise FormatError(
+            f"{NAME}: {n_channels} channels, prior {number} is of {len(found.variances)}"
+        )
+    return found
+
+
+def _orders(fields: Sequence[AxisOrderFields], skeleton: Skeleton) -> dict[int, int]:
+    """Codes by joint; raises FormatError for joints that cannot have one."""
+    joints = [order.joint for order in fields]
+    ends = [-1, *joints, skeleton.n_joints]
+    if any(after <= before for before, after in pairwise(ends)):  # PWAVE-15
+        raise FormatError(f"{NAME}: axis orders of joints {joints} of {skeleton.n_joints}")
+    found = {order.joint: order.code for order in fields}
+    check_orders(found, skeleton, NAME)
+    return found
 
 
 def _spread(octaves: int) -> float:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.annexes import annex_bytes
+from mcz.codecs.posewave.priors import SEEN, Prior
 from mcz.codecs.posewave.state import (
     BLOCK,
     LANES,
@@ -38,6 +39,7 @@ N_SECOND = 33
 START_ENERGY = 500.0
 
 N_LOGS = 1024
+VARIANCE = 2.0  # of a channel of which nothing is known
 N_MIXER_WEIGHTS = mixing.MODELS - mixing.WEIGHTS
 
 
@@ -124,18 +126,28 @@ def no_rows(n_channels: int) -> Floats:
     return np.zeros((1, 2 * wide_of(n_channels)))
 
 
-def make_model(classes: Ints, start: Start, coder: Ints | None = None) -> Model:
+def make_model(
+    classes: Ints, start: Start, coder: Ints | None = None, prior: Prior | None = None
+) -> Model:
     """The model for channels of these ``classes`` (n,), before the first level.
 
     A class is 0 for what is no rotation; 1 for a rotation of a root; otherwise by the joints of the
     subtree below the channel's joint, that one counted: 2 for one, 3 up to 3, 4 up to 7, 5 beyond.
-    ``coder`` is a state that has been used already, for what comes before the rows.
+    ``coder`` is a state that has been used already, for what comes before the rows; ``prior`` is of
+    these channels.
     """
     n, wide = len(classes), wide_of(len(classes))
     n_blocks = -(-n // BLOCK)
     own_sizes, features = np.zeros((N_FEATURES, wide)), np.zeros((N_FEATURES, wide))
     own_sizes[:, :n] = start.own_sizes[classes].T
     features[USUAL, :n] = start.usual[classes]
+    columns, variances = np.zeros((n_blocks, BLOCK, BLOCK)), np.full((n_blocks, BLOCK), VARIANCE)
+    if prior is not None:
+        for block in range(n_blocks):
+            first, stop = block * n // n_blocks, (block + 1) * n // n_blocks
+            known = prior.lower[first:stop, first:stop].T
+            columns[block, : stop - first, : stop - first] = known
+            variances[block, : stop - first] = prior.variances[first:stop]
     return Model(
         coder=start_coder(start) if coder is None else coder,
         classes=np.asarray(classes, np.int64),
@@ -150,9 +162,9 @@ def make_model(classes: Ints, start: Start, coder: Ints | None = None) -> Model:
         trust=trust_table(),
         logs=log_table(),
         costs=cost_table(),
-        columns=np.zeros((n_blocks, BLOCK, BLOCK)),
-        variances=np.zeros((n_blocks, BLOCK)),
-        seen=np.zeros(1),
+        columns=columns,
+        variances=variances,
+        seen=np.full(1, 0.0 if prior is None else SEEN),
         means=np.zeros(BLOCK),
         taps=start.taps.copy(),
         tap_energy=np.full((2 * N_LEVELS, N_TAPS), START_ENERGY),

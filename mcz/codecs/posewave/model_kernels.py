@@ -75,9 +75,9 @@ FAULTY = -1.0
 
 
 @kernel
-def begin_level(model: Model, level: int) -> None:
-    """Make the model ready for the rows of a level; levels follow in the order 0, 1 .. 5."""
-    begin_prediction(model, level)
+def begin_level(model: Model) -> None:
+    """Make the model ready for the rows of a level."""
+    begin_prediction(model)
 
 
 @kernel

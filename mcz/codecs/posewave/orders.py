@@ -6,7 +6,7 @@ turn, its other two turn fast although the joint does not; in another order all 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from functools import cache
 from itertools import pairwise
 from types import ModuleType
@@ -33,7 +33,7 @@ SEQUENCES: tuple[Sequenced, ...] = (
     (2, 0, 1),
     (2, 1, 0),
 )
-KEPT, N_ORDERS = 0, 1 + len(SEQUENCES)  # code KEPT: as the source has it; n: SEQUENCES[n - 1]
+N_ORDERS = len(SEQUENCES)  # code n: SEQUENCES[n - 1]
 N_NOTES = 4  # kinds: a switch, turns about x, y, z
 MAX_TURNS = 2**41
 PRICE = 0.25  # of a switch, in turns
@@ -76,22 +76,20 @@ def columns_by_axis(skeleton: Skeleton, index: int) -> list[int]:
     return [start + kinds.index(kind) for kind in ROTATION_KINDS]
 
 
-def check_orders(codes: Sequence[int], skeleton: Skeleton, where: str) -> None:
+def check_orders(codes: Mapping[int, int], skeleton: Skeleton, where: str) -> None:
     """Raises FormatError for a joint that cannot have an order."""
-    for index, (code, joint) in enumerate(zip(codes, skeleton.joints, strict=False)):
-        if code != KEPT and own_sequence(joint, skeleton) is None:  # PWAVE-23
+    for index, code in codes.items():
+        if own_sequence(skeleton.joints[index], skeleton) is None:  # PWAVE-23
             raise FormatError(f"order {code} of joint {index}, whose axes have none", where=where)
 
 
 class Orders:
-    """The orders of a clip; ``codes`` (n_joints,), or none."""
+    """The orders of a clip: ``codes`` by joint, ascending."""
 
-    def __init__(self, codes: Sequence[int], skeleton: Skeleton) -> None:
+    def __init__(self, codes: Mapping[int, int], skeleton: Skeleton) -> None:
         self.rule = RULES[skeleton.angle_unit]
         self.full = FULL_TURN.get(skeleton.angle_unit, 0.0)
-        self.places = [
-            _place(skeleton, joint, code) for joint, code in enumerate(codes) if code != KEPT
-        ]
+        self.places = [_place(skeleton, joint, code) for joint, code in codes.items()]
 
     def coded(self, values: Floats) -> Floats:
         """``values`` of the source, (n_frames, n_channels), as they are coded."""

@@ -23,19 +23,13 @@ from mcz.kernels.types import Floats, Floats2
 
 MEMORY = 0.996  # what a live row leaves of what earlier ones have taught
 NOISE = 0.1  # variance that each live row adds to that of a channel
-PRIOR = 2.0  # variance of a channel of which nothing is known
 CARRIED = 40.0  # rows at most that the coarser levels count for
 TAP_MEMORY, TAP_RATE, MOST_TAP = 0.98, 0.012, 2.0
 
 
-def begin_prediction(model: Model, level: int) -> None:
-    """Let a level start from what the coarser one has taught; the first one knows nothing."""
+def begin_prediction(model: Model) -> None:
+    """Let a level start from what the coarser one has taught."""
     seen = model.seen
-    if level == 0:
-        seen[0] = 0.0
-        for block in range(len(model.columns)):
-            model.columns[block] = 0.0
-            model.variances[block] = PRIOR
     if seen[0] > CARRIED:
         share = CARRIED / seen[0]
         for block in range(len(model.columns)):

@@ -12,7 +12,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.header import NAME
+from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.model import (
     Start,
     make_model,
@@ -86,17 +86,24 @@ def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: s
 class RowCoder:
     """Codes the rows of one level after the other, all with one model, which learns.
 
-    ``classes`` are those of the kept channels; ``where`` opens messages.
+    ``classes`` and ``kept`` are of all channels; ``where`` opens messages.
     """
 
     stream: Stream
     exponents: Ints  # (n_rows,) of the level, or of what it goes on with
 
     def __init__(
-        self, classes: Ints, start: Start, coder: Ints, where: str, *, refining: bool
+        self,
+        header: Header,
+        classes: Ints,
+        kept: NDArray[np.bool_],
+        coder: Ints,
+        where: str,
     ) -> None:
-        self.where, self.n_kept, self.refining = where, len(classes), refining
-        self.model = make_model(classes, start, coder)
+        known, channels = header.prior, np.flatnonzero(kept)
+        self.where, self.n_kept, self.refining = where, len(channels), header.refining
+        prior = None if known is None else known.of(channels)
+        self.model = make_model(classes[channels], header.start, coder, prior)
         nothing = no_rows(self.n_kept)
         self.here = nothing
         self.before = [nothing, nothing]  # the two levels of details before, the coarser one last
@@ -114,7 +121,7 @@ class RowCoder:
         self.kind, self.stream = kind, stream
         self.here = new_rows(n_rows, self.n_kept)
         self._make_room(0, n_rows)
-        _model().begin_level(self.model, kind)
+        _model().begin_level(self.model)
 
     def go_on(self, n_rows: int, stream: Stream) -> None:
         """More rows of the same level, in another stream."""

@@ -99,7 +99,7 @@ def encode_coded(
     bands = [approx, *reversed(details)]
     head = choose_head(header, values, kept, approx)
     classes, coder = classes_of(skeleton, header.whole), fresh_coder(header.start)
-    rows = RowCoder(classes[kept], header.start, coder, NAME, refining=header.refining)
+    rows = RowCoder(header, classes, kept, coder, NAME)
     walk = Walk(header, skeleton, pyramid, kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
@@ -151,7 +151,7 @@ def decode_segment(
     kept = head.kept(header)
     walk = Walk(header, skeleton, pyramid, kept, head.values(header))
     held = walk.held(header.contacts) if header.contacts and kept.any() else None  # HOLD-07
-    rows = RowCoder(classes[kept], header.start, coder, where, refining=header.refining)
+    rows = RowCoder(header, classes, kept, coder, where)
     for level in range(pyramid.n_details + 1):
         if level >= len(streams):
             walk.skip(level)

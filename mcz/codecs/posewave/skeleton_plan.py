@@ -9,13 +9,13 @@ to a joint is known along B: its mass, first moment and inertia never change.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.orders import KEPT, SEQUENCES
+from mcz.codecs.posewave.orders import SEQUENCES
 from mcz.codecs.posewave.turns import BEYOND, RULES, Rule, sine_cosine
 from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints2
 from mcz.kinematics.points import points_of
@@ -95,15 +95,15 @@ def make_plan(
     radius: float,
     kappa: float = 0.5,
     joint_weights: Floats | None = None,
-    orders: Sequence[int] = (),
+    orders: Mapping[int, int] | None = None,
     whole: bool = False,
 ) -> Plan:
     """The plan of ``skeleton`` for the channels where ``kept``, bool (n_channels,), is true.
 
     ``regularization`` (n_kept,) is added to the diagonal; of a plain channel it is the diagonal.
     ``radius`` of the shell is in length units, ``kappa`` the shell's part of the whole,
-    ``joint_weights`` (n_joints,) multiply what a joint has of both. ``orders`` (n_joints,), or
-    none, are codes of axis orders. ``whole``: quaternions and rotation vectors turn.
+    ``joint_weights`` (n_joints,) multiply what a joint has of both. ``orders`` are codes
+    of axis orders by joint. ``whole``: quaternions and rotation vectors turn.
 
     All but positions and what turns are plain. The pose takes scales as 1 and lengths as 0. All
     channels are plain where angles have no known unit. What is 2^40 or more, or not finite, among
@@ -120,7 +120,7 @@ def make_plan(
     rule = RULES[skeleton.angle_unit]
     frames = [orientation(joint, rule) for joint in skeleton.joints]
     moves, move_starts, directions = _moves(skeleton, frames, numbers)
-    turns, turn_starts = _turns(skeleton, numbers, orders, whole)
+    turns, turn_starts = _turns(skeleton, numbers, orders or {}, whole)
     moving = {column for _, column, _ in turns}
     if has_kinematics(skeleton, whole):
         moving |= {column for column, _ in moves}
@@ -231,7 +231,7 @@ def _moves(
 
 
 def _turns(
-    skeleton: Skeleton, numbers: list[int], orders: Sequence[int], whole: bool
+    skeleton: Skeleton, numbers: list[int], orders: Mapping[int, int], whole: bool
 ) -> tuple[list[Turn], list[int]]:
     if not has_kinematics(skeleton, whole):
         return [], [0] * (skeleton.n_joints + 1)
@@ -243,9 +243,9 @@ def _turns(
             for k, channel in enumerate(joint.channels)
             if channel.kind in ROTATION_KINDS
         ]
-        code = orders[index] if orders else KEPT
-        if code != KEPT:
-            turns += sorted(own, key=lambda turn: SEQUENCES[code - 1].index(turn[0]))
+        if index in orders:
+            sequence = SEQUENCES[orders[index] - 1]
+            turns += sorted(own, key=lambda turn, at=sequence.index: at(turn[0]))
         else:
             parts = [[turn] for turn in own] + (_whole(joint, column, numbers) if whole else [])
             parts.sort(key=lambda part: min(column for _, column, _ in part))

@@ -9,6 +9,7 @@ import { readHead } from "../pose-head.js";
 import { Holder } from "../pose-holding.js";
 import { Pyramid, Walk } from "../pose-levels.js";
 import { RowDecoder } from "../pose-rows.js";
+import { priorOf } from "../pose-prior.js";
 import { HEAD, startTable } from "../pose-start.js";
 import { stepOf } from "../scales.js";
 import { decodeAlone } from "./fast.js";
@@ -25,6 +26,7 @@ const MAX_LEVELS = 8;
 const MAX_SHELL = 16;
 const SPREADS = 32;
 const MAX_FINE = 24;
+const START_TABLES = 16;
 const MAX_START = 1;
 const MAX_ORDER = 6;
 const GREATEST_LENGTH = 2 ** 60;
@@ -72,7 +74,7 @@ function readHeader(bytes, skeleton, groups) {
   const reader = new ByteReader(bytes, "POSEWAVE_HEADER");
   const levels = upTo(reader, MAX_LEVELS, "levels");
   const borrowing = upTo(reader, levels, "borrowed levels");
-  const start = upTo(reader, MAX_START, "is a start table");
+  const [start, prior] = readStart(reader, channels.length);
   const flags = upTo(reader, REFINING | WHOLE_TURNS, "as flags");
   const refining = (flags & REFINING) !== 0;
   const whole = (flags & WHOLE_TURNS) !== 0;
@@ -91,10 +93,7 @@ function readHeader(bytes, skeleton, groups) {
   const kinds = Uint8Array.from(channels, (channel) => kindOf(channel, whole));
   const plain = readSteps(reader, kinds.filter((kind) => kind === PLAIN).length);
   const weights = readSteps(reader, joints.length);
-  const orders = reader.counted(() => upTo(reader, MAX_ORDER, "is an axis order"));
-  if (orders.length !== 0 && orders.length !== joints.length) {
-    reader.refuse(`${orders.length} axis orders of ${joints.length} joints`);
-  }
+  const orders = readOrders(reader, joints.length);
   const exactGroups = readExact(reader, groups.length);
   const contacts = reader.counted(() => readContacts(reader, skeleton));
   if (contacts.length > 1) reader.refuse(`${contacts.length} times contacts`);
@@ -105,7 +104,8 @@ function readHeader(bytes, skeleton, groups) {
   const firstStep = greatest.map((x) => x * 2 ** -first);
   const constantStep = firstStep.map((x) => x * 2 ** -constant);
   return {
-    ...{ levels, borrowing, start, refining, whole, step, radius, kappa, spread, weights, orders },
+    ...{ levels, borrowing, start, prior, refining, whole },
+    ...{ step, radius, kappa, spread, weights, orders },
     axisOrders: new AxisOrders(skeleton, orders),
     ...{ kinds, greatest, firstStep, constantStep, exactGroups },
     exactColumns: new Set(exactGroups.flatMap((g) => groups[g])),
@@ -125,6 +125,33 @@ function readSteps(reader, due) {
   const codes = reader.take(reader.varint());
   if (codes.length !== 0 && codes.length !== due) reader.refuse(`${codes.length} codes of ${due}`);
   return codes.length > 0 ? Array.from(codes, stepOf) : new Array(due).fill(1);
+}
+
+/** The number of a start table, and a prior for so many channels, or null. */
+function readStart(reader, nChannels) {
+  const byte = reader.u8();
+  const start = byte % START_TABLES;
+  if (start > MAX_START) reader.refuse(`${start} is a start table`);
+  const number = Math.floor(byte / START_TABLES);
+  if (number === 0) return [start, null];
+  const prior = priorOf(number);
+  if (prior === null) reader.refuse(`prior ${number}`);
+  if (prior.variances.length !== nChannels) reader.refuse(`prior ${number}: ${nChannels} channels`);
+  return [start, prior];
+}
+
+/** The codes of axis orders of so many joints, 0 where the header has none. */
+function readOrders(reader, nJoints) {
+  const codes = new Uint8Array(nJoints);
+  let last = -1;
+  reader.counted(() => {
+    const joint = reader.varint();
+    if (joint <= last || joint >= nJoints) reader.refuse(`an axis order of joint ${joint}`);
+    codes[joint] = upTo(reader, MAX_ORDER, "is an axis order");
+    if (codes[joint] === 0) reader.refuse("0 is an axis order");
+    last = joint;
+  });
+  return codes;
 }
 
 /** The numbers of exact groups, of so many. */
@@ -262,8 +289,7 @@ class PoseDecoder {
     fillRows(out, first);
     let left = { first, kept };
     if (kept.length > 0) {
-      const classes = Uint8Array.from(kept, (c) => header.classes[c]);
-      const rows = new RowDecoder(model, start, classes, header.refining);
+      const rows = new RowDecoder(header, kept, model, start);
       const walk = new Walk(header, skeleton, pyramid, kept, first);
       left = { first: first.slice(), kept, rows, walk };
       const rest = this.levels(coder, streams, rows, walk, what);
