@@ -17,6 +17,7 @@ SHOWN_ELSEWHERE = (
 )
 WIDEST = 80  # characters that are shown of a key or value: records in files may say anything
 UNCUT = "uncut_"  # in front of the figures of a clip before it was cut
+SPEEDS = {"s": "cm/s", "s2": "cm/s2"}
 DISTANCES = ("rms_coordinate_error", "mean_position_error", "max_position_error")
 
 
@@ -98,6 +99,7 @@ def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
         else:
             name = metric.rpartition(".")[2]
             unit = "channels, squared" if name.startswith("mse") else ""
+            unit = SPEEDS.get(key.rpartition("_cm_")[2], unit) if "_cm_s" in key else unit
             unit = "channels" if name in ("max_error", "mean_error") else unit
             yield [key, _number(value), unit, "", note]
 

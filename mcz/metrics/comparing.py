@@ -61,6 +61,7 @@ def compare(
             if placed:
                 places.add(start, left, right)
         further = _further_signals(original, decoded, notes)
+    velocities, accelerations = places.velocities(unit), places.accelerations(unit)
     points, markers, shell = places.points, places.markers, places.shell
     return Comparison(
         frames=a.n_frames,
@@ -77,6 +78,10 @@ def compare(
         where=places.point_where(),
         mismatched_points=points.mismatched if placed else None,
         sqnr_db=points.sqnr_db,
+        mean_velocity_error_cm_s=velocities[0],
+        max_velocity_error_cm_s=velocities[1],
+        mean_acceleration_error_cm_s2=accelerations[0],
+        max_acceleration_error_cm_s2=accelerations[1],
         virtual_marker_mean_cm=times(markers.mean, unit),
         virtual_marker_max_cm=times(markers.greatest, unit),
         shell_radius_cm=None if shell.mean is None else places.shell_cm,

@@ -78,6 +78,10 @@ class Comparison:
     where: tuple[int, str] | None = None
     mismatched_points: int | None = None
     sqnr_db: Number = None
+    mean_velocity_error_cm_s: Number = None
+    max_velocity_error_cm_s: Number = None
+    mean_acceleration_error_cm_s2: Number = None
+    max_acceleration_error_cm_s2: Number = None
     virtual_marker_mean_cm: Number = None
     virtual_marker_max_cm: Number = None
     shell_radius_cm: Number = None
@@ -121,6 +125,10 @@ class Comparison:
             "max_position_error_point": point,
             "mismatched_points": self.mismatched_points,
             "sqnr_db": self.sqnr_db,
+            "mean_velocity_error_cm_s": self.mean_velocity_error_cm_s,
+            "max_velocity_error_cm_s": self.max_velocity_error_cm_s,
+            "mean_acceleration_error_cm_s2": self.mean_acceleration_error_cm_s2,
+            "max_acceleration_error_cm_s2": self.max_acceleration_error_cm_s2,
             "virtual_marker_mean_cm": self.virtual_marker_mean_cm,
             "virtual_marker_max_cm": self.virtual_marker_max_cm,
             "shell_radius_cm": self.shell_radius_cm,

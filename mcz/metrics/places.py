@@ -10,6 +10,7 @@ from mcz.kinematics import Places, places_of, point_names, points_of
 from mcz.kinematics.contacts import Contacts, FootTracks
 from mcz.kinematics.feet import feet_of
 from mcz.metrics.alike import has_markers_of, same_axes
+from mcz.metrics.changes import ChangeErrors
 from mcz.metrics.comparison import JointFigures
 from mcz.metrics.sliding import Sliding, sliding
 from mcz.metrics.sums import Distances, Number, PointErrors, ShellErrors, Values, times
@@ -30,6 +31,7 @@ class PlaceErrors:
         self._a, self._b = original.skeleton, decoded.skeleton
         self._names = point_names(self._a) if placed else ()
         self.points = PointErrors(len(self._names))
+        self.changes = ChangeErrors(len(self._names))
         self.markers, self.shell = PointErrors(0), ShellErrors(0)
         self.shell_cm: float | None = None
         self._contacts: Contacts | None = None
@@ -76,6 +78,7 @@ class PlaceErrors:
         ours = places_of(self._a, left, markers=markers, shell_cm=shell_cm)
         theirs = self._theirs(right, markers)
         self.points.add_points(start, ours.points, theirs.points)
+        self.changes.add_points(start, ours.points, theirs.points)
         if markers:
             self.markers.add_points(start, ours.markers, theirs.markers)
         if shell_cm is not None:
@@ -113,6 +116,21 @@ class PlaceErrors:
 
     def _frame(self, row: int | None) -> int | None:
         return None if row is None else row // self._original.signals[0].samples_per_frame
+
+    def velocities(self, unit: Number) -> tuple[Number, Number]:
+        """Mean and greatest error of velocities in cm/s, ``unit`` cm a length unit."""
+        return self._changes(self.changes.velocity, unit, 1)
+
+    def accelerations(self, unit: Number) -> tuple[Number, Number]:
+        """Mean and greatest error of accelerations in cm/s2, ``unit`` cm a length unit."""
+        return self._changes(self.changes.acceleration, unit, 2)
+
+    def _changes(self, errors: Distances, unit: Number, order: int) -> tuple[Number, Number]:
+        rate = self._original.frame_rate or self._decoded.frame_rate
+        if unit is None or rate is None:
+            return None, None
+        factor = unit * float(rate * self._original.signals[0].samples_per_frame) ** order
+        return times(errors.mean, factor), times(errors.greatest, factor)
 
     def sliding(self) -> Sliding | None:
         """How far the feet slide that stand in the original; None where that is not asked for."""

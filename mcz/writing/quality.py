@@ -12,6 +12,7 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
+from mcz.kinematics.feet import feet_of
 from mcz.metrics import compare
 from mcz.metrics.sums import channel_errors
 from mcz.motion import Exceptions, Motion, Signal
@@ -21,7 +22,11 @@ from mcz.types import JsonObject, Params, Values
 CHUNK = ChunkType.QUAL
 # What a record does without, for its bytes: the radius is 3 cm where it is not stated.
 NOT_STORED = ("max_channel_error", "max_channel_error_frame", "max_channel_error_channel")
-LEFT_OUT = ("shell_radius_cm", "shell_max_frame", "shell_max_joint")
+LEFT_OUT = (
+    *("shell_radius_cm", "shell_max_frame", "shell_max_joint"),
+    *("contact_frames", "slide_max_frame", "slide_max_joint"),
+    *("slide_path_mm", "slide_path_original_mm"),
+)
 
 
 def quality_record(
@@ -78,9 +83,15 @@ def quality_entries(
 
 
 def figures(original: Motion, decoded: Motion) -> JsonObject:
-    """The figures of a record by their metric ids, None where there is none."""
-    found = compare(original, decoded).entries()
-    return {key: value for key, value in found.items() if key not in LEFT_OUT}
+    """The figures of a record by their metric ids, rounded; None where there is none."""
+    contacts = bool(feet_of(original.skeleton))
+    found = compare(original, decoded, contacts=contacts).entries()
+    return {key: _rounded(value) for key, value in found.items() if key not in LEFT_OUT}
+
+
+def _rounded(value: object) -> object:
+    """Eight significant digits of a float: what measures agree on, in half of the bytes."""
+    return float(f"{value:.8g}") if isinstance(value, float) else value
 
 
 def texts_of(entries: Params) -> dict[str, str]:

@@ -83,8 +83,8 @@ def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int,
             f"are coded in one"
         )
     left = {"plain": [], "orders": [], "exact": list(range(len(groups)))}
-    left["start"] = fields.start % START_TABLES
-    return build_header(**vars(fields) | left)
+    start = fields.start % START_TABLES  # without a prior
+    return build_header(**vars(fields) | left | {"start": start})
 
 
 def most_frames(layout: Layout, groups: Sequence[int]) -> int:

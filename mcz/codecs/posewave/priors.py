@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.annexes import annex_bytes
 from mcz.motion import Skeleton
+from mcz.types import JsonObject
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -63,8 +64,8 @@ def layout_of(skeleton: Skeleton) -> tuple[list[int], list[str]]:
 
 
 @cache
-def _document() -> dict[str, list[dict[str, list]]]:
-    found: dict[str, list[dict[str, list]]] = json.loads(annex_bytes("posewave_priors.json"))
+def _document() -> JsonObject:
+    found: JsonObject = json.loads(annex_bytes("posewave_priors.json"))
     return found
 
 

@@ -244,8 +244,8 @@ def _turns(
             if channel.kind in ROTATION_KINDS
         ]
         if index in orders:
-            sequence = SEQUENCES[orders[index] - 1]
-            turns += sorted(own, key=lambda turn, at=sequence.index: at(turn[0]))
+            by_axis = {turn[0]: turn for turn in own}
+            turns += [by_axis[axis] for axis in SEQUENCES[orders[index] - 1]]
         else:
             parts = [[turn] for turn in own] + (_whole(joint, column, numbers) if whole else [])
             parts.sort(key=lambda part: min(column for _, column, _ in part))
