@@ -20,6 +20,7 @@ from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
 from mcz.coding.fast.encoder import Plan, StreamBuilder
 from mcz.coding.fast.encoder import kernels as fast_kernels
 from mcz.coding.fast.lanes import fault_of
+from mcz.coding.forms.ids import WITH_UNIT
 from mcz.coding.start import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError
@@ -171,9 +172,17 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     uncode(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
     tails = own.Tails(lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns)
     leads = lanes.leads[residual.BEHIND :]
-    fault = own.read_ordinals(tails, lanes.lattices, leads, table, decoder.rows)
+    given = _ordinals_given(table, decoder)
+    fault = own.read_ordinals(tails, lanes.lattices, leads, given, decoder.rows)
     if fault != -1:
         raise fault_of("tails", "lane", fault)
     for lane in np.flatnonzero(rests.scales >= 0).tolist():
         decoder.rows[:, lanes.columns[lane]] = rests.values[:, lane]
     decoder.finish()
+
+
+def _ordinals_given(table: Ints, decoder: SegmentDecoder) -> Ints:
+    """The places of ``table`` whose ordinals echoes give: in units an ordinal is its lead."""
+    head = fast_kernels()[0]
+    forms = decoder.heads.plans[decoder.lanes.columns, head.FORM]
+    return np.where(np.isin(forms, WITH_UNIT), 0, table)
