@@ -6,6 +6,7 @@ mcz/codecs/posewave/README.md describes it; a decoder needs none of it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -315,7 +316,20 @@ def best_levels(
         error = distortion(header, skeleton, values[::SAMPLED], found)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 
-    return min(tried, key=score)
+    return _lowest(tried, score)
+
+
+def _lowest(tried: Sequence[int], score: Callable[[int], float]) -> int:
+    """The one with the lowest score, of scores that fall and then rise."""
+    scores = [score(tried[k]) for k in (1, 2)]
+    at, way = (2, 1) if scores[1] < scores[0] else (1, -1)
+    lowest = min(scores)
+    while 0 <= at + way < len(tried):
+        found = score(tried[at + way])
+        if found >= lowest:
+            break
+        at, lowest = at + way, found
+    return tried[at]
 
 
 def distortion(header: Header, skeleton: Skeleton, values: Floats, found: Floats) -> float:
