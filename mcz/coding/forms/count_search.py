@@ -23,6 +23,7 @@ Line = tuple[float, float]  # what a count is, and what 0 is
 LEAST_UNIT, MOST_COUNT = 2.0**-200, 2.0**40
 FEWEST = 9  # distinct values that show a law
 VANISHING = -(2.0**-200)  # an offset that makes -0 of the count 0, and changes nothing else
+MOST_REST = 2**31 - 1  # that has a code: where a law misses 0, a rest may be as large as an ordinal
 COARSE = 8  # multiples of a unit that all lie so far apart may be counts of a greater one
 _QUANTILES = np.array([0, 0.05, 0.1, 0.2, 0.35, 0.5])  # of gaps: one may be the unit
 _SOME = 128  # gaps that are looked at first
@@ -96,10 +97,12 @@ def _saves(found: Counted, values: Floats, fine: Floats | float) -> bool:
 
 
 def _cheapest(laws: Iterable[tuple[Law, Ints]], ordinals: Ints, grid: Grid) -> Counted | None:
-    """The law that costs least, or the first without rests."""
+    """The law that costs least, or the first without rests; None where no rests have codes."""
     best, least = None, np.inf
     for law, counts in laws:
         found = Counted(law, counts, ordinals - law.ordinals(counts, grid))
+        if np.abs(found.rests).max() > MOST_REST:
+            continue
         cost = found.cost()
         if cost < least:
             best, least = found, cost
