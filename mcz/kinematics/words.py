@@ -10,12 +10,12 @@ from mcz.kinematics.feet import feet_of
 from mcz.motion import Skeleton
 
 GROUPS = {
-    "all": "",
     "hands": r"hand|wrist|finger|thumb|index|middle|ring|pinky",
     "head": r"head|neck|eye|jaw",
     "arms": r"clavicle|collar|shoulder|humerus|arm|radius|elbow|hand|wrist|finger|thumb",
     "legs": r"hip|thigh|femur|upleg|leg|knee|shin|tibia|foot|toe|ankle",
     "spine": r"spine|back|chest|thorax|abdomen",
+    "all": "",
 }
 
 
