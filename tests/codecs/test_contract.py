@@ -423,7 +423,7 @@ def test_a_finer_setting_costs_more_and_errs_less(name: str) -> None:
             errors.append(np.abs(file.only_clip().read() - meant(case, motion)).mean())
         sizes.append(
             bytes_of(coded)
-        )  # the quality record's figures have as many digits as they have
+        )  # without the quality record
     assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
     assert errors[-1] < errors[0] / 4
 
