@@ -421,9 +421,7 @@ def test_a_finer_setting_costs_more_and_errs_less(name: str) -> None:
         coded = saved(motion, case, **{dial.parameter: setting})
         with mcz.open(coded) as file:
             errors.append(np.abs(file.only_clip().read() - meant(case, motion)).mean())
-        sizes.append(
-            bytes_of(coded)
-        )  # without the quality record
+        sizes.append(bytes_of(coded))  # without the quality record
     assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
     assert errors[-1] < errors[0] / 4
 
