@@ -129,7 +129,9 @@ class PlaceErrors:
         rate = self._original.frame_rate or self._decoded.frame_rate
         if unit is None or rate is None:
             return None, None
-        factor = unit * float(rate * self._original.signals[0].samples_per_frame) ** order
+        factor = unit
+        for _ in range(order):  # beyond binary64 it is infinite, and there is no figure
+            factor *= float(rate * self._original.signals[0].samples_per_frame)
         return times(errors.mean, factor), times(errors.greatest, factor)
 
     def sliding(self) -> Sliding | None:
