@@ -17,7 +17,12 @@ SHOWN_ELSEWHERE = (
 )
 WIDEST = 80  # characters that are shown of a key or value: records in files may say anything
 UNCUT = "uncut_"  # in front of the figures of a clip before it was cut
-SPEEDS = {"s": "cm/s", "s2": "cm/s2"}
+UNITS = {  # by how an id ends
+    **dict.fromkeys(("mse", "mse_raw"), "channels, squared"),
+    **dict.fromkeys((".max_error", ".mean_error"), "channels"),
+    "_cm_s": "cm/s",
+    "_cm_s2": "cm/s2",
+}
 DISTANCES = ("rms_coordinate_error", "mean_position_error", "max_position_error")
 
 
@@ -97,10 +102,7 @@ def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
         elif metric in DISTANCES:
             yield [key, _number(value), "units", _number(held.get(f"{key}_cm", "")), note]
         else:
-            name = metric.rpartition(".")[2]
-            unit = "channels, squared" if name.startswith("mse") else ""
-            unit = SPEEDS.get(key.rpartition("_cm_")[2], unit) if "_cm_s" in key else unit
-            unit = "channels" if name in ("max_error", "mean_error") else unit
+            unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
             yield [key, _number(value), unit, "", note]
 
 

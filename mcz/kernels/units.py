@@ -20,7 +20,6 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.lossless.best_kernels",
     ),
     "numbers": (
-        "mcz.coding.forms.count_kernels",
         "mcz.coding.forms.product_kernels",
         "mcz.formats.text_kernels",
         "mcz.numbers.kernels",

@@ -1,4 +1,4 @@
-"""How far velocities and accelerations of points are off, from what places are off."""
+"""Errors of velocities and accelerations of points, from those of their places."""
 
 from __future__ import annotations
 

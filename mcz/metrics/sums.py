@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.angles import without_turns
-from mcz.motion import Signal, Skeleton
+from mcz.motion import Channel, Signal, Skeleton
 from mcz.whole_turns import without_whole_turns
 
 Values = NDArray[np.float64]
@@ -30,10 +30,21 @@ def times(value: Number, factor: Number) -> Number:
 
 def channel_errors(skeleton: Skeleton, signal: Signal, left: Values, right: Values) -> Values:
     """Absolute differences of the channels of ``signal``, less whole turns."""
-    difference = without_turns(left - right, skeleton, signal.channels)
-    if signal.channels is None:
-        difference = -without_whole_turns(left, right, -difference, skeleton)
-    return np.abs(difference)
+    return np.abs(_less_turns(left - right, left, right, skeleton, signal.channels))
+
+
+def _less_turns(
+    difference: Values,
+    left: Values,
+    right: Values,
+    skeleton: Skeleton,
+    channels: tuple[Channel, ...] | None,
+) -> Values:
+    """``difference`` of two sides without whole turns; ``channels``: a signal's own, or None."""
+    found = without_turns(difference, skeleton, channels)
+    if channels is None:
+        found = -without_whole_turns(left, right, -found, skeleton)
+    return found
 
 
 class ChannelErrors:
@@ -48,9 +59,7 @@ class ChannelErrors:
     def add(self, left: Values, right: Values) -> None:
         valid = np.isfinite(left) & np.isfinite(right)
         raw = np.where(valid, left - right, 0.0)
-        difference = without_turns(raw, self._skeleton, self._channels)
-        if self._channels is None:
-            difference = -without_whole_turns(left, right, -difference, self._skeleton)
+        difference = _less_turns(raw, left, right, self._skeleton, self._channels)
         self._n += int(valid.sum())
         self.mismatched += int((np.isfinite(left) ^ np.isfinite(right)).sum())
         self._squares += float(np.sum(difference**2))

@@ -13,6 +13,7 @@ from mcz.errors import OptionError
 from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Skeleton
 from mcz.units import unit_ratio
 
+MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
 _BOUND = re.compile(r"([0-9.]+(?:[eE][-+]?[0-9]+)?) ?([^\s0-9.,].*)?")
 LENGTHS = (*POSITION_KINDS, "length")
 

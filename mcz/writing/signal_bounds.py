@@ -23,12 +23,11 @@ from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.types import JsonObject, Params
-from mcz.writing.channel_limits import limits_of
+from mcz.writing.channel_limits import MAX_ERROR, MEAN_ERROR, limits_of
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
 EXACT_ROLES = {"times": "they order the frames", "residuals": "they say which points are valid"}
 FLOATS = (GridKind.BINARY32, GridKind.VAX_F)
 MOST_MULTIPLES = 2**19  # of a step in a number; beyond, fast may find no unit

@@ -28,6 +28,7 @@ from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.sizes import clip_sizes
 from mcz.types import JsonObject, Params
+from mcz.writing.channel_limits import MEAN_ERROR
 from mcz.writing.clip_writer import file_in_memory
 from mcz.writing.planning import Prepared
 
@@ -36,7 +37,6 @@ Floats = NDArray[np.float64]
 BLOCK_FRAMES = 4096  # whose positions are in memory at a time
 
 REFINEMENT = "refinement"
-MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
 MOST_OCTAVES = 7
 MOST_ROUNDS = 10  # with one step
 MOST_STEPS = 6

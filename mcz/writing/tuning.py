@@ -22,13 +22,11 @@ from mcz.hints import Hint
 from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.types import JsonObject, Params, Progress
-from mcz.writing.channel_limits import limits_of, parse_bound
+from mcz.writing.channel_limits import MAX_ERROR, MEAN_ERROR, limits_of, parse_bound
 from mcz.writing.clip_writer import Amend, write_plan
 from mcz.writing.planning import Prepared, asked, check_bones, plan_clip
 from mcz.writing.signal_bounds import of_codec, with_bounds
 from mcz.writing.trials import (
-    MAX_ERROR,
-    MEAN_ERROR,
     QUALITY,
     REFINEMENT,
     Limits,

@@ -1,4 +1,4 @@
-"""What a converter counted, printed as decimals: forms with a unit on GENERAL grids."""
+"""Counts of a converter, printed as decimals: forms with a unit on GENERAL grids."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
     fields = _fields(skeleton, own, step_cm)
     fields |= _plain_steps(skeleton, np.ones(skeleton.n_channels), step_cm)
     fields |= {"levels": 0, "borrowing": 0}
-    fields["start"] = 1 + START_TABLES * number_of(skeleton)
+    fields["start"] |= 1
     if bound_cm is not None:
         fields["flags"] |= REFINING
     return Choice(build_header(**fields), weights_of(step_cm))

@@ -18,7 +18,6 @@ from mcz.codecs.posewave.decision_kernels import (
 )
 from mcz.codecs.posewave.prediction_kernels import (
     MEMORY,
-    begin_prediction,
     learn_in_time,
     predict_in_time,
     spread,
@@ -72,12 +71,6 @@ UNIT = 4096.0  # a mean is a multiple of 1 / UNIT
 MOST_MEAN = float(1 << 31)
 NO_CHOICE = -1.0  # as ``lam``: the integers are given
 FAULTY = -1.0
-
-
-@kernel
-def begin_level(model: Model) -> None:
-    """Make the model ready for the rows of a level."""
-    begin_prediction(model)
 
 
 @kernel

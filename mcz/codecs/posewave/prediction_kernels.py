@@ -23,20 +23,7 @@ from mcz.kernels.types import Floats, Floats2
 
 MEMORY = 0.996  # what a live row leaves of what earlier ones have taught
 NOISE = 0.1  # variance that each live row adds to that of a channel
-CARRIED = 40.0  # rows at most that the coarser levels count for
 TAP_MEMORY, TAP_RATE, MOST_TAP = 0.98, 0.012, 2.0
-
-
-def begin_prediction(model: Model) -> None:
-    """Let a level start from what the coarser one has taught."""
-    seen = model.seen
-    if seen[0] > CARRIED:
-        share = CARRIED / seen[0]
-        for block in range(len(model.columns)):
-            line = model.variances[block]
-            for c in range(BLOCK):
-                line[c] *= share
-        seen[0] = CARRIED
 
 
 def predict_in_time(model: Model, here: Floats2, parent: Floats2, level: int, row: int) -> None:

@@ -35,7 +35,7 @@ class Prior(NamedTuple):
     variances: Floats
 
     def of(self, kept: Ints) -> Prior:
-        """That of some channels, ascending."""
+        """Restrict it to some channels, ascending."""
         return Prior(self.lower[np.ix_(kept, kept)], self.variances[kept])
 
 

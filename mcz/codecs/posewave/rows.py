@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_WANTED = 2.0**29
+CARRIED = 40.0  # rows at most that the coarser levels count for
 
 
 @cache
@@ -121,7 +122,10 @@ class RowCoder:
         self.kind, self.stream = kind, stream
         self.here = new_rows(n_rows, self.n_kept)
         self._make_room(0, n_rows)
-        _model().begin_level(self.model)
+        seen = self.model.seen
+        if seen[0] > CARRIED:
+            self.model.variances[:] *= CARRIED / seen[0]
+            seen[0] = CARRIED
 
     def go_on(self, n_rows: int, stream: Stream) -> None:
         """More rows of the same level, in another stream."""

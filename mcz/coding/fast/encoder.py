@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.coding.forms.count_test import may_be_counts
 from mcz.coding.forms.ids import BINARY32, form_of_grid, has_binary32, unit_grid
 from mcz.coding.forms.products import tiny_limit
 from mcz.coding.forms.units import find_units
 from mcz.numbers import Grid, GridKind
-from mcz.numbers.tokens import TENS
 
 if TYPE_CHECKING:
     from mcz.coding.fast.survey_kernels import Channels, CodedLanes
@@ -83,9 +83,12 @@ class StreamBuilder:
         self.grids = tuple(signal_grids[number] for number in self.numbers.tolist())
         self.forms = _forms(self.grids)
         pairs = list(zip(self.grids, self.clip_grids, strict=True))
-        limits = {pair: (_unit_limit(*pair), _digits(*pair)) for pair in dict.fromkeys(pairs)}
-        both = np.array([limits[pair] for pair in pairs], np.int64).reshape(-1, 2)
-        self.unit_limits, self.digits = np.ascontiguousarray(both.T)
+        limits = {pair: _unit_limit(*pair) for pair in dict.fromkeys(pairs)}
+        self.unit_limits = np.array([limits[pair] for pair in pairs], np.int64)
+        self.may_be_counts = np.array(
+            [grid == clip_grid and grid.kind == GridKind.GENERAL for grid, clip_grid in pairs],
+            np.bool_,
+        )
 
     def build(self, ordinals: Ints, grids: tuple[Grid, ...]) -> tuple[bytes, ...]:
         """The streams of a segment, ``ordinals`` (rows, channels); ``grids``: those in force."""
@@ -161,12 +164,10 @@ class StreamBuilder:
         head, _, survey, _, _, _ = kernels()
         is_coded = channels.plans[:, head.KIND] == head.CODED
         is_small = channels.plans[:, survey.MOST] < self.unit_limits
-        others = (is_coded & ~is_small & (self.digits > 0)).astype(np.int64)
-        if others.any():
-            from mcz.coding.forms.count_kernels import clear_hopeless  # on first use
-
-            clear_hopeless(channels.ordinals, self.numbers, self.digits, TENS, others)
-        found: Bools = (is_coded & is_small) | (others > 0)
+        found: Bools = is_coded & is_small
+        others = np.flatnonzero(is_coded & ~is_small & self.may_be_counts)
+        grids = [self.grids[n] for n in others.tolist()]
+        found[others] = may_be_counts(channels.ordinals, self.numbers[others], grids)
         return found
 
     def _find_leads(self, channels: Channels) -> CodedLanes:
@@ -197,8 +198,3 @@ def _unit_limit(grid: Grid, clip_grid: Grid) -> int:
     if has_binary32(grid):
         return ANY if unit_grid(clip_grid) == BINARY32 else 0
     return tiny_limit(grid) if grid == clip_grid else 0
-
-
-def _digits(grid: Grid, clip_grid: Grid) -> int:
-    """The digits of a grid on which counts may be found by a test of their own, else 0."""
-    return grid.digits if grid == clip_grid and grid.kind == GridKind.GENERAL else 0
