@@ -71,14 +71,18 @@ class Grid:
 
     @property
     def limit(self) -> int:
-        """The largest magnitude index; ordinals run from -1 - limit (or -limit) to limit."""
+        """The largest magnitude index, and the largest ordinal."""
         return rules.limit(self.kind, self.digits, self.style)
+
+    @property
+    def lowest(self) -> int:
+        """The least ordinal: one below ``-limit`` where zero has a sign."""
+        return -1 - self.limit if self.signed_magnitude else -self.limit
 
     def magnitudes(self, ordinals: Values) -> Ints:
         """Magnitude indices; FormatError for an ordinal that is no number's."""
         whole: Ints = np.ascontiguousarray(ordinals, np.int64)
-        limit = self.limit
-        low = -1 - limit if self.signed_magnitude else -limit
+        low, limit = self.lowest, self.limit
         if whole.size and not (low <= whole.min() and whole.max() <= limit):  # GRID-05
             wrong = whole.max() if whole.max() > limit else whole.min()
             raise FormatError(f"{wrong} is not an ordinal of {self}: {low} to {limit}")

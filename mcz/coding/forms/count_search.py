@@ -64,7 +64,7 @@ def find_counts(
     """
     if multiples is not None and not _lie_apart(multiples[1]):
         return None
-    if ordinals.max() > grid.limit or ordinals.min() < -1 - grid.limit:
+    if ordinals.max() > grid.limit or ordinals.min() < grid.lowest:
         return None
     different = np.unique(ordinals)
     numbers = np.ravel(values_of(different[:, None], (grid,)))

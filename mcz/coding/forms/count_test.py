@@ -33,6 +33,7 @@ def may_be_counts(ordinals: Ints, columns: Ints, grids: Sequence[Grid]) -> Bools
     """
     hopeful, left = np.ones(len(columns), np.bool_), np.full(len(columns), ENOUGH)
     digits = np.array([grid.digits for grid in grids])
+    lows, limits = np.array([(grid.lowest, grid.limit) for grid in grids]).reshape(-1, 2).T
     size = min(SEEN, len(ordinals))
     for window in range(WINDOWS):
         some = np.flatnonzero(hopeful & (left > 0))
@@ -40,6 +41,9 @@ def may_be_counts(ordinals: Ints, columns: Ints, grids: Sequence[Grid]) -> Bools
             break
         start = window * (len(ordinals) - size) // (WINDOWS - 1)
         block = np.ascontiguousarray(ordinals[start : start + size, columns[some]])
+        are_numbers = (block.max(axis=0) <= limits[some]) & (block.min(axis=0) >= lows[some])
+        hopeful[some] = are_numbers
+        some, block = some[are_numbers], np.ascontiguousarray(block[:, are_numbers])
         values = np.sort(values_of(block, tuple(grids[n] for n in some.tolist())).T)
         tells = 1 + np.count_nonzero(np.diff(values), axis=1) >= FEWEST
         some = some[tells]

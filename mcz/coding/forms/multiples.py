@@ -30,7 +30,7 @@ def of_multiples(multiples: Ints, unit: float, grid: Grid = BINARY32) -> Ints:
 @np.errstate(over="ignore")  # numbers near the greatest
 def find_multiples(ordinals: Ints) -> tuple[float, Ints] | None:
     """A unit and the multiples of it that ``of_multiples`` turns into these ordinals, or None."""
-    if ordinals.max() > BINARY32.limit or ordinals.min() < -1 - BINARY32.limit:
+    if ordinals.max() > BINARY32.limit or ordinals.min() < BINARY32.lowest:
         return None
     values = BINARY32.values(ordinals)
     sizes = np.unique(np.abs(values))
