@@ -45,20 +45,21 @@ def may_be_counts(ordinals: Ints, columns: Ints, grids: Sequence[Grid]) -> Bools
         hopeful[some] = are_numbers
         some, block = some[are_numbers], np.ascontiguousarray(block[:, are_numbers])
         values = np.sort(values_of(block, tuple(grids[n] for n in some.tolist())).T)
-        tells = 1 + np.count_nonzero(np.diff(values), axis=1) >= FEWEST
+        with np.errstate(over="ignore"):  # a gap beyond binary64 tells nothing
+            gaps = np.diff(values)
+        tells = 1 + np.count_nonzero(gaps, axis=1) >= FEWEST
         some = some[tells]
-        hopeful[some] = _have_unit(values[tells], digits[some])
+        greatest = np.abs(values[tells][:, [0, -1]]).max(axis=1)
+        hopeful[some] = _have_unit(gaps[tells], greatest, digits[some])
         left[some] -= 1
     return hopeful
 
 
-def _have_unit(values: Floats, digits: Ints) -> Bools:
+def _have_unit(gaps: Floats, greatest: Floats, digits: Ints) -> Bools:
     """Most gaps between sorted values are whole numbers of the least one, or of a part of it."""
-    greatest = np.abs(values[:, [0, -1]]).max(axis=1)
     places = 10.0 ** (np.floor(np.log10(greatest)) - digits + 1)  # values of last digits
     slack = (places + BINARY32 * greatest)[:, None]
-    gaps = np.diff(values)
-    gaps[gaps <= WIDE * slack] = np.inf
+    gaps = np.where(gaps > WIDE * slack, gaps, np.inf)
     least = gaps.min(axis=1, keepdims=True, initial=np.inf)
     least[np.isinf(least)] = 1.0  # no gap is wide
     ratios = gaps / least
