@@ -87,14 +87,14 @@ def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What a model says of a basis before its entries."""
+    """Header of one basis in a model."""
 
     shifts: Ints
     n_points: int
 
 
 def parse_heads(data: bytes, where: str = "model") -> tuple[tuple[Head, ...], int]:
-    """What a model of kind 1 says of its bases, and where their entries begin."""
+    """Parse the headers of a model of kind 1; also return the offset of the entries."""
     n_bases, at = read_varint(data, 0)
     if not 1 <= n_bases <= MAX_BASES:  # BASES-02
         raise FormatError(f"{n_bases} bases, not 1 to {MAX_BASES}", where=where)
@@ -162,7 +162,7 @@ def _known_by_id() -> dict[bytes, Model]:
 
 
 def name_of(id_: bytes) -> str | None:
-    """What a well-known model is called, None for any other."""
+    """Name of a well-known model, None for any other."""
     return next((name for name, model in known_models().items() if id_of(model) == id_), None)
 
 

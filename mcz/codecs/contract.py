@@ -45,7 +45,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """What a decoder knows of a segment before it fetches a stream."""
+    """Frames of a segment, known to a decoder before it fetches a stream."""
 
     first: int
     n_frames: int
@@ -82,7 +82,7 @@ def model_finder(models: Sequence[Model]) -> FindModel:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What encoder and decoder both know of a signal.
+    """Facts of a signal that encoder and decoder share.
 
     ``n_frames`` are the stored ones. ``groups`` lists the channels of each group;
     ``samples_per_frame`` rows make a frame.
@@ -130,7 +130,7 @@ class SignalSource(Protocol):
         ...
 
     def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
-        """Which of these values are valid, None where all are."""
+        """Mask of the valid values, None if all are valid."""
         ...
 
 
@@ -219,7 +219,7 @@ class LiveEncoder(Protocol):
         ...
 
     def change(self, options: Params) -> None:
-        """Let some parameters have new values, of ``Codec.options``, as soon as the stream allows.
+        """Change some parameters, checked by ``Codec.options``, as soon as the stream allows.
 
         Raises OptionError for one that cannot change.
         """
@@ -331,7 +331,7 @@ class Codec:
     preset: int = 0
 
     def has(self, name: str) -> bool:
-        """Whether it has a parameter of that name."""
+        """Return True if the codec has a parameter of that name."""
         return any(parameter.name == name for parameter in self.parameters)
 
     def settings(self, options: Params) -> Settings:

@@ -1,4 +1,4 @@
-"""Some groups of a signal alone, as an encoder reads them that codes them anew."""
+"""A signal source restricted to some channel groups, for re-encoding."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Part:
         return self._held(cast("Read[np.bool_]", self._source.valid), start, stop)
 
     def _held(self, read: Read[Item], start: int, stop: int) -> NDArray[Item]:
-        """What ``read`` gives of these columns, the last frame again and again behind the end."""
+        """Read these columns; past the end, repeat the last frame."""
         end = self._n_read
         found = read(min(start, end), min(stop, end))[:, self._columns]
         missing = stop - max(start, end)

@@ -1,4 +1,4 @@
-"""What the codecs are and what each lets a caller set, as documents of JSON."""
+"""JSON documents about codecs and their parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the 
 
 
 def document(codec: Codec) -> Settings:
-    """What ``mcz codecs --json`` says of a codec; its keys are stable."""
+    """Entry of a codec in ``mcz codecs --json``; its keys are stable."""
     return {
         "name": codec.name,
         "id": codec.id,

@@ -40,7 +40,7 @@ class Parameter:
 
     @property
     def range(self) -> str:
-        """What it may be, in words; "" where its reader does not say."""
+        """Range in words; "" if ``parse`` states none."""
         return str(getattr(self.parse, "range", ""))
 
 
@@ -119,6 +119,6 @@ def decimals_parameter(help_: str) -> Parameter:
 
 
 def chosen_of(presets: Presets, params: Params) -> Settings:
-    """What a preset has a say in, each value that was given in place of the preset's."""
+    """Values of a preset, each replaced by the caller's where given."""
     values = presets[params["preset"]].items()
     return {name: value if params[name] is None else params[name] for name, value in values}

@@ -1,4 +1,4 @@
-"""How an encoder chooses among the four predictors that integers in time have."""
+"""Encoder choice among the four predictors for integers in time."""
 
 from __future__ import annotations
 

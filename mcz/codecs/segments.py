@@ -38,7 +38,7 @@ Code = Callable[[int, int], Streams]  # frames first <= f < stop -> the streams 
 
 @dataclass(frozen=True, slots=True)
 class Lengths:
-    """How long segments are: ``length`` frames at first, half of that where they get too large.
+    """Segment lengths: ``length`` frames at first, halved while segments are too large.
 
     A length is a multiple of ``unit`` and at least ``least``, but for that of the last segment.
     ``fixed``: the size decides nothing.
@@ -76,7 +76,7 @@ def halving(
 
 @dataclass(frozen=True, slots=True)
 class Sizing:
-    """How a codec of ordinals guesses the frames that fill a segment.
+    """Size targets by which a codec of ordinals chooses its segment lengths.
 
     About ``target`` bytes, ``most`` at most; ``value_bytes`` a value, before anything is known;
     ``spare`` bytes are counted beside the streams; ``most_rows``. ``full``: a segment that came out

@@ -1,4 +1,4 @@
-"""How a frame becomes coefficients in space, and back: what the codecs of Hou's family share.
+"""Spatial transform of a frame and its inverse, shared by the codecs of Hou's family.
 
 SPEC.md, "Space", is normative; the names below are its field names.
 """
@@ -74,11 +74,11 @@ class Space:
         return len(self.vectors)
 
     def transform(self) -> Transform:
-        """What compiled loops are given of it."""
+        """The transform as kernels take it."""
         return Transform(self.vectors, self.starts, self.columns, self.step, self.weights)
 
     def analysis(self) -> list[Floats]:
-        """Of each matrix what makes coefficients of its points, (n_rows, n_points).
+        """Matrices that turn points into coefficients, (n_rows, n_points) each.
 
         The inverse of what a decoder does, whose vectors are rounded.
         """

@@ -1,4 +1,4 @@
-"""How an encoder chooses bases, weights and a step; a decoder needs none of it.
+"""Encoder choice of bases, weights and a step.
 
 Source: Hou 2016; mcz/codecs/spatial/README.md describes it.
 """
@@ -72,13 +72,13 @@ def cosines(block: Floats) -> Floats:
 
 
 def changes(block: Floats) -> Floats:
-    """What each frame of a block adds to the one before."""
+    """Differences between consecutive frames of a block."""
     return np.asarray(np.diff(block, axis=0), np.float64)
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What is chosen: the fields of SPACE, and the models that they name."""
+    """Chosen fields of SPACE, and the models that they name."""
 
     fields: SpaceFields
     models: tuple[Model, ...] = ()
@@ -87,7 +87,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Some blocks of frames, (frames, n_channels) each, without gaps, in units of weights."""
+    """Sampled blocks of frames, (frames, n_channels) each, gaps filled, in units of weights."""
 
     blocks: tuple[Floats, ...]
     apart: bool
@@ -104,7 +104,7 @@ class Sample:
 
 
 def sample_of(name: str, source: SignalSource) -> Sample:
-    """What an encoder looks at; raises MotionError for a signal that the codec cannot code."""
+    """Sample a signal; raises MotionError for one that the codec cannot code."""
     layout = source.layout
     skeleton = skeleton_of(name, layout)
     apart = are_positions(skeleton)
@@ -141,7 +141,7 @@ def _block(skeleton: Skeleton, source: SignalSource, start: int, stop: int) -> F
 
 
 def are_positions(skeleton: Skeleton) -> bool:
-    """Whether the channels are x, y and z of one point after the other."""
+    """Return True if the channels are x, y and z of one point after the other."""
     kinds = [channel.kind for channel in skeleton.channels]
     return bool(kinds) and kinds == list(POSITION_KINDS) * (len(kinds) // N_COORDINATES)
 
@@ -294,7 +294,7 @@ def _learned(_digest: bytes, held: _Held, apart: bool) -> Model:
 def _expected_bytes(
     sample: Sample, in_time: InTime, vectors: Sequence[Floats], step: float, models: Sequence[Model]
 ) -> float:
-    """About what the signal takes with these vectors, and the models that come with them."""
+    """Estimated size of the signal with these vectors, including their models."""
     bits = 0.0
     for block in sample.blocks:
         for part, basis in zip(sample.matrices(in_time(block)), vectors, strict=True):

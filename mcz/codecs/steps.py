@@ -11,7 +11,7 @@ MIDDLE_CODE = 128  # the step code of 1
 
 
 def ratio_of(code: int) -> float:
-    """What a step code stands for, about 2^((code - 128) / 4)."""
+    """Step of a step code, about 2^((code - 128) / 4)."""
     return math.ldexp(4 + code % 4, code // 4 - 34)
 
 

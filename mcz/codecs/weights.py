@@ -1,4 +1,4 @@
-"""How an encoder weighs the channels of a skeleton against each other; a decoder needs none of it.
+"""Encoder weights of the channels of a skeleton.
 
 Source: Khan 2016, eq. 2, and its successors here, which ask how far the points move.
 """

@@ -72,7 +72,7 @@ def code(state: Ints, data: Bytes, bit: int, one: int) -> int:
 
 
 def last_bytes(state: Ints) -> int:
-    """How many bytes, with zeros after them, decide the bits that are still in the interval."""
+    """Number of bytes that, followed by zeros, determine the bits still in the interval."""
     for size in range(4):  # RANGE-04
         unit = 1 << (32 - 8 * size)
         if (state[LOW] + unit - 1) // unit * unit <= state[HIGH]:

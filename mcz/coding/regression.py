@@ -76,7 +76,7 @@ def learn(
     keep: float,
     row: int,
 ) -> None:
-    """Let a row join the sums of products, what they held multiplied by ``keep``."""
+    """Add a row to the sums of products, after multiplying them by ``keep``."""
     error, typical = target - guess, own.typical[index]  # BEST-18
     weight = 1.0 / ((typical * typical + SPIKES * (error * error)) + LEAST)
     n, sums, weighted = own.n_features[index], own.sums, own.weighted

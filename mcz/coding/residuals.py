@@ -28,7 +28,7 @@ def bits(value: int) -> int:
 
 
 def quarters(value: int) -> int:
-    """About 4 log2(value), value >= 1, at most 111."""
+    """Approximate 4 log2(value), value >= 1, at most 111."""
     n = bits(value)
     return min(4 * (n - 1) + ((value << 2) >> (n - 1) & 3), 111)  # RESID-01
 

@@ -22,7 +22,7 @@ N_SETS = 3
 
 
 class Transform(NamedTuple):
-    """How coefficients become values, as SPEC.md, "Space", has it: a row each, matrix by matrix.
+    """Transform from coefficients to values (SPEC.md, "Space"): a row each, matrix by matrix.
 
     ``vectors`` (n_rows, n_points), ``starts`` the first row of each matrix and the end, ``columns``
     (n_matrices, n_points) the channel of each point, ``weights`` (n_channels,).
@@ -108,7 +108,7 @@ def add_frame(
 
 
 def coefficient_of(points: Floats, row: Floats) -> float:
-    """What a row of the analysis makes of points."""
+    """Coefficient of points for one row of the analysis."""
     total = 0.0
     for j in range(len(points)):
         total += points[j] * row[j]

@@ -45,7 +45,7 @@ def code(start: Ints, size: int, loop: Loop, what: str) -> bytes:
 
 
 def uncode(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) -> None:
-    """Let ``loop`` read ``stream``; ``whole``: to its end, which its bits must need.
+    """Run ``loop`` on ``stream``; ``whole``: all its bytes must be needed.
 
     Raises FormatError, with ``what`` in front, where it is no code or has other bytes.
     """

@@ -80,7 +80,7 @@ def _interpreted(function: Callable[P, T], fault: str) -> Callable[P, T]:
 
 @cache
 def lacks_compiled_kernels() -> bool:
-    """Whether kernels run as plain Python though none asked for that: some work has another way."""
+    """Return True if kernels run as plain Python unasked: some callers then use numpy instead."""
     return MODE != INTERPRETED and any(_unit(name)[0] is None for name in set(UNIT_OF.values()))
 
 
@@ -118,7 +118,7 @@ def load_unit(folder: Path, name: str) -> tuple[ModuleType | None, str]:
 
 
 def _is_cut(path: Path) -> bool:
-    """Whether an ELF file lacks its end: the loader would stop the process, not raise."""
+    """Return True if an ELF file is truncated: the loader would kill the process, not raise."""
     with path.open("rb") as file:
         head = file.read(64)
     if head[:5] != b"\x7fELF\x02" or len(head) < 64:  # other loaders look at the size

@@ -79,7 +79,7 @@ class Link:
 
     @property
     def is_whole(self) -> bool:
-        """Whether one of its turns can be any turn by itself."""
+        """True if a single turn can be any rotation."""
         return bool(self.quaternion or self.vector)
 
     @property
@@ -96,7 +96,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Some frames, F of them, resolved to joint transforms.
+    """Joint transforms of a block of F frames.
 
     Of each joint ``origins`` has its position, (3, F) or (3, 1) where that is constant; ``axes``
     its local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
@@ -197,7 +197,7 @@ class Chain:
         return pose
 
     def hang(self, pose: Pose, link: Link, columns: Floats) -> tuple[Floats, Floats, Floats]:
-        """Of the joint that follows those in ``pose``: its arm, its origin, its axes unturned."""
+        """Place the next joint after those in ``pose``: its arm, origin and unturned axes."""
         arm = self._arm(link, columns)
         if link.parent < 0:
             return arm, arm, IDENTITY if link.change is None else link.change

@@ -31,7 +31,7 @@ BLOCK = 2**19  # numbers that are worked on at a time
 
 @dataclass(frozen=True, slots=True)
 class ContactRule:
-    """What counts as standing: speeds in cm/s, heights in cm, times in seconds.
+    """Thresholds of a contact: speeds in cm/s, heights in cm, times in seconds.
 
     ``speed`` is that over ``window``; ``height`` is above the percentile ``floor`` of all heights
     of that point. A contact goes on below ``wide_speed`` and ``wide_height``. Interruptions of up
@@ -87,7 +87,7 @@ class Contacts:
                 raise MotionError(f"{run} is not of {self.n_frames} frames of {self.joints}")
 
     def frames(self, joint: str) -> Flags:
-        """Whether ``joint`` stands, frame by frame, bool (n_frames,).
+        """Contact state of ``joint`` in every frame, bool (n_frames,).
 
         Raises MotionError where that joint was not looked at.
         """
@@ -129,7 +129,7 @@ def contacts(
 
 
 class FootTracks:
-    """Where the feet of a motion are in every frame, from blocks of positions of all points.
+    """Foot positions in every frame, collected from blocks of point positions.
 
     ``joints`` as of ``contacts``, whose errors it raises. ``feet`` is float64 (n_feet, n_frames,
     3), ``body`` the mean of all known points, float64 (n_frames, 3), both in length units.

@@ -80,7 +80,7 @@ class _Descent:
         return len(self.targets) * (NOTHING * self.targets.lever) ** 2
 
     def _costs(self, columns: Floats, frames: Ints) -> tuple[Floats, Floats]:
-        """What is to become least, and the share of the targets in it, (F,) each."""
+        """Objective of each frame, and the targets' share of it, (F,) each."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             positions = self.targets.positions(columns, self.targets.chain.pose(columns))
             missed = (positions - self.seen[:, :, frames]) * self.known[:, None, frames]

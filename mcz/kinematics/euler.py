@@ -55,7 +55,7 @@ def _held(angles: Floats, known: Floats) -> Floats:
 
 
 def nearest(angles: Floats) -> Floats:
-    """Of each frame the solution (a, b, c) or (a + pi, pi - b, c + pi) nearest to the one before.
+    """Choose (a, b, c) or (a + pi, pi - b, c + pi) per frame, the one nearer to the frame before.
 
     Which of them is nearer does not depend on which of them the frame before took, as both change
     alike; so changes can be found for all frames at once.

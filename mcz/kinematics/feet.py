@@ -1,4 +1,4 @@
-"""Which joints of a skeleton are feet, by their names."""
+"""Feet of a skeleton, found by joint names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where chosen points are and how chosen joints are turned, over many frames at once.
+"""Point positions and joint rotations over many frames at once.
 
 Compiled where the skeleton only turns and moves, from ``Chain`` otherwise: the same to 1e-9.
 """
@@ -59,7 +59,7 @@ class FramePoses:
         return tails
 
     def positions(self, values: Floats, points: Sequence[int]) -> Floats:
-        """Where the points are, (n_frames, n_points, 3) in length units."""
+        """Positions of the points, (n_frames, n_points, 3) in length units."""
         out = np.empty((len(values), len(points), 3))
         if self._tables is None:
             for rows, columns, pose in self.chain.poses(values):
@@ -74,7 +74,7 @@ class FramePoses:
         return out
 
     def origins(self, values: Floats, joints: Sequence[int]) -> Floats:
-        """Where the joints themselves are, (n_frames, n_chosen, 3) in length units."""
+        """Origins of the joints, (n_frames, n_chosen, 3) in length units."""
         out = np.empty((len(values), len(joints), 3))
         if self._tables is None:
             for rows, _, pose in self.chain.poses(values):
@@ -87,7 +87,7 @@ class FramePoses:
         return out
 
     def world(self, values: Floats, joints: Sequence[int]) -> Floats:
-        """How the joints are turned in the world, W, (n_frames, n_chosen, 3, 3)."""
+        """World rotations W of the joints, (n_frames, n_chosen, 3, 3)."""
         n_joints = len(self.chain.links)
         if self._tables is None:
             out = np.empty((len(values), len(joints), 3, 3))
@@ -106,7 +106,7 @@ class FramePoses:
         return out
 
     def local(self, values: Floats, joints: Sequence[int]) -> Floats:
-        """How the joints are turned from their parents, W_parent^-1 W, (n_frames, n_chosen, 3, 3).
+        """Local rotations of the joints, W_parent^-1 W, (n_frames, n_chosen, 3, 3).
 
         The identity in the rest pose.
         """

@@ -24,7 +24,7 @@ LINE_TO_REST = 1e-2  # the same for what lies on a line
 
 @dataclass(frozen=True, slots=True)
 class Fastened:
-    """What a joint carries: numbers of targets, their weights, positions along its axes (n, 3).
+    """Targets attached to a joint: numbers, weights, positions along its axes (n, 3).
 
     ``origin`` is the target at the joint's own origin, -1 where there is none.
     """
@@ -89,7 +89,7 @@ class Guess:
         return nearest, False
 
     def _steps(self, joint: int, number: int) -> int:
-        """How many joints that turn or move lie between ``joint`` and the target of a number."""
+        """Number of movable joints between ``joint`` and the target of that number."""
         steps, below = 0, self.targets.list[number].joint
         while below != joint:
             link = self.chain.links[below]
@@ -226,7 +226,7 @@ def _hold(link: Link, known: Floats, columns: Floats) -> None:
 
 
 def _hold_column(track: Floats, known: Floats) -> None:
-    """Where not ``known``, a straight line in time between the frames that are."""
+    """Interpolate linearly in time the frames that are not ``known``."""
     rows = np.flatnonzero(known)
     if 0 < len(rows) < len(track):
         track[:] = np.interp(np.arange(len(track)), rows, track[rows])

@@ -173,7 +173,7 @@ class _Solution:
         return max(1, len(self.targets)) * self.targets.lever**2
 
     def _steady(self) -> None:
-        """Where distances remain, as of noise, values stay nearer to those of the frames around.
+        """Smooth the values towards their neighbor frames where distances remain, as with noise.
 
         The remaining distances say how much a position is to be believed, and what people do says
         how far angles stray from their mean over some frames.
@@ -224,7 +224,7 @@ def _seen(targets: Targets, points: Floats, markers: Floats | None) -> tuple[Flo
 
 
 def _means(tracks: Floats, around: int) -> Floats:
-    """Of tracks (n, F) the means over the frames up to ``around`` before and after each."""
+    """Moving averages of tracks (n, F) over ``around`` frames before and after each."""
     n_frames = tracks.shape[1]
     sums = np.concatenate([np.zeros((len(tracks), 1)), np.cumsum(tracks, axis=1)], axis=1)
     frames = np.arange(n_frames)

@@ -19,7 +19,7 @@ SHELL_CM = (
 
 
 class Places(NamedTuple):
-    """Where things are over time, each float64 (n_frames, n, 3) in length units.
+    """Positions over time, each float64 (n_frames, n, 3) in length units.
 
     ``points`` as of ``positions``, ``markers`` as of ``virtual_markers_of``, ``shell`` as of
     ``shell_points_of``; empty (n = 0) where they were not asked for.
@@ -31,7 +31,7 @@ class Places(NamedTuple):
 
 
 def positions(motion: Motion) -> Floats:
-    """Where the points of ``motion`` are, float64 (n_frames, n_points, 3), in length units.
+    """Positions of the points of ``motion``, float64 (n_frames, n_points, 3), in length units.
 
     ``point_names`` says which points these are. A point that depends on an invalid value is NaN.
     Raises MotionError where the skeleton has no kinematics: its angle unit is unknown, or all of
@@ -43,12 +43,12 @@ def positions(motion: Motion) -> Floats:
 
 
 def positions_of(skeleton: Skeleton, values: Floats) -> Floats:
-    """As ``positions``, from values (n_frames, n_channels) in source units."""
+    """Positions of the points for ``values`` (n_frames, n_channels) in source units."""
     return _Positions(skeleton, values, points=True).points
 
 
 def origins_of(skeleton: Skeleton, values: Floats) -> Floats:
-    """Where the joints are, whatever counts as their points, float64 (n_frames, n_joints, 3)."""
+    """Origins of the joints, whatever the point set, float64 (n_frames, n_joints, 3)."""
     origins = np.empty((len(values), skeleton.n_joints, 3))
     for rows, _, pose in chain_of(skeleton).poses(values):
         for joint, origin in enumerate(pose.origins):
@@ -176,19 +176,19 @@ def forget(points: Floats) -> None:
 
 
 def point_position(chain: Chain, joint: int, tail: int, columns: Floats, pose: Pose) -> Floats:
-    """Where a point is, (3, F) or (3, 1); ``tail`` -1 is the joint's origin."""
+    """Position of a point, (3, F) or (3, 1); ``tail`` -1 is the joint's origin."""
     return pose.origins[joint] if tail < 0 else chain.tail(joint, tail, columns, pose)
 
 
 def point_set(skeleton: Skeleton) -> str:
-    """Which points count, by the id of SPEC.md's registry: "acclaim", "bvh" or "markers"."""
+    """Id of the point set in SPEC.md's registry: "acclaim", "bvh" or "markers"."""
     if skeleton.joints and all(map(is_marker, skeleton.joints)):
         return "markers"
     return "bvh" if skeleton.intrinsic else "acclaim"
 
 
 def is_marker(joint: Joint) -> bool:
-    """Whether a joint is a marker: parentless, without tails, with tx, ty and tz alone."""
+    """Return True for a marker: parentless, without tails, with only tx, ty and tz."""
     kinds = sorted(channel.kind for channel in joint.channels)
     return joint.parent < 0 and not joint.tails and kinds == list(POSITION_KINDS)
 
@@ -234,7 +234,7 @@ def first_points(skeleton: Skeleton) -> list[int]:
 
 
 def depths(skeleton: Skeleton) -> Floats:
-    """How deep each joint is, 0 for roots to 1 for the deepest of all joints, (n_joints,).
+    """Relative depth of each joint, 0 for roots to 1 for the deepest, (n_joints,).
 
     All 0 where no joint has a parent. Joints without channels count as well.
     """

@@ -17,7 +17,7 @@ _HEAD = re.compile("head|neck", re.IGNORECASE)
 
 
 def has_no_lengths(skeleton: Skeleton) -> bool:
-    """Whether joints turn, but all lie where their root is, whatever the pose.
+    """Return True if joints turn, but all coincide with their root in any pose.
 
     Arrays of body models are such: how long bones are stands in a model, not in them.
     """
@@ -29,7 +29,7 @@ def has_no_lengths(skeleton: Skeleton) -> bool:
 
 
 def rest_positions(skeleton: Skeleton) -> NDArray[np.float64]:
-    """Where the joints are at rest, float64 (n_joints, 3), in length units.
+    """Positions of the joints at rest, float64 (n_joints, 3), in length units.
 
     Nothing is turned, moved or stretched: rotation and length channels are 0, scales are 1. A
     joint whose position channels replace its offset lies at its offset, too, for 0 would put it

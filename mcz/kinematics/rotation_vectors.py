@@ -27,7 +27,7 @@ def matrices_of_vectors(vectors: Floats) -> Floats:
 
 
 def spins_of_vectors(vectors: Floats) -> Floats:
-    """What a change of each component turns about, after the rotation, (3, 3, F), as columns.
+    """Rotation axes for a change of each component, after the rotation, (3, 3, F), as columns.
 
     The left Jacobian of the exponential map: R(v + dv) = R(spins dv) R(v), to the first order.
     """
@@ -103,7 +103,7 @@ def quaternions_of_matrices(turns: Floats) -> Floats:
 
 
 def vectors_of_quaternions(quaternions: Floats) -> Floats:
-    """Of quaternions (w, x, y, z) of length 1, (4, F): vectors no longer than half a turn."""
+    """Convert unit quaternions (w, x, y, z), (4, F), to vectors of at most half a turn."""
     w, parts = quaternions[0], quaternions[1:]
     sine = _length(parts)
     angle = 2 * np.arctan2(sine, np.abs(w))
@@ -128,7 +128,7 @@ def continuous(vectors: Floats, start: Floats | None = None) -> Floats:
 
 
 def nearest_vector(vector: Floats, wanted: Floats) -> Floats:
-    """Of the vectors (3,) that turn as ``vector`` does, the one nearest to ``wanted``."""
+    """The vector (3,) nearest to ``wanted`` with the rotation of ``vector``."""
     length = float(np.sqrt(vector @ vector))
     if length:
         axis = vector / length

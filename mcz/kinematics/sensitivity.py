@@ -73,7 +73,7 @@ class _Block:
                 self.moments[parent] += self.moments[joint]
 
     def squares(self) -> Iterator[tuple[int, Floats]]:
-        """Of every channel that moves something, the sum over points of the squares, (F,)."""
+        """Sum of squares over points, (F,), for every channel that moves a point."""
         children: list[list[int]] = [[] for _ in self.chain.links]
         for joint, link in enumerate(self.chain.links):
             if link.parent >= 0:

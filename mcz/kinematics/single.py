@@ -1,4 +1,4 @@
-"""Where the points of a skeleton are in one frame, for those who have frames one by one."""
+"""Point positions of a single frame, for live input."""
 
 from __future__ import annotations
 

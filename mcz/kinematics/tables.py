@@ -9,7 +9,7 @@ from mcz.kinematics.single_kernels import Joints, Points
 
 
 def is_elaborate(chain: Chain) -> bool:
-    """Whether a joint has channels that do more than turn and move it, or one of them twice."""
+    """Return True if a joint has other channels than rotations and positions, or a repeated one."""
     return any(
         link.is_whole
         or link.scales
@@ -20,7 +20,7 @@ def is_elaborate(chain: Chain) -> bool:
 
 
 def tables_of(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Joints, Points]:
-    """What the compiled loop knows of a skeleton."""
+    """Skeleton tables for the kernels."""
     links = chain.links
     n_joints = len(links)
     most = max((len(link.turns) for link in links), default=0)

@@ -1,4 +1,4 @@
-"""What inverse kinematics aims at: points and virtual markers, and how channels move them.
+"""Targets of inverse kinematics: points, virtual markers, and their Jacobian.
 
 A target is a position fastened to a joint: a point, or a virtual marker beside the joint's first
 point. Arrays of a block of frames have the frames last.
@@ -65,7 +65,7 @@ class Targets:
         return units
 
     def _below(self) -> list[NDArray[np.int64]]:
-        """Of every joint the targets that are its own or of joints below it."""
+        """Targets of every joint and of the joints below it."""
         below: list[list[int]] = [[] for _ in self.chain.links]
         for number, target in enumerate(self.list):
             joint = target.joint
@@ -83,7 +83,7 @@ class Targets:
         return columns
 
     def positions(self, columns: Floats, pose: Pose) -> Floats:
-        """Where the targets are, (n_targets, 3, F)."""
+        """Positions of the targets, (n_targets, 3, F)."""
         positions = np.empty((len(self.list), 3, columns.shape[1]))
         for number, target in enumerate(self.list):
             positions[number] = point_position(self.chain, target.joint, target.tail, columns, pose)

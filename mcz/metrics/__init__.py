@@ -1,4 +1,4 @@
-"""How far a decoded motion is from the original: channels, points, markers, shell, contacts.
+"""Error metrics of decoded motions: channels, points, markers, shell, contacts.
 
 docs/measures.md, "Metrics", defines every id. Figures are sums of binary64 in no fixed order: they
 agree between machines to about 1e-9, not to the last bit.

@@ -1,4 +1,4 @@
-"""What of two motions can be compared at all, and what they have not in common, as notes."""
+"""Checks of what can be compared between two motions; differences become notes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def same_channels(original: Motion, decoded: Motion, notes: list[str]) -> bool:
 
 
 def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
-    """Whether both have kinematics, with the same number of points."""
+    """Return True if both have kinematics and the same number of points."""
     counts = []
     for motion in (original, decoded):
         signal, skeleton = motion.signals[0], motion.skeleton
@@ -94,7 +94,7 @@ def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
 
 
 def same_axes(a: Skeleton, b: Skeleton, notes: list[str]) -> bool:
-    """Whether both have as many joints that turn, or markers, whose axes are those of the world.
+    """Return True if both have the same number of joints with axes: turning ones or markers.
 
     Or the other has virtual markers as markers.
     """
@@ -112,7 +112,7 @@ def same_axes(a: Skeleton, b: Skeleton, notes: list[str]) -> bool:
 
 
 def has_markers_of(a: Skeleton, b: Skeleton) -> bool:
-    """Whether ``b`` holds the positions of points of ``a``, then of its virtual markers."""
+    """Return True if ``b`` has the points of ``a``, then its virtual markers."""
     if point_set(b) != "markers" or point_set(a) == "markers":
         return False
     return b.n_joints == len(point_names(a)) + 3 * a.n_joints

@@ -1,4 +1,4 @@
-"""How far one motion is from another: the document of JSON that ``mcz diff`` has of a pair."""
+"""JSON document of ``mcz diff`` about a pair of motions."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _in_clip(entries: Params, start: int) -> JsonObject:
 
 
 def _feet(found: Comparison) -> JsonObject | None:
-    """What contacts were looked for with; None where none were."""
+    """Settings of the contact search; None if there was none."""
     if found.sliding is None:
         return None
     contacts = found.sliding.contacts

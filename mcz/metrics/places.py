@@ -1,4 +1,4 @@
-"""Where two motions place their points, markers, shells and feet, and how far these are apart."""
+"""Distances between the points, markers, shells and feet of two motions."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ class PlaceErrors:
         return times(errors.mean, factor), times(errors.greatest, factor)
 
     def sliding(self) -> Sliding | None:
-        """How far the feet slide that stand in the original; None where that is not asked for."""
+        """Sliding of the feet during the original's contacts; None if not requested."""
         if self._feet is None:
             return None
         if self._contacts is None:

@@ -1,4 +1,4 @@
-"""How far feet slide that stood in the original. docs/contacts.md, has the definitions."""
+"""Foot sliding during the original's contacts. docs/contacts.md has the definitions."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Sliding:
 
 @dataclass(frozen=True, slots=True)
 class _Measured:
-    """Of one contact: distances behind its first frame, NaN where unknown, and both paths."""
+    """Distances of a contact after its first frame, NaN where unknown, and both path lengths."""
 
     run: Contact
     apart: Values

@@ -171,7 +171,7 @@ class PointErrors(Distances):
 
 
 class ShellErrors(Distances):
-    """Of every joint the greatest distance of its three points of the shell, in length units."""
+    """Greatest distance of each joint's three shell points, in length units."""
 
     def add_shell(self, start: int, left: Values, right: Values) -> None:
         """Points of shape (n_rows, 3 n, 3), three a joint, from row ``start`` on."""
@@ -183,7 +183,7 @@ class ShellErrors(Distances):
 
 
 def known_points(points: Values) -> Flags:
-    """Which points of (n_rows, n, 3) have three finite coordinates."""
+    """Mask of the points of (n_rows, n, 3) with three finite coordinates."""
     x, y, z = np.isfinite(np.moveaxis(points, 2, 0))  # much faster than along a short axis
     known: Flags = x & y & z
     return known

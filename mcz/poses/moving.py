@@ -1,4 +1,4 @@
-"""What moves: a Motion, or a Clip of which only what is needed is decoded."""
+"""Common access to a Motion or to a Clip, which decodes only the needed joints and frames."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Frames = tuple[int, int] | slice | None
 
 
 class Decoded(Protocol):
-    """What a Clip has that is needed here."""
+    """Interface of a Clip as this package uses it."""
 
     name: str
     n_frames: int
@@ -95,7 +95,7 @@ def values_of(moving: Moving, frames: tuple[int, int], joints: Sequence[int]) ->
 
 
 def scale_to(skeleton: Skeleton, unit: str | None) -> float:
-    """How many of ``unit``, cm, m, mm ..., a length unit is; 1 where None.
+    """Factor from length units to ``unit`` (cm, m, mm ...); 1 if None.
 
     Raises OptionError for another unit, and where the skeleton's is unknown.
     """

@@ -1,4 +1,4 @@
-"""Where things are, and how fast they move."""
+"""Positions, velocities and accelerations of points, and the root."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def positions(
     unit: str | None = None,
     dtype: DTypeLike = np.float64,
 ) -> Reals:
-    """Where the points of a Motion or Clip are in the world, (n_frames, n_points, 3).
+    """World positions of the points of a Motion or Clip, (n_frames, n_points, 3).
 
     ``joints`` by index or name, or points by the names of ``point_names``; None: all points, those
     of ``point_names``. ``frames`` (a, b) or a slice. In length units of the skeleton, or in
@@ -97,7 +97,7 @@ def velocities(
     unit: str | None = None,
     dtype: DTypeLike = np.float64,
 ) -> Reals:
-    """How fast the points move, (n_frames, n_points, 3), in length units (or ``unit``) a second.
+    """Velocities of the points, (n_frames, n_points, 3), in length units (or ``unit``) per second.
 
     Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate where these are
     uniform; one-sided at the ends of the clip, beside unknown positions and beside missing frames,
@@ -117,7 +117,7 @@ def accelerations(
     unit: str | None = None,
     dtype: DTypeLike = np.float64,
 ) -> Reals:
-    """How the velocity of the points changes, in length units (or ``unit``) a second squared.
+    """Accelerations of the points, in length units (or ``unit``) per second squared.
 
     (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or beside a gap that of
     the frame next to it, NaN in a run of fewer than three. Otherwise as ``velocities``.
@@ -156,7 +156,7 @@ def _cut(values: Floats, near: _Near) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Root:
-    """Where the root is and how it is turned, frame by frame.
+    """Position and rotation of the root in every frame.
 
     ``positions`` (n_frames, 3) in length units (or the unit that was asked for), ``rotations``
     (n_frames, 4), quaternions in the world, w first, ``joint`` its name, ``up_axis`` "x" to
@@ -172,7 +172,7 @@ class Root:
 
     @property
     def headings(self) -> Reals:
-        """How far the root is turned about the axis that points up, (n_frames,), in radians.
+        """Rotation of the root about the up axis, (n_frames,), in radians.
 
         0 in the rest pose, continuous over turns: the twist of the rotation. Raises OptionError
         where nobody says what is up.
@@ -196,7 +196,7 @@ def root(
     unit: str | None = None,
     dtype: DTypeLike = np.float64,
 ) -> Root:
-    """Where the root joint itself is and how it is turned in the world: a ``Root``.
+    """World position and rotation of the root joint.
 
     ``joint`` is another than the first. Raises as ``positions``, and MotionError where the skeleton
     has no joint.

@@ -191,7 +191,7 @@ MOST_FRAMES = 2**28
 
 
 def resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
-    """How many frames there are at ``wanted`` a second, from the first to at most the last."""
+    """Number of frames at rate ``wanted``, from the first to at most the last."""
     count = int((n_frames - 1) * wanted / rate) + 1 if n_frames else 0
     if count > MOST_FRAMES:
         raise OptionError(f"{count} frames at {float(wanted):g} a second are over {MOST_FRAMES}")
@@ -199,7 +199,7 @@ def resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
 
 
 def times_at(frames: Iterable[int], step: Fraction) -> Times:
-    """Where new frames lie among the old, each ``step`` old ones after the one before."""
+    """Times of new frames in old frames, ``step`` apart."""
     places = [divmod(frame * step.numerator, step.denominator) for frame in frames]
     before = np.array([whole for whole, _ in places], np.int64)
     return Times(before, np.array([rest / step.denominator for _, rest in places]))

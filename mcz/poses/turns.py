@@ -33,7 +33,7 @@ def rotations(
     degrees: bool = False,
     dtype: DTypeLike = np.float64,
 ) -> Reals:
-    """How the joints of a Motion or Clip are turned, (n_frames, n_joints, ...).
+    """Rotations of the joints of a Motion or Clip, (n_frames, n_joints, ...).
 
     ``form``: "quat" (..., 4), w first, unit length, signs continuous; "matrix" (..., 3, 3);
     "rotvec" (..., 3), axis times angle; "6d" (..., 6), the first column of the matrix, then the

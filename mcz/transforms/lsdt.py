@@ -142,7 +142,7 @@ def procrustes(products: Floats) -> Floats:
 
 
 def settled(objective: Sequence[float]) -> bool:
-    """Whether the last ``PATIENCE`` iterations have gained next to nothing."""
+    """Return True if the last ``PATIENCE`` iterations gained next to nothing."""
     if len(objective) <= PATIENCE:
         return False
     before = objective[-1 - PATIENCE]

@@ -58,7 +58,7 @@ def _has_gap(row: Floats) -> bool:
 
 
 def _choose(window: Floats2, past: Floats2, low: float, high: float, choice: Ints) -> None:
-    """Which filter each channel is to go through; ``past`` is filled where a run begins."""
+    """Choose the filter of each channel; fill ``past`` at the start of a run."""
     for c in range(window.shape[1]):
         here, before = window[SIDE, c], window[SIDE - 1, c]
         if not abs(before) < FAR:
@@ -84,7 +84,7 @@ def _patch(window: Floats2, patched: Floats2) -> None:
 
 
 def _sum(window: Floats2, bank: Floats2, choice: Ints, total: Floats) -> None:
-    """What the filter of each channel adds to the middle of ``window``."""
+    """Compute the correction of each channel's filter to the middle of ``window``."""
     total[:] = 0.0
     middle = window[SIDE]
     for k in range(1, SIDE + 1):  # FILT-02

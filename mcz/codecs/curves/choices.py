@@ -1,4 +1,4 @@
-"""What an encoder of qbc decides before it codes the first segment.
+"""Encoder decisions of qbc before the first segment.
 
 mcz/codecs/curves/README.md describes it.
 """
@@ -39,7 +39,7 @@ BREAKS = ("split", "fewest")
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What an encoder has decided before it codes the first segment."""
+    """Encoder decisions before the first segment."""
 
     limit: float
     delta: int
@@ -71,7 +71,7 @@ class Plan:
 
 
 def position_channels(layout: Layout) -> NDArray[np.bool_]:
-    """Which channels are lengths, and so have the position step."""
+    """Mask of the channels that are lengths and use the position step."""
     if layout.skeleton is None:
         return np.zeros(layout.n_channels, np.bool_)
     kinds = (channel.kind for channel in layout.skeleton.channels)
@@ -79,7 +79,7 @@ def position_channels(layout: Layout) -> NDArray[np.bool_]:
 
 
 def _lever(skeleton: Skeleton | None) -> float:
-    """How far the farthest point moves when a root turns by one angle unit; 1 without rotations."""
+    """Distance that the farthest point moves per angle unit of a root; 1 without rotations."""
     if skeleton is None or not any(c.kind in ANGLE_KINDS for c in skeleton.channels):
         return 1.0
     lever = reach(skeleton) * (math.pi / 180 if skeleton.angle_unit != "rad" else 1.0)
@@ -113,7 +113,7 @@ def plan_of_options(params: Params, layout: Layout) -> Plan:
 
 
 def plan_of_header(fields: Any, options: Params) -> Plan:
-    """What the encoder of a clip had decided, as far as its header and its options say."""
+    """Recover an encoder's plan from a clip's header and recorded options."""
     preset = PRESETS[options["preset"]]
     scaled = fields.decimals == SCALED
     limit = options["d2_lmt"]

@@ -16,7 +16,7 @@ PUBLISHED, LEAST_SQUARES = 0, 1  # how a middle point is found
 
 
 class Rule(NamedTuple):
-    """How curves are fitted.
+    """Rule by which curves are fitted.
 
     ``closed``: ends and middle are rounded before the error is measured, so that the bound holds
     for what is decoded; to multiples of 1 / ``per``, or of ``step`` where that is 0.
@@ -151,7 +151,7 @@ def breaks_of_fewest(
     rule: Rule,
     is_break: Flags,
 ) -> None:
-    """As ``breaks_by_splitting``, but as few breaks as there can be; of these the best fit.
+    """Set ``is_break`` at the fewest frames that keep the bound; of equals, the best fit.
 
     Dynamic programming between two marks: the work grows with the cube of their distance.
     """

@@ -88,7 +88,7 @@ def set_linear(features: Floats, own: Ints, channel: int, steps: Floats2) -> Non
 def set_quadratic(
     features: Floats, own: Ints, channel: int, steps: Floats2, levels: Floats2
 ) -> None:
-    """Those of QUADRATIC: steps, and the steps of products of two levels."""
+    """Set the features of QUADRATIC: steps, and the steps of products of two levels."""
     n = own[0]
     for lag in range(QUADRATIC_LAGS):
         features[lag] = steps[channel, 1 + lag]

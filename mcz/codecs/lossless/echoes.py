@@ -44,7 +44,7 @@ class Echo:
         return b"".join(map(varint, fields)) + bytes((MINUS * self.minus,))
 
     def covers(self, other: Echo) -> bool:
-        """Whether ``other`` has the rows, the lag and the signs of this one."""
+        """Return True if ``other`` has the rows, the lag and the signs of this one."""
         return (self.row, self.n_rows, self.lag, self.minus) == (
             other.row,
             other.n_rows,
@@ -99,7 +99,7 @@ def _check(echo: Echo, n_rows: int, may_echo: Sequence[bool]) -> None:
 
 
 def table_of(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:
-    """Of each number the place that it repeats, counted from 1, less than 0 for other signs.
+    """Place that each number repeats, counted from 1, negative if the sign is flipped.
 
     (n_rows, n_channels); 0 where a number is coded. Without echoes (0, n_channels).
     """
@@ -145,7 +145,7 @@ def find_echoes(numbers: Ints, leads: Words, usable: Ints) -> list[Echo]:
 
 
 def _bits(numbers: Ints) -> NDArray[np.float64]:
-    """Of each channel the bits that a number may take, roughly."""
+    """Rough bits per number of each channel."""
     bends = np.abs(np.diff(numbers.astype(np.float64), n=2, axis=0, prepend=numbers[:2]))
     return np.asarray(np.log2(np.median(bends, axis=0) + 1) + 1)
 
@@ -174,7 +174,7 @@ def _candidates(numbers: Ints, changes: Bools) -> Iterator[tuple[int, int, int, 
 
 
 def _runs(same: Bools) -> Iterator[tuple[int, int]]:
-    """Where runs of True begin and end."""
+    """Start and end of each run of True."""
     edges = np.flatnonzero(np.diff(same.astype(np.int8), prepend=0, append=0))
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 

@@ -1,4 +1,4 @@
-"""What an encoder of ``online`` asks of its quantizer steps, and how it changes.
+"""Step targets of an ``online`` encoder, and their changes.
 
 mcz/codecs/online/README.md describes it; a decoder needs none of it.
 Source: C.-H. Kwak, I. V. Bajic, Online MoCap data coding with bit allocation, rate control, and
@@ -82,7 +82,7 @@ def plan_of(chosen: Params, layout: Layout, step: float) -> Plan:
 
 
 def set_plan(plan: Plan, chosen: Params, layout: Layout, step: float) -> None:
-    """Let other parameters hold from the next group on."""
+    """Apply changed parameters from the next group on."""
     kernels, numbers = _kernels(), plan.numbers
     mode = chosen["rate_control"]
     if mode != "mod":

@@ -101,7 +101,7 @@ class Coder:
         self._whole = self._whole and not n_frames
 
     def distance(self) -> int:
-        """How far the LTR before the frame that is due is away."""
+        """Frames since the last LTR frame, for the next frame."""
         assert self._ltr is not None
         return self.at - self._ltr
 

@@ -56,7 +56,7 @@ LAST_STEP, LTR_STEP, PRESENT, N_MEMORY = range(4)
 
 
 class Past(NamedTuple):
-    """What is remembered from frame to frame.
+    """Memory from frame to frame.
 
     ``values`` and ``reference`` (n_channels,) are the last frame and the last LTR; ``memory``
     (N_MEMORY,), ``lengths`` (n_matrices,), ``tracks`` (n_rows, TRACK_SIZE).
@@ -70,7 +70,7 @@ class Past(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """What an encoder goes by: ``analysis`` (n_rows, n_points) makes coefficients of points.
+    """Encoder settings: ``analysis`` (n_rows, n_points) turns points into coefficients.
 
     ``n_group`` are the frames of the group; ``plan`` and the two tables of rates are those of
     ``rate_kernels``.
@@ -85,7 +85,7 @@ class Choice(NamedTuple):
 
 
 def _ratio(code: int) -> float:
-    """What a step code stands for, about 2^((code - 256) / 8)."""
+    """Step of a step code, about 2^((code - 256) / 8)."""
     return math.ldexp(float(8 + (code & 7)), int((code >> 3) - 35))  # ONLINE-24
 
 

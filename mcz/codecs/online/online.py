@@ -85,7 +85,7 @@ def _header(space: SpaceFields, order: int, chosen: Params) -> OnlineHeader:
 
 
 class _Writer:
-    """Which frames are LTRs, and which of these are intra coded; shared by file and live stream."""
+    """Frame kinds (LTR or STR, intra or not), the same for files and live streams."""
 
     def __init__(self, header: bytes, layout: Layout, chosen: Params) -> None:
         self.chosen, self.layout = dict(chosen), layout
@@ -97,7 +97,7 @@ class _Writer:
         self._waiting: Settings | None = None  # parameters of the next group on
 
     def kind(self) -> int:
-        """What the next frame is."""
+        """Kind of the next frame."""
         if self.left:
             return STR
         period = self.chosen["intra_period"]
@@ -120,7 +120,7 @@ class _Writer:
         return unit
 
     def change(self, options: Params) -> None:
-        """Let parameters hold from the next group on."""
+        """Apply parameters from the next group on."""
         self._waiting = settled({**self.chosen, **(self._waiting or {}), **options})
 
 
@@ -149,7 +149,7 @@ def _segments(source: SignalSource, writer: _Writer) -> Iterator[Segment]:
 def _is_full(
     units: Sequence[Unit], n_frames: int, least: int, n_more: int, writer: _Writer
 ) -> bool:
-    """Whether a segment ends before the next unit of ``n_more`` frames."""
+    """Return True if the segment ends before the next unit of ``n_more`` frames."""
     if n_frames + n_more > writer.layout.most_frames:
         return True
     due = INTRA if writer.chosen["intra_period"] else LTR

@@ -72,7 +72,7 @@ def log_step(rates: Floats, bits: float, variance: float) -> float:
 
 
 def begin_group(plan: Floats, n_frames: int) -> None:
-    """What the group that begins may have: its share, and what the last one left or overdrew."""
+    """Set the budget of a new group: its share, plus or minus the balance of the last one."""
     carry = plan[DUE] - plan[SPENT] if plan[AT] > 0 else 0.0
     carry = min(carry, MOST_CARRY * plan[GROUP_BITS])
     if plan[AT] > 1:
@@ -172,7 +172,7 @@ def settle(plan: Floats, kind: int, used: float, bits: float, variance: float) -
 
 
 def _settle_steady(plan: Floats, kind: int, used: float, bits: float, empty: bool) -> None:
-    """What lies beyond the rate, and what frames cost now.
+    """Update the excess over the rate and the current cost of frames.
 
     Of an ``empty`` frame, in which nothing was coded, it is known only what it costs at most.
 

@@ -1,4 +1,4 @@
-"""How an encoder finds principal components and their integers; a decoder needs none of it.
+"""Encoder search for principal components and their integer form.
 
 Source: Khan 2014, section 4; mcz/codecs/pca/README.md describes it. Nothing here is the same to the
 last bit on every machine; what is decoded is.
@@ -37,7 +37,7 @@ class Grid:
 
 
 def grid_of(code: int) -> Grid:
-    """Where there are no decimals."""
+    """Grid of a scale code that names no decimals."""
     step = ratio_of(code)
     return Grid(step, step / MEAN_STEPS, code)
 

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 class Chain:
-    """What a segment leaves to the next one; after one that is refused only a fresh one decodes."""
+    """State carried from segment to segment; after a refused one only a fresh one decodes."""
 
     def __init__(self, header: Header, skeleton: Skeleton) -> None:
         self.header, self.skeleton = header, skeleton

@@ -1,4 +1,4 @@
-"""What the encoder of ``posewave`` chooses before the first segment.
+"""Encoder choices of ``posewave`` before the first segment.
 
 mcz/codecs/posewave/README.md describes it; a decoder needs none of it.
 """
@@ -144,7 +144,7 @@ def _contacts(
 
 
 def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) -> Choice:
-    """What suits frames that come one by one; ``step`` in cm or, where it is None, by the bound.
+    """Choose settings for live frames; ``step`` in cm, derived from the bound if None.
 
     Raises OptionError where a bound is given that nobody could measure.
     """
@@ -295,7 +295,7 @@ def _greatest_steps(skeleton: Skeleton, fields: Params, limits: Floats, step_cm:
 def best_levels(
     source: SignalSource, skeleton: Skeleton, fields: Params, weights: Weights, step_cm: float
 ) -> int:
-    """How many levels make the beginning of the clip smallest for what they get wrong."""
+    """Number of levels with the best rate-distortion over the start of the clip."""
     layout = source.layout
     n_frames = min(TRIAL_FRAMES, layout.n_frames, layout.most_frames)
     tried = next(levels for step, levels in LEVELS if step_cm < step)
@@ -333,7 +333,7 @@ def _lowest(tried: Sequence[int], score: Callable[[int], float]) -> int:
 
 
 def distortion(header: Header, skeleton: Skeleton, values: Floats, found: Floats) -> float:
-    """How far joints and points on their axes are off on average, by the weights of joints."""
+    """Mean error of joints and points on their axes, weighted by joint."""
     try:
         chain = chain_of(skeleton)
     except MotionError:  # without angles that mean something: by channel

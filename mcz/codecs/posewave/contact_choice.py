@@ -1,4 +1,4 @@
-"""What the encoder of ``posewave`` makes of contacts: points, and the pieces that hold each.
+"""Encoder choice of contact points, and the frames in which each is held.
 
 A decoder needs none of it. SPEC.md, "Held contacts", says what comes of it.
 """
@@ -98,7 +98,7 @@ def _entry(text: str) -> Run:
 
 
 def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
-    """What is ``wanted``, found by the rule where nobody says the frames.
+    """Requested runs, detected by the contact rule where no frames are given.
 
     Raises OptionError for what is beyond the clip, where angles have no known unit, and where no
     joint is a foot.
@@ -139,7 +139,7 @@ def _found(
 def choose_contacts(
     skeleton: Skeleton, runs: Iterable[Run], tolerance: float, frame_rate: float | None
 ) -> Wanted | None:
-    """What keeps the places of ``runs`` to ``tolerance``, in length units; None without runs.
+    """Contact settings that hold ``runs`` to ``tolerance``, in length units; None without runs.
 
     Raises OptionError for a joint that is not there, or for too many.
     """

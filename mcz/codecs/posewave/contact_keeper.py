@@ -1,4 +1,4 @@
-"""What an encoder of ``posewave`` does for contacts: where points are held, and how well.
+"""Contact state of a ``posewave`` encoder: target positions, and their errors.
 
 A decoder needs none of it. SPEC.md, "Held contacts", says what comes of it.
 """
@@ -50,7 +50,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How far the displacement of a piece is ``off``, (n_frames, 3), in length units."""
+    """Displacement error of a piece: ``off``, (n_frames, 3), in length units."""
 
     piece: Piece
     off: Floats
@@ -63,7 +63,7 @@ class Outcome:
 
 @dataclass(slots=True)
 class Keeper:
-    """What an encoder knows of contacts: the pieces of a clip, and where they are held.
+    """Contacts of a clip as an encoder tracks them: pieces, and their target positions.
 
     ``shifts`` are how far the place that is held is off the source's, by stance, with the frame in
     which that was found.
@@ -142,7 +142,7 @@ class Keeper:
     def _choose_shifts(
         self, corrections: Corrections, pieces: Sequence[Piece], targets: Floats
     ) -> None:
-        """Of each stance that is new: the mean of how far decoded points are off."""
+        """Set the shift of each new stance to the mean error of its decoded points."""
         for stance in sorted({piece.stance for piece in pieces} - set(self.shifts)):
             own = [piece for piece in pieces if piece.stance == stance]
             first = min(piece.first for piece in own)
@@ -193,7 +193,7 @@ class Keeper:
     def _outcomes(
         self, corrections: Corrections, pieces: Sequence[Piece], targets: Floats
     ) -> list[Outcome]:
-        """What of each piece is off the place in which its contact was first."""
+        """Error of each piece against the position in which its contact began."""
         places = corrections.placed(corrections.values)
         found = []
         for piece in pieces:

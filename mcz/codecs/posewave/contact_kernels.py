@@ -38,7 +38,7 @@ def place(plan: Plan, held: Held, lanes: Lanes, values: Floats2, found: Floats3)
 def aim(
     places: Floats2, contacts: Track, step: float, ramp: int, shifts: Floats2, active: Ints
 ) -> None:
-    """How far a point, at ``places`` (n_frames, 3), is to be from there, and when.
+    """Set the target shift of a point, at ``places`` (n_frames, 3), and when it applies.
 
     ``shifts`` (n_frames, 3) and ``active`` (n_frames,) are filled.
     """
@@ -137,7 +137,7 @@ def correct(
 
 
 def _note_active(active: Ints2, n: int, least: int, which: Ints) -> int:
-    """Which points are that active in a frame, and how many."""
+    """List the points at least that active in a frame; return their number."""
     found = 0
     for k in range(len(active)):
         if active[k, n] >= least:
@@ -147,7 +147,7 @@ def _note_active(active: Ints2, n: int, least: int, which: Ints) -> int:
 
 
 def _place_point(plan: Plan, held: Held, k: int, row: Floats, lanes: Lanes, point: Floats) -> None:
-    """Where point ``k`` is: from its root on as the joints are placed, and where the root is."""
+    """Compute the position of point ``k``, from its root on, and that of the root."""
     joint, root = held.joints[k], held.roots[k]
     own, origin = lanes.axes[joint + 1], lanes.origins[joint + 1]
     x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]
@@ -164,7 +164,7 @@ def _place_point(plan: Plan, held: Held, k: int, row: Floats, lanes: Lanes, poin
 def _note_pulls(
     plan: Plan, held: Held, k: int, lanes: Lanes, factor: Floats, pulls: Floats2
 ) -> None:
-    """How the channels move point ``k``, in the metric: three rows of J R^-1."""
+    """Write the Jacobian of point ``k`` in the metric: three rows of J R^-1."""
     joint = held.joints[k]
     own, origin, motions = lanes.axes[joint + 1], lanes.origins[joint + 1], lanes.motions
     x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]

@@ -1,4 +1,4 @@
-"""What contacts of a segment rest on: the points that are held, and the channels that move them.
+"""Contact plan of a segment: the held points, and the channels that move them.
 
 SPEC.md, "Held contacts", is normative.
 """

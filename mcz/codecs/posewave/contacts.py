@@ -106,12 +106,12 @@ class Coder:
         return int(_coding().code_point(self.state, self.stream.data, *args))
 
     def close(self) -> None:
-        """Let the stream go on, or end."""
+        """Code whether the stream goes on or ends."""
         self.stream.coder[: _mixing().SQUASH] = self.state[: _mixing().SQUASH]
 
 
 class Corrections:
-    """Where points are and where contacts have them.
+    """Decoded point positions, and their corrections by contacts.
 
     By point and frame: ``places`` (..., 3), in length units, ``stands``, ``starts`` (..., 3) and
     ``moves`` (..., 3), as ``displacement_kernels`` has them, ``shifts`` (..., 3) and ``active`` as
@@ -129,7 +129,7 @@ class Corrections:
         self.active = np.zeros_like(self.stands)
 
     def placed(self, values: Floats) -> Floats:
-        """Where the points are in frames ``values``, (n_points, n_frames, 3)."""
+        """Positions of the points in frames ``values``, (n_points, n_frames, 3)."""
         found = np.empty((len(self.contacts.joints), len(values), 3))
         _kernels().place(self.plan, self.held, self.lanes, values, found)
         return found
@@ -139,7 +139,7 @@ class Corrections:
         return found
 
     def code(self, coder: Coder, point: int, wanted: Floats, radii: Floats) -> int:
-        """As ``Coder.point``."""
+        """Code one point, as ``Coder.point`` does."""
         contacts, places = self.contacts, self.places[point]
         step, followed = contacts.steps[point], contacts.follows[point] - 1
         leader = _coding().Leader(np.zeros(len(places), np.int64), self.shifts[0])
@@ -159,7 +159,7 @@ class Corrections:
 
 
 def room_of_contacts(contacts: Contacts | None, n_frames: int) -> int:
-    """As many bytes as the contacts of a segment may take."""
+    """Buffer size in bytes for the contacts of a segment."""
     return ROOM * (n_frames + 1) * len(contacts.joints) + 64 if contacts else 0
 
 

@@ -23,7 +23,7 @@ PRIOR, PRIOR_SHARE = 0.25, 0.5  # (PRIOR * greatest step)^2 times 4, and the sha
 
 
 class Course(NamedTuple):
-    """How the approximations have gone so far: a row goes on as the last two did, more or less.
+    """Linear extrapolation state of the approximation rows.
 
     ``pose`` (1, n_channels) is the last one, ``kept`` (n_kept,) are its columns that change. By
     kept channel: ``expected`` is the next row, ``moved`` the last difference of rows, ``above`` and

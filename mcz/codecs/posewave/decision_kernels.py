@@ -58,7 +58,7 @@ def opinion(model: Model, slot: int, one: Ints, other: Ints, second: Ints) -> tu
 def learn(
     model: Model, slot: int, one: Ints, other: Ints, second: Ints, bit: int, chance: int, x: int
 ) -> None:
-    """Let all learn from a coded bit that ``opinion`` was asked about."""
+    """Update all models with a coded bit, after ``opinion``."""
     slots, at, inputs, rates = model.slots, model.at, model.inputs, model.rates
     error = (bit << 16) - chance
     inputs[N_OPINIONS] = BIAS
@@ -136,7 +136,7 @@ def code_rest(coder: Ints, data: Bytes, size: int, bucket: int, level: int) -> i
 
 
 def cost_of(model: Model, error: int, where: Contexts) -> int:
-    """About what ``code_error`` would take, in units of ``COST_UNIT``; nothing is changed."""
+    """Estimate the cost of ``code_error``, in units of ``COST_UNIT``, without side effects."""
     one, other = model.weights[where[ONE]], model.weights[where[OTHER]]
     second, costs = model.second[where[SECOND]], model.costs
     _, chance, _ = opinion(model, 0, one[0], other[0], second[0])

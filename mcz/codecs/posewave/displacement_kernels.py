@@ -35,7 +35,7 @@ FARTHEST = 4096.0  # steps of a frame's movement
 
 
 class Learner(NamedTuple):
-    """What was learned of how points move, axis by axis.
+    """Adaptive statistics of point displacements, per axis.
 
     ``squares`` (3, 9, 9) and ``products`` (3, 9) of features; ``weights`` (3, 9); ``usual`` (7,),
     what they begin with; ``sizes`` (3, 2) of residuals, fast and slow; ``features`` (3, 9) and
@@ -220,7 +220,7 @@ def _note_features(
 
 
 def _note_leader(learner: Learner, leader: Leader, at: int, step: float) -> None:
-    """How the shift of a point changes that this one hangs from, and what it was."""
+    """Note the change of the shift of this point's leader, and its last value."""
     stands, shifts = leader.stands, leader.shifts
     features = learner.features
     for axis in range(3):

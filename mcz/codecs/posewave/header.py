@@ -1,4 +1,4 @@
-"""What the header of a ``posewave`` signal says: steps, the metric, the levels.
+"""Header of a ``posewave`` signal: steps, the metric, the levels.
 
 SPEC.md, "Codec 3: posewave", is normative; the names below are its field names.
 """
@@ -152,13 +152,13 @@ class Header:
 
     @property
     def may_go_on(self) -> bool:
-        """Whether a segment may go on where the one before it ended."""
+        """True if a segment may continue the state of the one before it."""
         rest = self.orders or self.exact_groups or self.contacts
         return self.levels == 0 and not rest  # PWAVE-28
 
 
 def has_whole_turns(skeleton: Skeleton) -> bool:
-    """Whether a joint turns by a quaternion or a rotation vector."""
+    """Return True if a joint turns by a quaternion or a rotation vector."""
     return any(
         first_columns(joint.channels, kinds)
         for joint in skeleton.joints
@@ -266,7 +266,7 @@ def _spread(octaves: int) -> float:
 
 
 def _exact(groups: Sequence[int], layout: Layout) -> NDArray[np.bool_]:
-    """Of each channel whether it is exact."""
+    """Mask of the exact channels."""
     found, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
     for before, group in pairwise([-1, *groups]):
         if group <= before:  # PWAVE-32

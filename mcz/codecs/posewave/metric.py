@@ -37,7 +37,7 @@ def apply_kernels() -> ModuleType:
 
 
 class Metric:
-    """That of the kept channels of a segment, whose other channels stand still.
+    """Metric of the kept channels of a segment; its other channels are constant.
 
     ``still`` (n_channels,) has their values.
     """
@@ -67,7 +67,7 @@ class Metric:
         return found
 
     def factors(self, poses: Floats) -> Floats:
-        """Those of ``poses``, (n_poses, n_kept): (n_poses, n_entries)."""
+        """Factors of ``poses``, (n_poses, n_kept): (n_poses, n_entries)."""
         values = np.repeat(self.still[None], len(poses), axis=0)
         values[:, self.kept] = poses
         found: Floats = kernels().factor(self.plan, values)

@@ -122,7 +122,7 @@ def new_rows(n_rows: int, n_channels: int) -> Floats:
 
 
 def no_rows(n_channels: int) -> Floats:
-    """What stands for the rows of a coarser level where there is none."""
+    """Placeholder for the rows of a coarser level where there is none."""
     return np.zeros((1, 2 * wide_of(n_channels)))
 
 
@@ -190,7 +190,7 @@ def start_coder(start: Start) -> Ints:
 
 @cache
 def trust_table() -> Ints:
-    """How much of what a context says counts that was used n times, in 65536ths."""
+    """Weight of a context that was used n times, in 65536ths."""
     n = np.arange(256, dtype=np.int64)
     return 65536 * (10 * n + 4) // (10 * n + 16)
 

@@ -339,7 +339,7 @@ def code_row(
 
 
 def learn_from_row(model: Model, here: Floats2, level: int, row: int) -> None:
-    """Let all predictions learn from a coded row; one with large values counts for less."""
+    """Update all predictors from a coded row; a row of large values counts for less."""
     n, blocks, width = len(model.classes), len(model.columns), len(model.timely)
     values = here[row + 3, width:]
     learn_sizes(model, level, here[row + 3, :width])

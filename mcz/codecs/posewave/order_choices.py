@@ -1,4 +1,4 @@
-"""Which joints an encoder of ``posewave`` codes in another order of axes; a decoder needs none."""
+"""Encoder choice of the joints whose axes ``posewave`` reorders."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def _rotate(m: Floats, j: int, k: int, sine: float, cosine: float) -> None:
 
 
 def whole_turns(step: float, full: float) -> float:
-    """As ``mcz.angles.turns``."""
+    """Whole turns in ``step``, as ``mcz.angles.turns``."""
     ratio = step / full
     count: float = -np.floor(0.5 - abs(ratio))
     return count if ratio >= 0.0 else -count
@@ -68,7 +68,7 @@ def other(value: float, p: int, half: float) -> float:
 
 
 def is_nearer(row: Floats, before: Floats, sequence: Ints, full: float) -> bool:
-    """Whether the second solution of ``row`` is nearer to the first of the row ``before``."""
+    """Return True if the second solution of ``row`` is nearer to the row ``before``."""
     one = two = 0.0
     for p in range(3):
         axis = sequence[p]

@@ -55,7 +55,7 @@ def kernels() -> ModuleType:
 
 
 def own_sequence(joint: Joint, skeleton: Skeleton) -> Sequenced | None:
-    """That of a joint that can have an order; None of another.
+    """Axis sequence of a joint that can be reordered, None otherwise.
 
     It has three rotation channels about three axes, no other, and angles of a known unit.
     """
@@ -105,7 +105,7 @@ class Orders:
         return found
 
     def notes_and_values(self, source: Floats, coded: Floats) -> tuple[bytes, Floats]:
-        """What a decoder is told beside ``coded`` values, and the source's as it will have them."""
+        """Notes for a decoder beside ``coded`` values, and the values that it restores."""
         if not self.places:
             return b"", coded
         notes = np.zeros((len(coded), len(self.places), N_NOTES), np.int64)
@@ -144,7 +144,7 @@ def _place(skeleton: Skeleton, index: int, code: int) -> Place:
 
 
 def _build_notes(notes: Ints) -> bytes:
-    """How many there are; of each how many places lie between it and the one before, and turns."""
+    """Build the notes: their count, then the gap to the one before and the turns of each."""
     flat = notes.ravel()
     numbers = np.flatnonzero(flat).tolist()
     out = bytearray(varint(len(numbers)))

@@ -65,7 +65,7 @@ def lanes_of(plan: Plan, width: int) -> Lanes:
 
 
 def take_values(columns: Floats2, column: int, first: int, values: Floats, lanes: int) -> None:
-    """What a column has in the frames from ``first`` on; after the last, the last again."""
+    """Read a column from frame ``first`` on; repeat the last frame past the end."""
     last = len(columns) - 1
     for p in range(lanes):
         value = columns[min(first + p, last), column]
@@ -181,7 +181,7 @@ def _change(above: Floats2, change: Floats2, own: Floats2, lanes: int) -> None:
 def _note_turn(
     axes: Floats2, axis: int, radians: float, origin: Floats2, motion: Floats2, lanes: int
 ) -> None:
-    """What one unit of a rotation does: the turn, and how it moves what is at the root."""
+    """Write the effect of one unit of a rotation: the turn, and the motion at the root."""
     for p in range(lanes):
         x, y, z = axes[axis, p] * radians, axes[axis + 3, p] * radians, axes[axis + 6, p] * radians
         a, b, c = origin[0, p], origin[1, p], origin[2, p]

@@ -186,7 +186,7 @@ def _needed(spans: Sequence[Span], request: Request) -> range:
 
 
 def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], Span], Floats]:
-    """What decodes one segment after the other, (n_frames, n_channels) of each.
+    """Return a function that decodes segments in order, (n_frames, n_channels) each.
 
     Of exact channels it gives something that is of no account.
     """

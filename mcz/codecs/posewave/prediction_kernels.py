@@ -44,7 +44,7 @@ def predict_in_time(model: Model, here: Floats2, parent: Floats2, level: int, ro
 
 
 def learn_in_time(model: Model, values: Floats, level: int, row: int, share: float) -> None:
-    """Let the taps learn from what they missed; ``timely`` is used up."""
+    """Update the taps by their prediction errors; overwrites ``timely``."""
     timely, sources, usual = model.timely, model.sources, model.features[USUAL]
     scale, product = sources[N_TAPS], sources[N_TAPS + 1]
     which = 2 * level + (row & 1)

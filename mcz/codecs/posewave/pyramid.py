@@ -17,7 +17,7 @@ N_KINDS = 6  # of levels
 
 
 class Pyramid:
-    """Of a segment of some frames: level 0 are approximations, then come details, finest last."""
+    """Wavelet levels of a segment: level 0 are approximations, then details, finest last."""
 
     def __init__(self, n_frames: int, levels: int, borrowing: int) -> None:
         self.lengths = lifting.lengths(n_frames, levels)
@@ -25,11 +25,11 @@ class Pyramid:
         self.borrowing = min(borrowing, max(self.n_details - 1, 0))
 
     def depth(self, level: int) -> int:
-        """How often what a level is about was halved: 1 for the finest details."""
+        """Number of halvings of a level: 1 for the finest details."""
         return self.n_details if level == 0 else self.n_details + 1 - level
 
     def kind(self, level: int) -> int:
-        """What a level is to the model of its rows: 0 approximations, 5 the finest details."""
+        """Kind of a level in the row model: 0 approximations, 5 the finest details."""
         return 0 if level == 0 else max(1, N_KINDS - self.depth(level))
 
     def rows(self, level: int) -> int:

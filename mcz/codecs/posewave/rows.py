@@ -69,7 +69,7 @@ class Stream:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all bytes were due, after the last bit was decoded."""
+        """True if every byte was needed, after the last bit was decoded."""
         return bool(_coding().coded_size(self.coder) == len(self.data))
 
 

@@ -32,7 +32,7 @@ MAX_NUMBER = 2.0**40  # of a first value
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """What an encoder lets a bit cost, in squared steps, in approximations and in details."""
+    """Price of a bit in squared steps, for approximations and for details."""
 
     approximations: float
     details: float
@@ -43,7 +43,7 @@ class Weights:
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """Which channels change in a segment, and the first value of every channel, in steps."""
+    """Changing channels of a segment, and the first value of every channel, in steps."""
 
     moving: NDArray[np.bool_]
     numbers: Ints
@@ -87,7 +87,7 @@ def encode_coded(
     refinement: Ints | None = None,
     contacts: Keeper | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
-    """As ``encode_segment``, of ``values`` whose angles are in the orders of the header."""
+    """Encode a segment of ``values`` whose angles are in the orders of the header."""
     pyramid = Pyramid(len(values), header.levels, header.borrowing)
     if refinement is None or not header.refining:
         refinement = np.zeros(len(values), np.int64)
@@ -124,7 +124,7 @@ def encode_coded(
 
 
 def room_of(pyramid: Pyramid, level: int, kept: NDArray[np.bool_]) -> int:
-    """As many bytes as the stream of a level may take."""
+    """Buffer size in bytes for the stream of a level."""
     return 8 * len(kept) + pyramid.rows(level) * (8 * int(kept.sum()) + 1) + 1024
 
 
@@ -177,7 +177,7 @@ def kinds_of(skeleton: Skeleton, whole: bool = False) -> Ints:
 
 
 def classes_of(skeleton: Skeleton, whole: bool = False) -> Ints:
-    """What channels are to the model of their rows: by how many joints a rotation moves."""
+    """Class of each channel in the row model: by the number of joints a rotation moves."""
     turning = ANGLE_KINDS if whole else ROTATION_KINDS
     n_below = [1] * skeleton.n_joints
     for index in range(skeleton.n_joints - 1, -1, -1):

@@ -35,7 +35,7 @@ USUAL_RATE = 0.06
 
 
 def log_of(logs: Ints, value: float) -> int:
-    """About 6 log2(1 + 4 value), 0 <= value < 2^32, at most 95."""
+    """Approximate 6 log2(1 + 4 value), 0 <= value < 2^32, at most 95."""
     x = int(value * 16.0)
     return int(logs[x & 1023] if x < 1024 else logs[min(x >> 6, 1023)] + 36)
 
@@ -68,7 +68,7 @@ def gather_magnitudes(
 
 
 def learn_sizes(model: Model, level: int, magnitudes: Floats) -> None:
-    """Let the weights of both sizes learn from a coded row, and what is usual."""
+    """Update the weights of both sizes, and the usual size, from a coded row."""
     features, n = model.features, len(model.classes)
     one, two, found, spare = (
         model.sizes[ONE],

@@ -1,4 +1,4 @@
-"""What a skeleton is to the pose metric: flat arrays, made once for a clip.
+"""Skeleton as flat arrays for the pose metric, built once per clip.
 
 SPEC.md, "Pose metric", is normative, from the fields of SKEL on: decoded values depend on every bit
 of a plan, so all here is binary64 + - * / in the stated order, without NumPy's products.
@@ -156,7 +156,7 @@ def limited(value: float) -> float:
 
 
 def has_kinematics(skeleton: Skeleton, whole: bool = False) -> bool:
-    """Whether angles mean something; without, all channels are plain."""
+    """Return True if the angle unit is known; otherwise all channels are plain."""
     kinds = ANGLE_KINDS if whole else ROTATION_KINDS
     turning = any(c.kind in kinds for c in skeleton.channels)
     return bool(skeleton.angle_unit) or not (turning or any(any(j.axis) for j in skeleton.joints))
@@ -206,7 +206,7 @@ def _change(above: Matrix, frame: Matrix) -> Matrix:
 
 
 def _arm(joint: Joint, above: Matrix) -> Vector:
-    """What of the way from the parent's origin no channel says, along the parent's B."""
+    """Constant part of the offset from the parent's origin, along the parent's B."""
     if joint.parent < 0:  # where a root is does not matter
         return 0.0, 0.0, 0.0
     replaced = set() if joint.adds_to_offset else {channel.kind for channel in joint.channels}

@@ -1,4 +1,4 @@
-"""What encoder and decoder know of the rows so far, and how it is laid out.
+"""Model state shared by encoder and decoder, and its layout.
 
 SPEC.md, "Rows in the metric", is normative; the names below are its names.
 """

@@ -17,7 +17,7 @@ BEYOND = 2.0**40  # a value of this magnitude or more counts as 0
 
 
 class Rule(NamedTuple):
-    """How angles of a unit are taken apart: a quarter turn is ``high`` + ``low``.
+    """Range reduction of angles in a unit: a quarter turn is ``high`` + ``low``.
 
     ``high`` of a quarter turn in radians has 33 bits, so that its products are exact.
     """
@@ -40,7 +40,7 @@ COSINE = tuple(1.0 / (k * (k + 1.0)) for k in (13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1
 
 
 def sine_cosine(angle: float, rule: Rule) -> tuple[float, float]:
-    """Of an angle in the unit of ``rule``; one of 2^40 or more, or NaN, counts as 0."""
+    """Sine and cosine of an angle in the unit of ``rule``; 2^40 or more, or NaN, counts as 0."""
     angle = angle if abs(angle) < BEYOND else 0.0
     turns = np.floor(angle * rule.quarters + 0.5)
     rest = ((angle - turns * rule.high) - turns * rule.low) * rule.radians

@@ -124,7 +124,7 @@ class Walk:
         self.approx = lifting.join(self.approx, nothing)
 
     def _poses_of(self, level: int) -> Ints:
-        """Of each row the number of its pose, which is that of a coarser level's where borrowed."""
+        """Pose number of each row, a coarser level's where borrowed."""
         pyramid = self.pyramid
         n_rows = pyramid.rows(level)
         if pyramid.depth(level) > pyramid.borrowing:  # PWAVE-22

@@ -118,7 +118,7 @@ def _note(
     number: int,
     p: int,
 ) -> None:
-    """What one unit of a part does: it turns by u, v, w along the axes, and moves the root."""
+    """Write the effect of one unit of a part: a turn by u, v, w, and the root's motion."""
     if number >= 0:
         x = own[0, p] * u + own[1, p] * v + own[2, p] * w
         y = own[3, p] * u + own[4, p] * v + own[5, p] * w

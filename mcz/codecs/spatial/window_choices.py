@@ -1,4 +1,4 @@
-"""How an encoder fits bases to a whole clip, and how many of them are worth their bytes.
+"""Encoder fit of bases to a whole clip, and the number worth their bytes.
 
 Source: Hou 2016, sections 2 and 5.4; mcz/codecs/spatial/README.md describes it. Nothing here is the
 same to the last bit on every machine; what is decoded is.
@@ -60,7 +60,7 @@ ROOM = MAX_ENTRIES - 2**15  # for vectors and courses, beside a mean
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """What a clip as a whole tells, whatever the step.
+    """Fit of a whole clip, independent of the step.
 
     ``columns`` (n_matrices, n_points) are the channels of each matrix, ``vectors`` of each an
     orthonormal basis (n_points, n_points), the vector with the greatest ``energies`` (n_points,),
@@ -80,7 +80,7 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a caller has a say in; None: the encoder chooses."""
+    """Settings of the caller; None: the encoder chooses."""
 
     step: float
     window: int
@@ -270,7 +270,7 @@ def _first(basis: Basis, count: int) -> Basis:
 def _gains(
     windows: Windows, found: Fit, counts: Sequence[int], in_time: Basis | None, asked: Asked
 ) -> list[Floats]:
-    """What each coefficient is worth over all windows, in squared steps: (vectors, frequencies).
+    """Gain of each coefficient over all windows, in squared steps: (vectors, frequencies).
 
     That is the error without it less that with it, less its bits.
     """
@@ -317,7 +317,7 @@ def _cost(basis: Basis) -> Floats:
 
 
 def parameters_of(presets: Presets, window: int) -> tuple[Parameter, ...]:
-    """Those of a codec with these presets, whose windows have ``window`` frames by default."""
+    """Parameters of a codec with these presets and a default window of ``window`` frames."""
     return (
         preset_parameter(presets),
         STEP,

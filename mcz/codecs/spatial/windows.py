@@ -73,7 +73,7 @@ class Plan:
 
 
 def temporal_of(space: Space, fields: WindowsHeader, n_frames: int) -> Floats:
-    """What turns a row of coefficients into a course over a window, (n_frequencies, n_frames).
+    """Matrix from a row of coefficients to values over a window, (n_frequencies, n_frames).
 
     A window that is shorter than the others, the last one, has cosines of its own length.
     """
@@ -111,7 +111,7 @@ class _Quantizer:
             self.from_courses = np.asarray(np.linalg.pinv(self.space.courses.T), np.float64)
 
     def windows(self) -> Iterator[Ints]:
-        """Of each window its coefficients, (n_rows, n_frequencies)."""
+        """Coefficients of each window, (n_rows, n_frequencies)."""
         reader = FrameReader(self.name, self.source)
         n_frames = self.source.layout.n_frames
         for start in range(0, n_frames, self.fields.window):
@@ -136,7 +136,7 @@ class _Quantizer:
         return signed.astype(np.int64)
 
     def _to_time(self, values: Floats) -> Floats:
-        """What makes coefficients in time of a window, (n_frequencies, n_frames)."""
+        """Matrix from the frames of a window to coefficients in time, (n_frequencies, n_frames)."""
         if self.from_courses is not None and len(values) == self.fields.window:
             return self.from_courses
         return temporal_of(self.space, self.fields, len(values))

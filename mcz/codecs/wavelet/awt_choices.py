@@ -1,4 +1,4 @@
-"""Which coefficients an encoder of adaptive wavelets keeps; a decoder needs none of it.
+"""Encoder choice of the coefficients that adaptive wavelets keep.
 
 Source: Beaudoin, Poulin, van de Panne, Adapting wavelet compression to human motion capture clips,
 2007, as Khan 2014, section 5, describes it; mcz/codecs/wavelet/README.md.
@@ -141,7 +141,7 @@ def quantizer_of(choice: Choice, weights: Floats, decimals: int | None) -> Quant
 
 
 def equal_counts(most: Ints, average: float) -> Ints:
-    """As many for each channel, at most ``most``, as nearly alike as can be.
+    """Counts per channel, each at most ``most``, as equal as possible.
 
     Their sum is ``average`` a channel, or all there are.
     """

@@ -1,4 +1,4 @@
-"""How an encoder of wavelets chooses thresholds and quantizer steps; a decoder needs none of it.
+"""Encoder choice of thresholds and quantizer steps for wavelets.
 
 Source: Khan 2016, eq. 2; mcz/codecs/wavelet/README.md describes it.
 """

@@ -1,4 +1,4 @@
-"""Some channels of a clip of wavelets coded anew, under the header that the others have."""
+"""Re-encode some channels of a wavelet clip under its existing header."""
 
 from __future__ import annotations
 

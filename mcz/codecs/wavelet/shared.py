@@ -75,7 +75,7 @@ class Transform:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What an encoder has decided before it codes the first segment.
+    """Encoder decisions before the first segment.
 
     ``kept``: band by band of the clip, the coarsest first, which coefficients are not to become 0,
     (coefficients, channels); None: the quantizer decides.

@@ -28,7 +28,7 @@ CONSTANT = 63  # in place of a scale: every coefficient is the first one
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """What the streams of a signal have in common.
+    """Settings shared by the streams of a signal.
 
     The codec's name, for messages; are there step codes; the least magnitude of a detail that is
     not zero; where a coefficient lies in the next coarser band.
@@ -86,7 +86,7 @@ def parse_streams(
 
 
 def _prefixes(counts: Sequence[int], wanted: Sequence[int], coding: Coding) -> list[int]:
-    """How many coefficients of every band must be decoded: a band is the context of the next."""
+    """Coefficients to decode per band: each band is the context of the next."""
     prefixes = list(wanted)
     for number in range(len(counts) - 1, 0, -1):
         context = (prefixes[number] + coding.shift) // 2 + 3
@@ -95,7 +95,7 @@ def _prefixes(counts: Sequence[int], wanted: Sequence[int], coding: Coding) -> l
 
 
 def _activity(approximations: Ints, count: int) -> Ints:
-    """What an approximation says of its details: the size of its second difference, no side."""
+    """Context of details from approximations: the size of their second difference, without sign."""
     out = np.zeros((2, len(approximations)), np.int64)
     out[0, 1:-1] = np.abs(np.diff(approximations, 2))  # MRDWT-27
     out[1] = 3  # MRDWT-27
@@ -103,7 +103,7 @@ def _activity(approximations: Ints, count: int) -> Ints:
 
 
 def _magnitudes(details: Ints, coding: Coding) -> Ints:
-    """What details say of the next finer ones: size and side."""
+    """Context of the next finer details: size and sign."""
     sizes = np.maximum(0, np.abs(details) - coding.least + 1)  # MRDWT-27
     return np.stack([sizes, np.where(details == 0, 0, np.where(details > 0, 1, 2))])
 
