@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from mcz.hints import Hint
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
-    from mcz.kinematics.rest import rest_positions
+    from mcz.kinematics.rest_pose import rest_positions
     from mcz.live.concealment import LiveFrame
     from mcz.live.generators import LiveReader, stream_decode, stream_encode
     from mcz.live.reader_with_losses import StreamSummary
@@ -172,7 +172,7 @@ _HOMES = {
     "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.reading.source_files": ("read_skeleton",),
-    "mcz.kinematics.rest": ("rest_positions",),
+    "mcz.kinematics.rest_pose": ("rest_positions",),
     "mcz.formats.body_models": ("offsets_from_positions", "offsets_of_model"),
     "mcz.formats.body_trees": ("body_skeleton",),
     "mcz.formats.c3d_events": ("Event",),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mcz.brief import brief
 from mcz.errors import MotionError
 from mcz.kinematics import origins_of
-from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion, Skeleton
 from mcz.types import JsonObject
 

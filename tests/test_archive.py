@@ -181,7 +181,7 @@ def test_remote_archive_costs_few_requests(samples: Path) -> None:
 
     import fsspec
 
-    from mcz.codecs import by_name
+    from mcz.codecs import codec_by_name
     from mcz.container.writer import Writer
     from mcz.writing.clip_writer import write_clip
 
@@ -193,7 +193,7 @@ def test_remote_archive_costs_few_requests(samples: Path) -> None:
         frames = int(draw.integers(100, 140))
         signal_ = replace(motion.signals[0], values=motion.signals[0].values[:frames])
         clip = replace(motion, signals=(signal_,), source=None, name=f"{n % 144:03d}/take {n}")
-        write_clip(writer, clip, by_name("raw"), {})
+        write_clip(writer, clip, codec_by_name("raw"), {})
     writer.finish()
     with fsspec.open("memory://archive.mcz", "wb") as stream:
         stream.write(out.getvalue())

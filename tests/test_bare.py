@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import mcz
-from mcz.codecs import CODECS, bitstream
+from mcz.codecs import CODECS, bitstream_name
 from mcz.sample import write_samples
 from tests import bare
 
@@ -36,4 +36,4 @@ def test_every_codec_is_among_the_vectors() -> None:
     from tests.broken import answers
 
     codecs = {name for v in bare.chosen(2) for name in answers.vectors()[v].get("codecs", [])}
-    assert {bitstream(codec.id) for codec in CODECS.values()} <= codecs
+    assert {bitstream_name(codec.id) for codec in CODECS.values()} <= codecs

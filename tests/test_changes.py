@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Motion
 from mcz.kinematics import positions_of
-from mcz.metrics import comparing
+from mcz.metrics import comparison
 from mcz.sample import bvh_walk
 from tests.motions import motions
 
@@ -25,7 +25,7 @@ def test_beside_plain_differences(motion: Motion, block: int) -> None:
     values = np.clip(np.nan_to_num(motion.values, nan=1.0), -1e300, 1e300)
     other = motion.with_values(values * (1 + 1e-9))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(comparing, "BLOCK", block)
+        patch.setattr(comparison, "BLOCK", block)
         found = mcz.compare(motion, other, shell_cm=None, virtual_markers=False)
     with np.errstate(all="ignore"):
         p, q = (positions_of(m.skeleton, m.values) for m in (motion, other))

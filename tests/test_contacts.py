@@ -24,8 +24,8 @@ from mcz import (
     Skeleton,
     contacts,
 )
-from mcz.kinematics.contacts import frames_in, runs_of, speeds
-from mcz.kinematics.feet import is_foot
+from mcz.kinematics.contacts import find_runs, frames_in, speeds
+from mcz.kinematics.joint_groups import is_foot
 from tests.motions import POSITIONS
 
 FEET = (
@@ -89,10 +89,10 @@ def test_a_foot_stands_between_its_steps() -> None:
 def test_what_is_unknown_does_not_stand() -> None:
     track = np.zeros((100, 3))
     track[40:60, 0] = np.nan
-    assert list(runs_of(track, 120.0, 1)) == [(0, 38), (62, 38)]
-    assert list(runs_of(np.full((50, 3), np.nan), 120.0, 1)) == []
+    assert list(find_runs(track, 120.0, 1)) == [(0, 38), (62, 38)]
+    assert list(find_runs(np.full((50, 3), np.nan), 120.0, 1)) == []
     track[50] = [np.inf, 1e308, 0]
-    assert list(runs_of(track, 120.0, 1)) == [(0, 38), (62, 38)]
+    assert list(find_runs(track, 120.0, 1)) == [(0, 38), (62, 38)]
 
 
 @pytest.mark.parametrize("n_frames", [0, 1, 2, 11, 12])
@@ -225,7 +225,7 @@ def tracks(draw: st.DrawFn) -> tuple[np.ndarray, float]:
 
 @given(tracks(), st.integers(0, 2))
 def test_the_rule(track: tuple[np.ndarray, float], up: int) -> None:
-    assert list(runs_of(*track, up)) == by_definition(*track, up)
+    assert list(find_runs(*track, up)) == by_definition(*track, up)
 
 
 @given(tracks())

@@ -8,7 +8,7 @@ import pytest
 
 import mcz
 from conformance.run import VECTORS
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container.chunks import FOOT, HEADER
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
@@ -20,9 +20,9 @@ from tests.repair import joined, parts_of
 
 def test_clips_are_unique() -> None:
     writer = Writer(io.BytesIO())
-    write_clip(writer, smooth(3), by_name("raw"), {})
+    write_clip(writer, smooth(3), codec_by_name("raw"), {})
     with pytest.raises(MotionError, match="already has 'smooth'"):
-        write_clip(writer, smooth(3), by_name("raw"), {})
+        write_clip(writer, smooth(3), codec_by_name("raw"), {})
 
 
 def test_attachment_of_several_parts() -> None:
@@ -43,7 +43,7 @@ def test_salvage_goes_on_behind_garbage() -> None:
     out = io.BytesIO()
     writer = Writer(out)
     for name in "ab":
-        write_clip(writer, smooth(30, name=name), by_name("raw"), {})
+        write_clip(writer, smooth(30, name=name), codec_by_name("raw"), {})
     writer.finish()
     parts = parts_of(out.getvalue())
     second = [i for i, (c, _) in enumerate(parts) if c.type == b"CLIP"][1]

@@ -198,7 +198,7 @@ def test_every_signal_is_cut_at_its_own_segments() -> None:
     motion = motion_for("raw")
     out = io.BytesIO()
     writer = Writer(out)
-    write_clip(writer, motion, codecs.by_name("raw"), {})
+    write_clip(writer, motion, codecs.codec_by_name("raw"), {})
     writer.finish()
     with mcz.open(out.getvalue()) as file:
         assert [len(s.rows) for s in file.clips["smooth"].signals] == [2, 1]
@@ -260,7 +260,7 @@ def test_an_uncut_clip_is_copied_as_it_is() -> None:
     writer = Writer(out)
     writer.attachment("notes.txt", b"kept")
     for name in ("a", "b"):
-        write_clip(writer, replace(rich(), name=name), codecs.by_name("raw"), {})
+        write_clip(writer, replace(rich(), name=name), codecs.codec_by_name("raw"), {})
         writer.ancillary(b"abCD", name.encode())
         writer.ancillary(b"abCE", b"", safe_to_copy=False)
     writer.finish()
@@ -287,7 +287,7 @@ def test_all_clips_are_cut_alike_and_the_rest_is_kept() -> None:
     writer.attachment("notes.txt", b"kept")
     writer.alias("more.txt", payloads.OF_ATTACHMENT, b"notes.txt")
     for name in ("a", "b"):
-        write_clip(writer, replace(rich(), name=name), codecs.by_name("raw"), {})
+        write_clip(writer, replace(rich(), name=name), codecs.codec_by_name("raw"), {})
     writer.finish()
     part = extracted(out.getvalue(), frames=(3, 9))
     with mcz.open(part) as file:
@@ -344,7 +344,7 @@ class _Live(Writer):
 def test_ancillary_chunks_inside_a_clip_are_kept() -> None:
     out = io.BytesIO()
     writer = _Live(out)
-    write_clip(writer, rich(), codecs.by_name("raw"), {})
+    write_clip(writer, rich(), codecs.codec_by_name("raw"), {})
     writer.finish()
     for how in ({"frames": (3, 9)}, {"clip": "smooth"}):
         kinds = [chunk.type for chunk, _ in parts_of(extracted(out.getvalue(), **how))]
@@ -464,7 +464,7 @@ def test_resolution_beside_a_signal_without_any() -> None:
     out = io.BytesIO()
     writer = Writer(out)
     write_clip(writer, replace(motion, signals=motion.signals[:1]), overlap_codec.CODEC, {})
-    write_clip(writer, replace(motion, name="raw"), codecs.by_name("raw"), {})
+    write_clip(writer, replace(motion, name="raw"), codecs.codec_by_name("raw"), {})
     writer.finish()
     with pytest.raises(mcz.OptionError, match="clip 'raw': the 1 finest"):
         extracted(out.getvalue(), resolution=1)

@@ -215,7 +215,7 @@ def test_clips_that_nobody_has_are_let_go() -> None:
     """What a clip has read goes with it, so that work on all of an archive is bounded."""
     from weakref import ref
 
-    from mcz.codecs import by_name
+    from mcz.codecs import codec_by_name
     from mcz.container.writer import Writer
     from mcz.reading.clips import KEPT
     from mcz.writing.clip_writer import write_clip
@@ -223,7 +223,7 @@ def test_clips_that_nobody_has_are_let_go() -> None:
     out, motion = io.BytesIO(), smooth(3)
     writer = Writer(out)
     for number in range(KEPT + 9):
-        write_clip(writer, replace(motion, name=f"{number}"), by_name("raw"), {})
+        write_clip(writer, replace(motion, name=f"{number}"), codec_by_name("raw"), {})
     writer.finish()
     with mcz.open(out.getvalue()) as file:
         first = file.clips["0"]

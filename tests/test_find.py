@@ -12,7 +12,7 @@ import pytest
 
 import mcz
 from mcz import File, FormatError, OptionError
-from mcz.codecs import CODECS, by_name
+from mcz.codecs import CODECS, codec_by_name
 from mcz.container.writer import Writer
 from mcz.queries import Query
 from mcz.reading.faults import part_problems
@@ -41,7 +41,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for name, n_frames, metadata in CLIPS:
             rate = None if name == "still" else 120
             motion = smooth(n_frames, name=name, metadata=metadata, frame_rate=rate)
-            write_clip(writer, motion, by_name("raw" if n_frames > 60 else "fast"), {})
+            write_clip(writer, motion, codec_by_name("raw" if n_frames > 60 else "fast"), {})
         writer.attachment("notes.txt", b"hello")
         writer.finish()
     return path

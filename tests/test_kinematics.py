@@ -22,8 +22,8 @@ from mcz.kinematics import (
     reach,
     virtual_markers_of,
 )
+from mcz.kinematics.frame_positions import FramePositions
 from mcz.kinematics.sensitivity import sensitivities
-from mcz.kinematics.single import FramePositions
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for
 

@@ -240,11 +240,11 @@ def test_clips_that_are_not_live_are_followed_too() -> None:
     out = io.BytesIO()
     writer = Writer(out)
     motion = smooth(12)
-    write_clip(writer, motion, codecs.by_name("raw"), {"segment_frames": 5})
+    write_clip(writer, motion, codecs.codec_by_name("raw"), {"segment_frames": 5})
     write_clip(writer, smooth(6, name="b"), live_codec.CODEC, {"every": 4})
     writer.finish()
     writer.attachment("a", b"more")
-    write_clip(writer, smooth(3, name="c"), codecs.by_name("fast"), {})
+    write_clip(writer, smooth(3, name="c"), codecs.codec_by_name("fast"), {})
     writer.finish()
     found = list(live_frames(io.BytesIO(out.getvalue())))
     assert [n for n, _, _ in found] == [*range(12), *range(6), *range(3)]

@@ -216,7 +216,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     motion = smooth(50)
     other = motion.with_values(np.round(motion.values))
     whole = mcz.compare(motion, other)
-    monkeypatch.setattr("mcz.metrics.comparing.BLOCK", 100)
+    monkeypatch.setattr("mcz.metrics.comparison.BLOCK", 100)
     parts = mcz.compare(motion, other)
     assert parts.where == whole.where
     for key, value in whole.entries().items():

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.codecs import CODECS, by_name
+from mcz.codecs import CODECS, codec_by_name
 from mcz.sample import bvh_walk
 from tests.motions import smooth
 
@@ -31,7 +31,7 @@ def encoded(codec: str) -> bytes:
     """The walk in several segments."""
     motion, out = bvh_walk(), io.BytesIO()
     skeleton = replace(motion.skeleton, unit_cm=1.0)
-    names = {parameter.name for parameter in by_name(codec).parameters}
+    names = {parameter.name for parameter in codec_by_name(codec).parameters}
     sizes = {"segment_frames": 100} if "segment_frames" in names else {}
     mcz.write(replace(motion, skeleton=skeleton), out, codec=codec, **sizes)
     return out.getvalue()

@@ -17,7 +17,7 @@ import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.kinematics import positions_of
 from mcz.kinematics.chain import Chain
-from mcz.poses.conversions import FORMS, continuous, from_matrices, to_matrices
+from mcz.poses.conversions import FORMS, continuous_signs, from_matrices, to_matrices
 from tests.motions import smooth
 from tests.skeletons import skeletons, values_for
 
@@ -71,7 +71,7 @@ def test_quaternions_keep_their_sign(seed: int, gap: bool) -> None:
     quaternions *= random.choice([-1.0, 1.0], size=(41, 1))
     if gap:
         quaternions[20:23] = np.nan
-    found = continuous(quaternions[:, None].copy())[:, 0]
+    found = continuous_signs(quaternions[:, None].copy())[:, 0]
     np.testing.assert_array_equal(np.abs(found), np.abs(quaternions))
     dots = (found[1:] * found[:-1]).sum(axis=1)
     assert (dots[~np.isnan(dots)] > 0).all()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container.writer import Writer
 from mcz.editing.recoding import recorded_options
 from mcz.errors import OptionError
@@ -34,7 +34,7 @@ def written(motions: list[mcz.Motion], codec: str) -> bytes:
     out = io.BytesIO()
     writer = Writer(out)
     for one in motions:
-        found, params = by_name(codec), CODECS[codec]
+        found, params = codec_by_name(codec), CODECS[codec]
         write_motion(writer, prepare(one, found, params), found, params)
     writer.finish()
     return out.getvalue()
@@ -216,7 +216,7 @@ def test_settings_are_read_as_they_are_recorded() -> None:
     given = {"contacts": "knee:5+10,hips", "quality": "knee=0.5mm", "step": 0.01}
     out = io.BytesIO()
     mcz.write(motion(), out, codec="posewave", **given)
-    codec = by_name("posewave")
+    codec = codec_by_name("posewave")
     found = recorded_options(codec, clip(out.getvalue()).quality)
     assert found == codec.options(given)
 

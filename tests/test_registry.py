@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from mcz import compare, sample
-from mcz.codecs import CODECS, bitstream
-from mcz.codecs.basis_models import name_of
+from mcz.codecs import CODECS, bitstream_name
+from mcz.codecs.basis_models import known_model_name
 from mcz.codecs.online.options import PRESET_IDS
 from mcz.container import limits
 from mcz.container.chunks import FLAGS_OF, ChunkType
@@ -79,7 +79,8 @@ def test_profiles() -> None:
 def test_codecs() -> None:
     rows = by("id", "codecs")
     assert {id_: (row["name"], row["version"], row["decodes"]) for id_, row in rows.items()} == {
-        codec.id: (bitstream(codec.id), codec.version, codec.domain) for codec in CODECS.values()
+        codec.id: (bitstream_name(codec.id), codec.version, codec.domain)
+        for codec in CODECS.values()
     }
     presets = {(row["codec"], row["id"], row["preset"]) for row in FOUND["presets"]}
     online = {(21, id_, name) for name, id_ in PRESET_IDS.items() if id_}
@@ -115,7 +116,7 @@ def test_metrics() -> None:
 
 def test_bases() -> None:
     for name, row in by("name", "bases").items():
-        assert name_of(bytes.fromhex(row["id"])) == name
+        assert known_model_name(bytes.fromhex(row["id"])) == name
 
 
 def test_wavelets() -> None:

@@ -18,7 +18,7 @@ import mcz.formats.restore as restore_module
 from mcz import Signal
 from mcz.cli.figures import figure_lines
 from mcz.cli.skeleton_lines import _tree
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container import strict
 from mcz.container.chunks import build_header
 from mcz.container.writer import Writer
@@ -102,7 +102,7 @@ def test_unpack_never_overwrites_one_member_by_another(folder: Path) -> None:
             motion = mcz.read(folder / f"{name}.bvh")
             assert motion.source is not None
             same = replace(motion, source=replace(motion.source, path="one.bvh"))
-            write_clip(writer, same, by_name("raw"), {})
+            write_clip(writer, same, codec_by_name("raw"), {})
         writer.finish()
     report = mcz.unpack(folder / "a.mcz", folder / "out", force=True)
     assert [outcome.result for outcome in report.outcomes] == ["restored", "failed"]
@@ -301,7 +301,7 @@ def test_reading_many_segments_is_not_quadratic(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize("name", ["T_g", "Q", "target_bytes", "mean_error_cm"])
 def test_a_truth_is_no_number(name: str) -> None:
     with pytest.raises(mcz.OptionError, match=f"{name} is True, not"):
-        by_name("mrdwt").options({name: True})
+        codec_by_name("mrdwt").options({name: True})
 
 
 def test_a_full_disk_is_told_of_the_target(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import origins_of, reach, shell_points_of
-from mcz.kinematics.feet import feet_of
+from mcz.kinematics.joint_groups import find_feet
 from mcz.retargeting.joint_names import SKELETONS, SMPL_BODY
 from mcz.retargeting.rest_poses import _least_turn
 from mcz.retargeting.sizes import size_ratio
@@ -427,7 +427,7 @@ def test_real_clips_on_other_people(data: Path) -> None:
         turned = degrees(world_turns(made), world_turns(motion)).max()
         bones = np.linalg.norm(np.diff(origins(made)[:, [2, 3, 4]], axis=1), axis=2)
         scale = origins(made)[0, 0, 1] / origins(motion)[0, 0, 1]
-        feet = feet_of(target)
+        feet = find_feet(target)
         low = [origins(m)[:, feet, 1].min() for m in (made, motion)]
         print(
             f"{clip} on {person}: {turned:.1e} degrees, scale {scale:.3f}, "

@@ -186,7 +186,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     walk = acclaim_walk()
     other = noisy(walk)
     whole = mcz.compare(walk, other)
-    monkeypatch.setattr("mcz.metrics.comparing.BLOCK", 5000)
+    monkeypatch.setattr("mcz.metrics.comparison.BLOCK", 5000)
     parts = mcz.compare(walk, other)
     assert parts.shell_where == whole.shell_where
     for one, two in zip(parts.by_joint, whole.by_joint, strict=True):

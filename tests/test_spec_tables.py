@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcz.codecs import by_id
+from mcz.codecs import codec_by_id
 from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.online import kernels as online_kernels
 from mcz.codecs.posewave import header as posewave
@@ -57,7 +57,7 @@ def test_states_of_the_grammar() -> None:
 def test_groups_and_resolutions_of_codecs() -> None:
     levels = f"1 to {MAX_LEVELS + 1}"
     for row in rows_under("Codecs"):
-        codec = by_id(int(row[0]), 0, 0)
+        codec = codec_by_id(int(row[0]), 0, 0)
         groups = "any" if codec.domain == "ordinals" else codec.grouping
         assert row[4] == groups + ("; any with exact groups" if codec.exact else "")
         by_codec = {"wavelet": levels, "qbc": "1 to 2"}

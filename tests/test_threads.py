@@ -16,7 +16,7 @@ import mcz
 from mcz import ChecksumError, OptionError
 from mcz.codecs import CODECS
 from mcz.codecs.contract import Layout
-from mcz.codecs.segments import Sizing, guessing
+from mcz.codecs.segments import Sizing, segments_by_guess
 from mcz.threads import in_force, in_order, limited
 from tests.motions import smooth, written
 
@@ -128,7 +128,7 @@ def test_segments_cover_all_frames(
     source = SimpleNamespace(layout=layout, breaks=sorted(b for b in breaks if b < n_frames))
     sizing = Sizing(target, target + spare, 1.5, most_rows, full=full)
     at = 0
-    for segment in guessing(source, fixed, sizing, prepare, threads):
+    for segment in segments_by_guess(source, fixed, sizing, prepare, threads):
         assert segment.first == at
         at += segment.n_frames
         assert 1 <= segment.n_frames <= most_rows

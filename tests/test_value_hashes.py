@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.codecs import CODECS, by_name, known_answers
+from mcz.codecs import CODECS, codec_by_name, known_answers
 from mcz.codecs.known_answer_table import ANSWERS
 from mcz.errors import ChecksumError, UnsupportedError
 from tests.codecs.cases import CASES
@@ -89,7 +89,7 @@ def test_a_repaired_file_has_no_clip_of_other_values(wrong: Path, tmp_path: Path
 
 def test_a_faulty_encoder_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """It changes one bit of one segment, after all else was made."""
-    raw = by_name("raw")
+    raw = codec_by_name("raw")
 
     def encode(source, params):  # type: ignore[no-untyped-def]
         good = raw.encode(source, params)
@@ -113,7 +113,7 @@ def test_a_faulty_encoder_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_first_decode_runs_a_known_answer(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A decoder that is off by the last bit of one value is not used."""
     assert name in ANSWERS
-    data, codec = BytesIO(), by_name(name)
+    data, codec = BytesIO(), codec_by_name(name)
     mcz.write(smooth(12), data, name, **CASES[name].params)
 
     def off(*arguments):  # type: ignore[no-untyped-def]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from conformance import run
 from mcz import MczError
 from mcz.cli import conformance
-from mcz.codecs import CODECS, bitstream, by_name
+from mcz.codecs import CODECS, bitstream_name, codec_by_name
 from tools import make_vectors
 from tools.vectors import requirements
 from tools.vectors.build.files import Vector, arrays
@@ -79,7 +79,7 @@ def test_stored_files_made_at_random_have_everything() -> None:
     stored = [row for name, row in ROWS.items() if name.startswith("valid/random/")]
     assert sorted(row["seed"] for row in stored) == list(range(COUNT))
     found = Counter(name for row in stored for name in row["codecs"])
-    assert set(found) == {bitstream(codec.id) for codec in CODECS.values()}
+    assert set(found) == {bitstream_name(codec.id) for codec in CODECS.values()}
     assert min(found.values()) >= 5
     said = " ".join(row["purpose"] for row in stored)
     for trait in (
@@ -111,7 +111,7 @@ def test_every_invalid_vector_has_a_fault() -> None:
     effects = {row["effect"] for row in ROWS.values() if "effect" in row}
     assert effects == set(tables.EFFECTS)
     every = {name for row in ROWS.values() if "fault" in row for name in row["codecs"]}
-    assert every == {bitstream(by_name(name).id) for name in NAMES}
+    assert every == {bitstream_name(codec_by_name(name).id) for name in NAMES}
 
 
 def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from mcz.codecs import CODECS
 from mcz.codecs.contract import Codec
 from mcz.codecs.known_answer_table import KnownAnswer
-from mcz.codecs.known_answers import N_FRAMES, digest, layout_of
+from mcz.codecs.known_answers import N_FRAMES, answer_layout, digest
 from mcz.motion import Motion, Signal
 from mcz.writing.signal_source import MemorySource
 
@@ -26,7 +26,7 @@ WIDTH = 96
 
 def motion_of(codec: Codec) -> Motion:
     """A motion without a sine, the same on every machine: parabolas with a little noise."""
-    layout = layout_of(codec.grouping)
+    layout = answer_layout(codec.grouping)
     assert layout.skeleton is not None
     frame = np.arange(N_FRAMES)[:, None]
     channel = np.arange(layout.n_channels)[None]
@@ -40,7 +40,7 @@ def answer_of(codec: Codec) -> KnownAnswer:
     given = {name: value for name, value in OPTIONS.items() if codec.has(name)}
     options = codec.options(given)
     source = MemorySource(motion_of(codec), 0, codec, 2**26, options)
-    source.layout = layout_of(codec.grouping)
+    source.layout = answer_layout(codec.grouping)
     encoded = codec.encode(source, options)
     (segment,) = encoded.segments
     models = (*encoded.models, *encoded.known)

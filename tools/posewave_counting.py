@@ -14,15 +14,15 @@ os.environ["MCZ_LOOPS"] = "interpreted"
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave import decision_kernels, rows, segment
+from mcz.codecs.posewave import decision_kernels, row_coder, segment
 from mcz.codecs.posewave.model import Start, make_model
+from mcz.codecs.posewave.model_state import N_OPINIONS, Model
 from mcz.codecs.posewave.priors import Prior
-from mcz.codecs.posewave.state import N_OPINIONS, Model
 from mcz.coding import mixing
 
 Ints = NDArray[np.int64]
 
-plain_learn, plain_learn_small = decision_kernels.learn, mixing._learn
+plain_learn, plain_learn_small = decision_kernels.learn_bit, mixing._learn
 
 
 def counting_learn(
@@ -49,11 +49,11 @@ class Counting:
     """Makes the codec's coders count, and keeps the model of the last segment."""
 
     def __init__(self) -> None:
-        fresh = rows.fresh_coder
-        decision_kernels.learn = counting_learn
+        fresh = row_coder.fresh_coder
+        decision_kernels.learn_bit = counting_learn
         mixing._learn = counting_learn_small
         segment.fresh_coder = lambda start: tripled(fresh(start))
-        rows.make_model = self.make_model
+        row_coder.make_model = self.make_model
 
     def make_model(self, classes: Ints, start: Start, coder: Ints, prior: Prior | None) -> Model:
         model = make_model(classes, start, coder, prior)

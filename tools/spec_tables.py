@@ -37,7 +37,7 @@ MODULES = (
     "mcz.container.copies",
     "mcz.container.metadata",
     "mcz.container.packed",
-    "mcz.codecs.wavelet.shared",
+    "mcz.codecs.wavelet.wavelet",
     "mcz.codecs.curves.qbc",
     "mcz.codecs.pca.pca",
     "mcz.codecs.space",

@@ -18,7 +18,7 @@ import mcz
 from mcz.codecs.lossless import best_streams
 from mcz.codecs.lossless.best import CODEC
 from mcz.coding import mixing, residuals
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.writing.signal_source import MemorySource
 from tools.start_tables import Kept, table, untrained
 

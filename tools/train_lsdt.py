@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.codecs.basis_models import build_bases, falling_digits, rounded
+from mcz.codecs.basis_models import build_bases, falling_digits, round_vectors
 from mcz.training import SHIPPED, Recipe, Trained, training_set
 
 TRIES = (("dct", 20), ("haar", 20), ("dct", 40), ("haar", 40), ("dct", 80))
@@ -74,7 +74,7 @@ def with_virtual_markers(out: str, *clips: str) -> None:
     motions = (mcz.in_positions(mcz.read(clip), virtual_markers=True) for clip in clips)
     trained = VIRTUAL.learn(training_set(motions))
     digits = falling_digits(len(trained.source.names), *VIRTUAL_DIGITS)
-    bases = [rounded(found.basis, digits) for found in trained.learned]
+    bases = [round_vectors(found.basis, digits) for found in trained.learned]
     Path(out).write_bytes(build_bases(bases))
     for line in lines(trained):
         print(line, file=sys.stderr)

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from mcz.codecs.posewave import choices, segment
 from mcz.codecs.posewave.header import parse_header
 from mcz.codecs.posewave.model import N_SECOND, Start, start_of, start_tables
-from mcz.codecs.posewave.state import (
+from mcz.codecs.posewave.model_state import (
     C_LEVEL,
     C_ROWS,
     N_CLASSES,

@@ -18,7 +18,7 @@ from mcz.kinematics.points import listed_points, point_set
 from mcz.motion import Motion, Skeleton
 from mcz.pictures.bodies import LEFT, MIDDLE, RIGHT, body_of
 from mcz.poses import point_names
-from mcz.poses.moving import Moving, scale_to, values_of
+from mcz.poses.motion_like import MotionLike, scale_to, values_of
 from mcz.reading.clip import Clip
 from mcz.reading.source_info import recording as recording_of
 from mcz.tables.files import channel_names, channel_units
@@ -37,7 +37,7 @@ SIDES = {
 
 
 def to_rerun(
-    moving: Moving, recording: RecordingStream | None = None, *, entity: str | None = None
+    moving: MotionLike, recording: RecordingStream | None = None, *, entity: str | None = None
 ) -> RecordingStream:
     """Log a Motion or Clip to a ``rerun.RecordingStream``; needs rerun-sdk (``mcz[rerun]``).
 
@@ -59,7 +59,7 @@ def to_rerun(
     return recording
 
 
-def view_of(moving: Moving, entity: str) -> Horizontal:
+def view_of(moving: MotionLike, entity: str) -> Horizontal:
     """How the viewer of rerun is to show what ``to_rerun`` logs: a figure, and curves beside it.
 
     Residuals are there, and not shown: there are as many as points.
@@ -81,7 +81,7 @@ def view_of(moving: Moving, entity: str) -> Horizontal:
 class _Log:
     """One motion on its way into a recording."""
 
-    def __init__(self, rerun: ModuleType, recording: Any, moving: Moving, entity: str) -> None:
+    def __init__(self, rerun: ModuleType, recording: Any, moving: MotionLike, entity: str) -> None:
         self.rerun, self.recording, self.moving = rerun, recording, moving
         self.parts = [part for part in entity.split("/") if part] or ["motion"]
         self.timeline = moving.timeline
@@ -197,13 +197,13 @@ class _Figure:
         of_bones = self.body.sides[self.body.bones[:, 1]]
         self.bones = {s: self.body.bones[of_bones == s] for s in SIDES if (of_bones == s).any()}
 
-    def places(self, moving: Moving, start: int, stop: int) -> Floats:
+    def places(self, moving: MotionLike, start: int, stop: int) -> Floats:
         """Where the nodes are, (n_frames, n_nodes, 3), NaN where unknown."""
         values = values_of(moving, (start, stop), range(moving.skeleton.n_joints))
         return self.body.places(values) * self.scale
 
 
-def _figure_of(moving: Moving) -> _Figure | None:
+def _figure_of(moving: MotionLike) -> _Figure | None:
     """None where the skeleton has no kinematics."""
     if not moving.signals[0].has_poses or not moving.skeleton.joints:
         return None
@@ -218,7 +218,7 @@ def _figure_of(moving: Moving) -> _Figure | None:
 Columns = list[tuple[str, str, int]]  # names, units, columns
 
 
-def _series_of(moving: Moving) -> Iterator[tuple[str, int, Columns, int]]:
+def _series_of(moving: MotionLike) -> Iterator[tuple[str, int, Columns, int]]:
     """Of every signal with scalars its name, its index, these, and how many samples a frame has."""
     for index, signal in enumerate(moving.signals):
         channels = signal.channels
@@ -236,19 +236,19 @@ def _series_of(moving: Moving) -> Iterator[tuple[str, int, Columns, int]]:
             yield name, index, [(names[k], units[k], k) for k in plain], per_frame
 
 
-def _samples(moving: Moving, index: int, start: int, stop: int) -> NDArray[np.float64]:
+def _samples(moving: MotionLike, index: int, start: int, stop: int) -> NDArray[np.float64]:
     """The samples of a signal in some frames, in units, NaN where invalid."""
     if isinstance(moving, Clip):
         return np.asarray(moving.read((start, stop), signal=index), np.float64)
     return np.asarray(_motion(moving).signals[index].cut(start, stop).masked(), np.float64)
 
 
-def _numbers(moving: Moving) -> NDArray[np.int64]:
+def _numbers(moving: MotionLike) -> NDArray[np.int64]:
     """The source's numbers of all frames."""
     numbers = moving.frame_numbers if isinstance(moving, Clip) else _motion(moving).frame_numbers
     return numbers_or_rows(numbers, moving.n_frames)
 
 
-def _motion(moving: Moving) -> Motion:
+def _motion(moving: MotionLike) -> Motion:
     assert isinstance(moving, Motion)
     return moving

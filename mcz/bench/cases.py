@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import mcz
-from mcz.codecs import CODECS, by_name
+from mcz.codecs import CODECS, codec_by_name
 from mcz.codecs.contract import Codec
 from mcz.errors import MczError, OptionError
 from mcz.motion import Motion
@@ -100,7 +100,7 @@ def variants_of(names: Sequence[str]) -> list[Variant]:
     found: list[Variant] = []
     for name in names or [codec.name for codec in CODECS.values()]:
         word, *settings = name.split(":")
-        codec = by_name(word)
+        codec = codec_by_name(word)
         if settings:
             params = {k: _value(v) for k, v in (_pair(setting) for setting in settings)}
             codec.options(params)

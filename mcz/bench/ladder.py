@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from mcz.bench.cases import Case, Variant, load
 from mcz.bench.measure import Record, coded_bytes, point
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.parameters import Dial
 from mcz.errors import MczError, MotionError, OptionError
 
@@ -38,7 +38,7 @@ class Settings:
 
 def dial_of(variant: Variant) -> tuple[Dial, Settings]:
     """Raises OptionError where the codec has no dial."""
-    codec = by_name(variant.codec)
+    codec = codec_by_name(variant.codec)
     if codec.dial is None:
         raise OptionError(f"codec {variant.codec} has nothing to turn")
     return codec.dial, Settings(codec.dial)
@@ -46,7 +46,7 @@ def dial_of(variant: Variant) -> tuple[Dial, Settings]:
 
 def sweep(case: Case, variant: Variant, n_points: int = N_POINTS) -> list[Record]:
     """Points of about evenly spaced sizes from fine to coarse; one point without a dial."""
-    if by_name(variant.codec).dial is None:
+    if codec_by_name(variant.codec).dial is None:
         return [point(case, variant, {})]
     dial, settings = dial_of(variant)
     signal = load(case).motion.signals[0]

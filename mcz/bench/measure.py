@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import mcz
 from mcz.bench.cases import Case, Variant, load
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Request, Segment, Span, model_finder
 from mcz.container.limits import BASE
 from mcz.kinematics import SHELL_CM
-from mcz.metrics.comparison import NO_CONTACTS
+from mcz.metrics.figures import NO_CONTACTS
 from mcz.motion import Motion
 from mcz.reading.sizes import clip_ratios, clip_sizes
 from mcz.types import JsonObject, Params
@@ -33,12 +33,12 @@ DROPPED = (
 
 def what_is_coded(motion: Motion, codec: str) -> Motion:
     """All of the clip for a lossless codec, the motion alone for a lossy one."""
-    return motion if by_name(codec).lossless else replace(motion, signals=motion.signals[:1])
+    return motion if codec_by_name(codec).lossless else replace(motion, signals=motion.signals[:1])
 
 
 def write_file(motion: Motion, codec: str, params: Params) -> bytes:
     """An MCZ file of one clip, without its quality record, which is no part of the codec."""
-    chosen = by_name(codec)
+    chosen = codec_by_name(codec)
     return file_in_memory(prepare(motion, chosen, params), chosen, params, BASE)
 
 
@@ -62,7 +62,7 @@ def point(case: Case, variant: Variant, params: Params, *, markers: bool = True)
         radius = SHELL_CM if markers else None
         found = mcz.compare(motion, clip.motion(), virtual_markers=markers, shell_cm=radius)
     coded = sizes.payload + sizes.overhead + sizes.models
-    if not by_name(variant.codec).lossless:
+    if not codec_by_name(variant.codec).lossless:
         ratios = _ratios(motion, len(load(case).data), coded)
     ratios.pop("cr_file", None)
     if len(motion.signals) < len(whole.signals):
@@ -145,7 +145,7 @@ def work_of(
     motion: Motion, name: str, params: Params
 ) -> tuple[Callable[[], object], Callable[[], object]]:
     """Encoding and decoding by the codec alone, of values in the domain that it wants."""
-    codec = by_name(name)
+    codec = codec_by_name(name)
     options = codec.options(params)
     wanted = prepare(motion, codec, params).motion
 

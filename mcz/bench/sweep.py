@@ -15,7 +15,7 @@ from mcz.bench.measure import Record
 from mcz.bench.tables import Table, setting
 from mcz.bench.tasks import Runner, Task
 from mcz.bjontegaard import bd_rate, bd_sqnr, front
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.types import JsonObject
 
 ZFP = "zfp, tolerance"
@@ -36,7 +36,7 @@ class Curve:
 
     @property
     def lossless(self) -> bool:
-        return self.variant is not None and by_name(self.variant.codec).lossless
+        return self.variant is not None and codec_by_name(self.variant.codec).lossless
 
     def pairs(self, key: str) -> list[tuple[float, float]]:
         """(bytes, figure) of the points that have both."""

@@ -20,7 +20,7 @@ from typing import Any
 from mcz.bench import ladder, measure, peers
 from mcz.bench.cache import Cache
 from mcz.bench.cases import Case, Variant, load, why
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.errors import MczError, SkeletonWarning
 
 Progress = Callable[[int, int, str], None]
@@ -92,7 +92,7 @@ def perform(task: Task, kind: Kind) -> Any:
 
 def key_of(task: Task) -> str:
     """What the result depends on, the package itself apart."""
-    codec = by_name(task.variant.codec) if task.variant.codec else None
+    codec = codec_by_name(task.variant.codec) if task.variant.codec else None
     return json.dumps(
         [
             task.kind,

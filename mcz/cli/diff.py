@@ -272,7 +272,7 @@ def _compared(
     left: _Side, right: _Side, a: str | None, b: str | None, wanted: _Wanted
 ) -> JsonObject:
     """The document of one pair of motions."""
-    from mcz.metrics.document import difference
+    from mcz.metrics.diff_document import diff_document
     from mcz.reading.differences import document_of
 
     one, other = left.load(a), right.load(b)
@@ -282,7 +282,7 @@ def _compared(
             f"{other.motion.n_frames}; --frames A:B chooses what both have"
         )
     with about(f"{left.path}, {right.path}"):
-        document = difference(
+        document = diff_document(
             one.motion,
             other.motion,
             start=one.start,

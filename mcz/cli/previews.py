@@ -11,7 +11,7 @@ from mcz.cli.terminal import can_show
 from mcz.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.poses.moving import Moving
+    from mcz.poses.motion_like import MotionLike
     from mcz.reading.clip import Clip
 
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"
@@ -33,7 +33,7 @@ def preview_of(clip: Clip) -> JsonObject:
     return {"motion": motion_of(clip), "payload": shares}
 
 
-def motion_of(moving: Moving) -> JsonObject | None:
+def motion_of(moving: MotionLike) -> JsonObject | None:
     """The speeds of equal parts of the time, and what they are in; None where they are unknown."""
     from mcz.pictures.energy import motion_energy
 

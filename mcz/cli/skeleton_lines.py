@@ -33,7 +33,7 @@ def skeleton_lines(skeleton: JsonObject) -> Iterator[str]:
 
 
 def _height(height: float, unit_cm: float | None) -> str:
-    from mcz.kinematics.rest import note_on_height
+    from mcz.kinematics.rest_pose import note_on_height
 
     if unit_cm is None:
         return f"  height {height:.3g} units"

@@ -12,7 +12,7 @@ from mcz.codecs.contract import Codec
 from mcz.errors import OptionError, UnsupportedError
 
 
-class Home(NamedTuple):
+class CodecEntry(NamedTuple):
     """The ids of a codec, and the module that has it."""
 
     id: int
@@ -22,21 +22,21 @@ class Home(NamedTuple):
 
 # A module is imported when its codec is asked for: importing all takes longer than most commands
 # work.
-HOMES = {
-    "raw": Home(0, 0, "raw"),
-    "fast": Home(1, 0, "lossless.fast"),
-    "best": Home(2, 0, "lossless.best"),
-    "posewave": Home(3, 0, "posewave.posewave"),
-    "mrdwt": Home(16, 1, "wavelet.mrdwt"),
-    "dwt": Home(16, 2, "wavelet.dwt"),
-    "awt": Home(16, 3, "wavelet.awt"),
-    "qbc": Home(17, 0, "curves.qbc"),
-    "pca": Home(18, 0, "pca.pca"),
-    "lsdt-frame": Home(19, 0, "spatial.lsdt_frame"),
-    "lsdt-clip": Home(20, 1, "spatial.lsdt_clip"),
-    "mdtt": Home(20, 2, "spatial.mdtt"),
-    "pca-rdo": Home(20, 3, "spatial.pca_rdo"),
-    "online": Home(21, 0, "online.online"),
+ENTRIES = {
+    "raw": CodecEntry(0, 0, "raw"),
+    "fast": CodecEntry(1, 0, "lossless.fast"),
+    "best": CodecEntry(2, 0, "lossless.best"),
+    "posewave": CodecEntry(3, 0, "posewave.posewave"),
+    "mrdwt": CodecEntry(16, 1, "wavelet.mrdwt"),
+    "dwt": CodecEntry(16, 2, "wavelet.dwt"),
+    "awt": CodecEntry(16, 3, "wavelet.awt"),
+    "qbc": CodecEntry(17, 0, "curves.qbc"),
+    "pca": CodecEntry(18, 0, "pca.pca"),
+    "lsdt-frame": CodecEntry(19, 0, "spatial.lsdt_frame"),
+    "lsdt-clip": CodecEntry(20, 1, "spatial.lsdt_clip"),
+    "mdtt": CodecEntry(20, 2, "spatial.mdtt"),
+    "pca-rdo": CodecEntry(20, 3, "spatial.pca_rdo"),
+    "online": CodecEntry(21, 0, "online.online"),
 }
 SHARED = {16: "wavelet"}  # ids of which no codec has the name of the bitstream
 PRIVATE = range(128, 256)  # ids that SPEC.md never gives a meaning
@@ -46,7 +46,7 @@ class Codecs(MutableMapping[str, Codec]):
     """The codecs by their names."""
 
     def __init__(self) -> None:
-        self._homes = dict(HOMES)
+        self._homes = dict(ENTRIES)
         self._loaded: dict[str, Codec] = {}
 
     def __getitem__(self, name: str) -> Codec:
@@ -56,7 +56,7 @@ class Codecs(MutableMapping[str, Codec]):
         return self._loaded[name]
 
     def __setitem__(self, name: str, codec: Codec) -> None:
-        self._homes[name] = Home(codec.id, codec.preset, codec.encode.__module__)
+        self._homes[name] = CodecEntry(codec.id, codec.preset, codec.encode.__module__)
         self._loaded[name] = codec
 
     def __delitem__(self, name: str) -> None:
@@ -86,7 +86,7 @@ EFFORTS = {"fast": "fast", "best": "best"}  # by what they cost
 ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 
-def by_name(name: str) -> Codec:
+def codec_by_name(name: str) -> Codec:
     """The codec called ``name``, or by a name of ``ALIASES``; raises OptionError for another."""
     if ALIASES.get(name, name) not in CODECS:
         raise OptionError(
@@ -95,7 +95,7 @@ def by_name(name: str) -> Codec:
     return CODECS[ALIASES.get(name, name)]
 
 
-def chosen(codec: str | None, effort: str | None) -> str:
+def choose_name(codec: str | None, effort: str | None) -> str:
     """The codec of that name or of that effort, by default ``DEFAULT``; raises OptionError."""
     if codec is not None and effort is not None:
         raise OptionError(f"codec {codec!r} and effort {effort!r}: one of them, not both")
@@ -104,12 +104,12 @@ def chosen(codec: str | None, effort: str | None) -> str:
     return codec or EFFORTS.get(effort or "", DEFAULT)
 
 
-def bitstream(id_: int) -> str | None:
+def bitstream_name(id_: int) -> str | None:
     """The name of the bitstream of a codec, None where it is not known."""
     return SHARED.get(id_) or CODECS.find(id_, 0)
 
 
-def by_id(id_: int, version: int, preset: int) -> Codec:
+def codec_by_id(id_: int, version: int, preset: int) -> Codec:
     """The codec with this id; raises UnsupportedError where it or its version is not known.
 
     The codec has the preset that is asked for, where that is not known as one of the bitstream.
@@ -121,7 +121,7 @@ def by_id(id_: int, version: int, preset: int) -> Codec:
     if version > codec.version:  # CODEC-04, HEAD-05
         raise UnsupportedError(f"codec {codec.name}: version {version}, known is {codec.version}")
     if preset != codec.preset:
-        codec = replace(codec, preset=preset, name=bitstream(id_) or codec.name)
+        codec = replace(codec, preset=preset, name=bitstream_name(id_) or codec.name)
     if version < codec.version:
         return replace(codec, version=version, decode=codec.earlier.get(version, codec.decode))
     return codec

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.annexes import annex_bytes, annex_names
-from mcz.codecs.contract import Layout, Model, id_of
-from mcz.coding.start import start_states
+from mcz.codecs.contract import Layout, Model, model_id
+from mcz.coding.start_states import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError, MotionError, UnsupportedError
 from mcz.schema import read_varint, varint
@@ -43,11 +43,11 @@ class Basis:
     @property
     def vectors(self) -> Floats:
         """(n_vectors, n_points), exact."""
-        found: Floats = np.ldexp(self.entries.astype(np.float64), -self.shifts[:, None])
-        return found
+        vectors: Floats = np.ldexp(self.entries.astype(np.float64), -self.shifts[:, None])
+        return vectors
 
 
-def rounded(vectors: Floats, shift: int | Sequence[int] | Ints = FINE) -> Basis:
+def round_vectors(vectors: Floats, shift: int | Sequence[int] | Ints = FINE) -> Basis:
     """``vectors``, as rows, in integers of ``shift`` binary digits, or of so many each."""
     shifts = np.broadcast_to(np.asarray(shift, np.int64), len(vectors)).copy()
     return Basis(shifts, np.rint(np.ldexp(vectors, shifts[:, None])).astype(np.int64))
@@ -64,7 +64,7 @@ def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
 
     Raises MotionError where there are too many, or an entry is too large.
     """
-    parts = [basis if isinstance(basis, Basis) else rounded(basis, shift) for basis in bases]
+    parts = [basis if isinstance(basis, Basis) else round_vectors(basis, shift) for basis in bases]
     size = sum(part.entries.size for part in parts)
     widest = max((part.entries.shape[1] for part in parts), default=0)
     if not 1 <= len(parts) <= MAX_BASES or size > MAX_ENTRIES or widest > MAX_POINTS:
@@ -142,7 +142,7 @@ def _loop(
     return True
 
 
-def model_of(bases: Sequence[Basis | Floats], shift: int = FINE) -> Model:
+def build_model(bases: Sequence[Basis | Floats], shift: int = FINE) -> Model:
     """``bases`` as a model; raises MotionError as ``build_bases`` does."""
     return Model(BASES, build_bases(bases, shift))
 
@@ -158,12 +158,12 @@ def known_models() -> dict[str, Model]:
 
 @cache
 def _known_by_id() -> dict[bytes, Model]:
-    return {id_of(model): model for model in known_models().values()}
+    return {model_id(model): model for model in known_models().values()}
 
 
-def name_of(id_: bytes) -> str | None:
+def known_model_name(id_: bytes) -> str | None:
     """Name of a well-known model, None for any other."""
-    return next((name for name, model in known_models().items() if id_of(model) == id_), None)
+    return next((name for name, model in known_models().items() if model_id(model) == id_), None)
 
 
 def find_bases(
@@ -174,20 +174,20 @@ def find_bases(
     ``check`` refuses heads that are not due, before their entries take memory. Raises
     UnsupportedError where there is no such model, FormatError where it is none of bases.
     """
-    found = _known_by_id().get(id_)
-    if found is None and layout.find_model is not None:
-        found = layout.find_model(id_)
-    if found is None:
+    model = _known_by_id().get(id_)
+    if model is None and layout.find_model is not None:
+        model = layout.find_model(id_)
+    if model is None:
         # BASES-09
         raise UnsupportedError(f"{codec}: model {id_.hex()} is not in the file nor well known")
     where = f"{codec}: model {id_.hex()}"
-    if found.kind != BASES:  # SPACE-08
-        raise FormatError(f"{where} is one of kind {found.kind} where bases are due")
-    heads, _ = parse_heads(found.data, where)
+    if model.kind != BASES:  # SPACE-08
+        raise FormatError(f"{where} is one of kind {model.kind} where bases are due")
+    heads, _ = parse_heads(model.data, where)
     check(heads)
     if sum(len(head.shifts) * head.n_points for head in heads) > MAX_KEPT:
-        return parse_bases(found.data, where)
-    return _parsed(found.data)
+        return parse_bases(model.data, where)
+    return _parsed(model.data)
 
 
 @lru_cache(maxsize=8)

@@ -1,4 +1,4 @@
-"""The size of one channel in codec ``fast``, by which an encoder compares grids."""
+"""Size of one channel in codec ``fast``, by which an encoder compares grids."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ BLOCK_ROWS = 1024
 
 
 def channel_bytes(ordinals: NDArray[np.int64], grid: Grid) -> int:
-    """The bytes of the streams of a channel, (n_rows,), that is coded alone."""
+    """Size in bytes of the streams of one channel, (n_rows,), coded alone."""
     builder, starts = StreamBuilder([grid], [[0]]), range(0, len(ordinals), BLOCK_ROWS)
     blocks = (ordinals[start : start + BLOCK_ROWS, None] for start in starts)
     return sum(len(builder.build(block, (grid,))[0]) for block in blocks)

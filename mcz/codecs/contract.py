@@ -70,14 +70,14 @@ class Model:
 FindModel = Callable[[bytes], Model | None]
 
 
-def id_of(model: Model) -> bytes:
+def model_id(model: Model) -> bytes:
     """The id that a clip names the model by: that of its MODL."""
     return hashlib.sha256(b"MODL\0" + varint(model.kind) + model.data).digest()[:ID_SIZE]
 
 
 def model_finder(models: Sequence[Model]) -> FindModel:
     """Finds those that an encoder has made or named."""
-    return {id_of(model): model for model in models}.get
+    return {model_id(model): model for model in models}.get
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,7 @@ Subset = Callable[[Layout, Span, Sequence[int], "Fetch"], tuple[bytes, ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Recoding:
+class RecodeRequest:
     """Groups of a coded signal that are coded anew, with the header that they have.
 
     ``source`` holds the whole signal with its new values, ``options`` are the parameters, where
@@ -196,7 +196,7 @@ class Recoding:
 
 # Of each span the streams of the groups, in stored order, which a decoder reads under the header
 # beside the streams of all other groups.
-Recode = Callable[[Recoding], Iterator[tuple[bytes, ...]]]
+Recode = Callable[[RecodeRequest], Iterator[tuple[bytes, ...]]]
 
 
 class LiveEncoder(Protocol):
@@ -346,12 +346,12 @@ class Codec:
         Parameters that only a search finds may be given where ``inner`` is true.
         """
         known = {p.name: p for p in (*self.parameters, *(TARGETS if self.dial else ()))}
-        told = [name for name, parameter in known.items() if inner or not parameter.inner]
-        unknown = sorted(set(given) - set(told))
+        listed = [name for name, parameter in known.items() if inner or not parameter.inner]
+        unknown = sorted(set(given) - set(listed))
         if unknown:
             raise OptionError(
                 f"codec {self.name} has no parameter {unknown[0]!r}; it has "
-                f"{', '.join(told) or 'none'}"
+                f"{', '.join(listed) or 'none'}"
             )
         return {
             name: parameter.parse(given[name]) if name in given else parameter.default

@@ -24,7 +24,7 @@ _proved: set[str] = set()
 _LOCK = Lock()
 
 
-def skeleton() -> Skeleton:
+def answer_skeleton() -> Skeleton:
     """A body of four joints, 15 channels."""
     turns = tuple(Channel(kind) for kind in ("rz", "rx", "ry"))
     moves = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
@@ -39,19 +39,19 @@ def skeleton() -> Skeleton:
     )
 
 
-def layout_of(grouping: str) -> Layout:
+def answer_layout(grouping: str) -> Layout:
     """The layout of the answer, which the encoder and the decoder know."""
     sizes = {"all": [15], "joint": [6, 3, 3, 3]}.get(grouping, [1] * 15)
     ends = list(accumulate(sizes, initial=0))
     groups = tuple(tuple(range(*pair)) for pair in pairwise(ends))
     grids = (Grid(GridKind.FIXED, 4),) * ends[-1]
-    return Layout(N_FRAMES, groups, 1, skeleton(), Fraction(30), grids)
+    return Layout(N_FRAMES, groups, 1, answer_skeleton(), Fraction(30), grids)
 
 
 def digest(codec: Codec, answer: KnownAnswer) -> str:
     """The SHA-256 of the ordinals or values that the codec decodes."""
     models = [Model(kind, bytes.fromhex(data)) for kind, data in answer.models]
-    layout = layout_of(answer.grouping)
+    layout = answer_layout(answer.grouping)
     n_groups = len(layout.groups)
     layout = replace(
         layout,
@@ -61,14 +61,14 @@ def digest(codec: Codec, answer: KnownAnswer) -> str:
     streams = [bytes.fromhex(stream) for stream in answer.streams]
     is_earlier = answer.version < codec.version
     decode = codec.earlier.get(answer.version, codec.decode) if is_earlier else codec.decode
-    found = decode(
+    decoded = decode(
         bytes.fromhex(answer.header),
         layout,
         [Span(0, N_FRAMES)],
         Request(0, N_FRAMES, tuple(range(n_groups))),
         lambda segment, resolution, group: streams[resolution * n_groups + group],
     )
-    return hashlib.sha256(found.astype(found.dtype.newbyteorder("<")).tobytes()).hexdigest()
+    return hashlib.sha256(decoded.astype(decoded.dtype.newbyteorder("<")).tobytes()).hexdigest()
 
 
 def check_known_answer(codec: Codec) -> None:

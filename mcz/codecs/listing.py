@@ -11,7 +11,7 @@ from mcz.types import Settings
 DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the clip decides
 
 
-def document(codec: Codec) -> Settings:
+def codec_document(codec: Codec) -> Settings:
     """Entry of a codec in ``mcz codecs --json``; its keys are stable."""
     return {
         "name": codec.name,
@@ -22,7 +22,7 @@ def document(codec: Codec) -> Settings:
         "positions": codec.positions,
         "live": codec.live is not None,
         "quality": codec.dial.parameter if codec.dial else None,
-        "parameters": [facts_of(parameter) for parameter in parameters_of(codec)],
+        "parameters": [parameter_document(parameter) for parameter in parameters_of(codec)],
     }
 
 
@@ -31,10 +31,10 @@ def parameters_of(codec: Codec) -> tuple[Parameter, ...]:
     return (*(p for p in codec.parameters if not p.inner), *(TARGETS if codec.dial else ()))
 
 
-def facts_of(parameter: Parameter) -> Settings:
+def parameter_document(parameter: Parameter) -> Settings:
     """Name, default, range and meaning of a parameter."""
-    found = DEFAULT_IN_HELP.fullmatch(parameter.help)
-    decided, meaning = (found[2], found[1]) if found else (None, parameter.help)
+    match = DEFAULT_IN_HELP.fullmatch(parameter.help)
+    decided, meaning = (match[2], match[1]) if match else (None, parameter.help)
     return {
         "name": parameter.name,
         "default": decided if parameter.default is None else parameter.default,

@@ -118,7 +118,7 @@ def decimals_parameter(help_: str) -> Parameter:
     return Parameter("Q", None, help_, integer("Q", 0, MAX_DECIMALS))
 
 
-def chosen_of(presets: Presets, params: Params) -> Settings:
+def preset_values(presets: Presets, params: Params) -> Settings:
     """Values of a preset, each replaced by the caller's where given."""
     values = presets[params["preset"]].items()
     return {name: value if params[name] is None else params[name] for name, value in values}

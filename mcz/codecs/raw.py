@@ -1,4 +1,4 @@
-"""Codec raw, ``raw``: grid ordinals in as few whole bytes as they need.
+"""Codec 0, ``raw``: grid ordinals in as few whole bytes as they need.
 
 SPEC.md, "Codec 0: raw", is normative; the names below are its field names.
 
@@ -18,14 +18,14 @@ from mcz.codecs.contract import (
     Encoded,
     Fetch,
     Layout,
-    Recoding,
+    RecodeRequest,
     Request,
     SignalSource,
     Span,
     refuse_extras,
 )
 from mcz.codecs.parameters import Parameter, integer
-from mcz.codecs.segments import Sizing, gather, guessing
+from mcz.codecs.segments import Sizing, gather, segments_by_guess
 from mcz.errors import FormatError
 from mcz.types import Params
 
@@ -42,7 +42,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
         ordinals = source.ordinals(first, stop)
         return lambda: tuple(_build(ordinals[:, list(group)]) for group in source.layout.groups)
 
-    return Encoded(b"", guessing(source, params["segment_frames"], SIZING, prepare))
+    return Encoded(b"", segments_by_guess(source, params["segment_frames"], SIZING, prepare))
 
 
 def _build(ordinals: NDArray[np.int64]) -> bytes:
@@ -57,7 +57,7 @@ def _build(ordinals: NDArray[np.int64]) -> bytes:
     return b"".join(parts)
 
 
-def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of some groups with new values."""
     groups = [list(asked.source.layout.groups[group]) for group in asked.groups]
     for span in asked.spans:

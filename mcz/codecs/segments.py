@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.ahead import Ahead, Prepare
 from mcz.codecs.contract import Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.parameters import Parameter, integer
 from mcz.errors import MotionError
 from mcz.motion import Skeleton
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
 SEGMENT_FRAMES = 4096  # where that leaves it open
@@ -25,6 +30,16 @@ SEGMENT_FRAMES_PARAMETER = Parameter(
 )
 
 
+def lossless_segment_frames(size: str, most: int) -> Parameter:
+    """Parameter of the segment length, at most ``most`` frames; 0 means about ``size`` bytes."""
+    return Parameter(
+        "segment_frames",
+        0,
+        f"frames a segment; 0: as many as make about {size} bytes",
+        integer("segment_frames", 0, most),
+    )
+
+
 def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool = False) -> int:
     """Frames a segment, 0: the size decides; published methods take the whole clip at once."""
     if given is None:
@@ -33,6 +48,8 @@ def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool =
 
 
 Streams = tuple[bytes, ...]
+Frames = tuple[int, int]  # first <= f < stop
+Prepare = Callable[[int, int], Callable[[], Streams]]  # takes frames; the rest may be done anywhere
 Code = Callable[[int, int], Streams]  # frames first <= f < stop -> the streams of their segment
 
 
@@ -55,7 +72,7 @@ class Lengths:
         return shorter if self.least <= shorter < length else length
 
 
-def halving(
+def segments_by_halving(
     n_frames: int, lengths: Lengths, code: Code, breaks: Sequence[int] = ()
 ) -> Iterator[tuple[int, int, Streams]]:
     """Segments first <= f < stop of a signal of ``n_frames``, and their streams.
@@ -91,7 +108,39 @@ class Sizing:
     full: bool = False
 
 
-def guessing(
+class SegmentPrefetch(AbstractContextManager["SegmentPrefetch"]):
+    """Codes a requested segment while other threads code those likely to be next."""
+
+    def __init__(self, prepare: Prepare, threads: int) -> None:
+        self._prepare = prepare
+        self._threads = threads
+        self._pool: ThreadPoolExecutor | None = None
+        self._pending: dict[Frames, Future[Streams]] = {}
+
+    def code(self, span: Frames, following: Iterator[Frames]) -> Streams:
+        """The streams of ``span``. Nothing depends on ``following`` but how long it takes."""
+        if self._threads < 2:
+            return self._prepare(*span)()
+        due = [span, *islice(following, self._threads)]
+        if self._pool is None:
+            if len(due) < 2:
+                return self._prepare(*span)()
+            from concurrent.futures import ThreadPoolExecutor  # on first use
+
+            self._pool = ThreadPoolExecutor(self._threads)
+        for other in self._pending.keys() - set(due):
+            self._pending.pop(other).cancel()
+        for other in due:
+            if other not in self._pending:
+                self._pending[other] = self._pool.submit(self._prepare(*other))
+        return self._pending.pop(span).result()
+
+    def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+
+
+def segments_by_guess(
     source: SignalSource, fixed: int, sizing: Sizing, prepare: Prepare, threads: int = 1
 ) -> Iterator[Segment]:
     """Segments of ``fixed`` frames, or, where that is 0, of as many as their size allows.
@@ -105,13 +154,13 @@ def guessing(
     most = min(layout.most_frames, max(1, sizing.most_rows // layout.samples_per_frame))
     guess = fixed or max(1, int(sizing.target / (sizing.value_bytes * per_frame)))
     first, limit, grows = 0, most, sizing.full and not fixed
-    with Ahead(prepare, threads) as ahead:
+    with SegmentPrefetch(prepare, threads) as prefetch:
         while first < layout.n_frames:
             longest = min(limit, guess if fixed else guess * 11 // 10)
             spans = _spans(first, min(guess, limit), longest, ends)
             span = next(spans)
             n_frames = span[1] - first
-            streams = ahead.code(span, spans)
+            streams = prefetch.code(span, spans)
             size = _size(streams) + sizing.spare
             fitting = n_frames * sizing.target // size if size else guess
             if size > sizing.most and n_frames > 1 and not fixed:

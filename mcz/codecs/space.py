@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.basis_models import MAX_POINTS, Basis, Head, find_bases
 from mcz.codecs.contract import ID_SIZE, Layout, Span
-from mcz.codecs.steps import ratio_of
+from mcz.codecs.step_codes import ratio_of
 from mcz.coding.space_kernels import Transform
 from mcz.errors import FormatError
 from mcz.schema import Checked, Exactly, Record, bounded, counted, field, one_of

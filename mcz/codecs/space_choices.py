@@ -19,14 +19,15 @@ from mcz.angles import Unwrapper
 from mcz.codecs.basis_models import (
     MAX_POINTS,
     Basis,
+    build_model,
     falling_digits,
     known_models,
-    model_of,
     parse_bases,
     read_bases,
-    rounded,
+    round_vectors,
 )
-from mcz.codecs.contract import Layout, Model, SignalSource, id_of
+from mcz.codecs.channel_weights import RULES, weights_of
+from mcz.codecs.contract import Layout, Model, SignalSource, model_id
 from mcz.codecs.gaps import fill_gaps
 from mcz.codecs.parameters import Parameter, choice, in_range, integer, number
 from mcz.codecs.segments import skeleton_of
@@ -39,8 +40,7 @@ from mcz.codecs.space import (
     SpaceFields,
     columns_of,
 )
-from mcz.codecs.steps import code_of, ratio_of
-from mcz.codecs.weights import RULES, weights_of
+from mcz.codecs.step_codes import code_of, ratio_of
 from mcz.errors import (
     AccessError,
     MotionError,
@@ -71,7 +71,7 @@ def cosines(block: Floats) -> Floats:
     return dct_matrix(len(block)) @ block
 
 
-def changes(block: Floats) -> Floats:
+def frame_differences(block: Floats) -> Floats:
     """Differences between consecutive frames of a block."""
     return np.asarray(np.diff(block, axis=0), np.float64)
 
@@ -177,15 +177,15 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
         candidates.append((Choice(fields), [dct_matrix(n) for n in n_points]))
     known = [m for m in known_models().values() if _fits(m, n_points)] if which != "learned" else []
     if which in ("auto", "known"):
-        candidates += [(_with(fields, known=model), _vectors(model)) for model in known]
+        candidates += [(_with_model(fields, known=model), _vectors(model)) for model in known]
     if len(frames) and (which == "learned" or (which == "auto" and not known)):
-        model = learned(sample)
-        candidates.append((_with(fields, model=model), _vectors(model)))
+        model = learn_model(sample)
+        candidates.append((_with_model(fields, model=model), _vectors(model)))
     if which not in WHICH:
         model = _read(which)
         if not _fits(model, n_points):
             raise OptionError(f"{name}: the bases of {which} do not fit {n_points} points")
-        candidates.append((_with(fields, model=model), _vectors(model)))
+        candidates.append((_with_model(fields, model=model), _vectors(model)))
     if not candidates:
         raise OptionError(f"{name}: there are no well-known bases of {n_points} points")
     if len(candidates) == 1:
@@ -202,7 +202,7 @@ def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Ch
     if step is None:
         raise OptionError(f"{name}: the step has to be given, for no frame is known yet")
     sample, which = live_sample(name, layout, which)
-    return choose_space(name, sample, step, which, changes)
+    return choose_space(name, sample, step, which, frame_differences)
 
 
 def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
@@ -214,20 +214,22 @@ def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
     if n_points > MAX_POINTS:
         raise MotionError(f"{name}: {n_points} points, at most {MAX_POINTS} in a matrix")
     sample = _sample(skeleton, [np.zeros((1, layout.n_channels))], 0)
-    return sample, at_hand(sample) if which == "auto" else which
+    return sample, basis_at_hand(sample) if which == "auto" else which
 
 
-def at_hand(sample: Sample) -> str:
+def basis_at_hand(sample: Sample) -> str:
     """The bases that need no look at the motion: well-known ones where some fit, or cosines."""
     n_points = [part.shape[1] for part in sample.matrices(sample.frames)]
     fits = any(_fits(model, n_points) for model in known_models().values())
     return "known" if fits else "cosines"
 
 
-def _with(fields: SpaceFields, model: Model | None = None, known: Model | None = None) -> Choice:
+def _with_model(
+    fields: SpaceFields, model: Model | None = None, known: Model | None = None
+) -> Choice:
     used = model or known
     assert used is not None
-    fields = replace(fields, basis=LEARNED, model=id_of(used))
+    fields = replace(fields, basis=LEARNED, model=model_id(used))
     return Choice(fields, (model,) if model else (), (known,) if known else ())
 
 
@@ -247,19 +249,19 @@ def _vectors(model: Model) -> list[Floats]:
     return [basis.vectors for basis in parse_bases(model.data)]
 
 
-def learned(sample: Sample) -> Model:
+def learn_model(sample: Sample) -> Model:
     """Bases of the changes from frame to frame, made once for the same sample.
 
     Of a single frame there are none, and it is taken itself.
     """
-    steps = np.concatenate([changes(block) for block in sample.blocks])
+    steps = np.concatenate([frame_differences(block) for block in sample.blocks])
     if not len(steps):
         steps = sample.frames
     digest = hashlib.sha256(steps.tobytes()).digest()
-    return _learned(digest, _Held(steps), sample.apart)
+    return _learn_cached(digest, _SampleKey(steps), sample.apart)
 
 
-class _Held:
+class _SampleKey:
     """Steps that leave it to the digest to tell them apart in the key of a cache."""
 
     def __init__(self, steps: Floats) -> None:
@@ -269,26 +271,26 @@ class _Held:
         return 0
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held)
+        return isinstance(other, _SampleKey)
 
 
 @lru_cache(maxsize=4)
-def _learned(_digest: bytes, held: _Held, apart: bool) -> Model:
+def _learn_cached(_digest: bytes, held: _SampleKey, apart: bool) -> Model:
     from mcz.transforms.lsdt import learn_basis
 
     bases: list[Basis | Floats] = []
     for columns in columns_of(held.steps.shape[1], apart=apart):
         points = held.steps[:, columns]
-        found = learn_basis(
+        learned_basis = learn_basis(
             points,
             sparsity=min(SPARSITY, points.shape[1]),
             iterations=ITERATIONS,
             growth=0,
             start=np.ascontiguousarray(np.linalg.eigh(points.T @ points)[1].T),
         )
-        digits = falling_digits(len(found.basis), MOST_DIGITS, LEAST_DIGITS)
-        bases.append(rounded(found.basis, digits))
-    return model_of(bases)
+        digits = falling_digits(len(learned_basis.basis), MOST_DIGITS, LEAST_DIGITS)
+        bases.append(round_vectors(learned_basis.basis, digits))
+    return build_model(bases)
 
 
 def _expected_bytes(
@@ -349,10 +351,10 @@ DOMAIN = Parameter(
 
 def _flag(text: object) -> bool:
     words = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-    found = words.get(str(text).lower())
-    if found is None:
+    flag = words.get(str(text).lower())
+    if flag is None:
         raise OptionError(f"virtual_markers is {text!r}, neither true nor false")
-    return found
+    return flag
 
 
 VIRTUAL_MARKERS = Parameter(

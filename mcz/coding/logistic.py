@@ -40,8 +40,8 @@ def stretch_table() -> Ints:
     """stretch at index p >> 4: the least x in -2047 to 2047 whose squash is >= 16 (p >> 4) + 8."""
     reachable = squash_table()[1:]  # x from -2047
     wanted = 16 * np.arange(4096) + 8  # RANGE-05
-    found: Ints = np.searchsorted(reachable, wanted) - LIMIT
-    return np.minimum(found, LIMIT)
+    table: Ints = np.searchsorted(reachable, wanted) - LIMIT
+    return np.minimum(table, LIMIT)
 
 
 @cache

@@ -49,8 +49,8 @@ def code_first(state: Ints, data: Bytes, value: int) -> int:
         return FAULT
     if length == 0:
         return 0
-    found = 1 << (length - 1) | number(state, data, abs(value), length - 1)  # QBC-17
-    return -found if number(state, data, 1 if value < 0 else 0, 1) else found  # QBC-17
+    size = 1 << (length - 1) | number(state, data, abs(value), length - 1)  # QBC-17
+    return -size if number(state, data, 1 if value < 0 else 0, 1) else size  # QBC-17
 
 
 def code_residual(
@@ -134,17 +134,17 @@ def code_size(
     contexts, mixers = first
     f, s = clamp(length - octave(kf) + 4, 0, 15), clamp(length - octave(ks) + 4, 0, 15)
     e, qf, qs = min(length, 31), kf & 3, ks & 3
-    found = 1
+    code = 1
     if length > 1:
         at = contexts + C_SECOND
         a, b = at + 4 * f + qf, at + 64 + 4 * s + qs  # RESID-01
         bit = size >> (length - 2) & 1
-        found = 2 + mixed(state, data, bit, mixers + M_SECOND, a, b, at + 128 + e)
+        code = 2 + mixed(state, data, bit, mixers + M_SECOND, a, b, at + 128 + e)
     if length > 2:
-        at = contexts + C_THIRD + (found & 1)
+        at = contexts + C_THIRD + (code & 1)
         a, b = at + 8 * f + 2 * qf, at + 128 + 8 * s + 2 * qs  # RESID-01
         bit = size >> (length - 3) & 1
-        found = 2 * found + mixed(state, data, bit, mixers + M_THIRD, a, b, at + 256 + 2 * e)
+        code = 2 * code + mixed(state, data, bit, mixers + M_THIRD, a, b, at + 256 + 2 * e)
     if length > 3:
-        found = found << (length - 3) | number(state, data, size, length - 3)
-    return found
+        code = code << (length - 3) | number(state, data, size, length - 3)
+    return code

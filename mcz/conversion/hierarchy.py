@@ -10,7 +10,7 @@ from mcz.conversion.losses import first_gap
 from mcz.errors import MotionError
 from mcz.formats.bvh import with_positions
 from mcz.kinematics import point_set
-from mcz.kinematics.chain import Chain, Floats, times
+from mcz.kinematics.chain import Chain, Floats, multiply_matrices
 from mcz.kinematics.euler import euler_angles, euler_order
 from mcz.motion import (
     ORIGIN,
@@ -167,7 +167,7 @@ def _angles(skeleton: Skeleton, index: int, values: Floats) -> tuple[str, Floats
         return "zyx", np.zeros((len(values), 3))
     turns = part.pose(columns).axes[0]
     if part.turned[0] is not None:
-        turns = times(turns, part.turned[0].T[:, :, None])
+        turns = multiply_matrices(turns, part.turned[0].T[:, :, None])
     order = euler_order(turns)
     angles = euler_angles(turns, order)
     return order, np.rad2deg(np.where(np.abs(angles) < TINY, 0.0, angles))

@@ -12,7 +12,7 @@ from mcz.formats.c3d_plain import KNOWN
 from mcz.formats.c3d_recording import Recording, parameters_of
 from mcz.formats.table_signals import text_columns
 from mcz.kinematics import point_set
-from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion
 from mcz.reading.source_info import recording
 

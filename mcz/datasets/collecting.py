@@ -20,7 +20,12 @@ from mcz.datasets.sources import MOST_OPEN, Recipe
 from mcz.datasets.windows import Dataset, Settings
 from mcz.errors import MczError, OptionError
 from mcz.motion import frame_rate_of
-from mcz.poses.resampling import MOST_VALUES, frames_within, resampled_frames, too_many
+from mcz.poses.resampling import (
+    MOST_VALUES,
+    count_resampled_frames,
+    frames_within,
+    too_many_frames_error,
+)
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, is_source, open
@@ -167,7 +172,7 @@ def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> 
     if part is not None and not member.is_even:
         frames, _ = frames_within(part, rate, (0, member.n_source))
         if frames.stop > MOST_VALUES:
-            raise too_many(part, rate)
+            raise too_many_frames_error(part, rate)
         return len(frames)
     if member.source_rate is None:
         raise OptionError(
@@ -175,7 +180,7 @@ def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> 
             path=member.target,
             clip=member.clip,
         )
-    return resampled_frames(member.n_source, member.source_rate, rate)
+    return count_resampled_frames(member.n_source, member.source_rate, rate)
 
 
 class _Agreement:

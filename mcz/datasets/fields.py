@@ -14,10 +14,10 @@ from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.frames import FramePoses
 from mcz.motion import Skeleton
-from mcz.poses.changes import accelerations_of, velocities_of
 from mcz.poses.conversions import from_matrices
-from mcz.poses.moving import joint_numbers, scale_to
-from mcz.poses.places import chosen_points, point_names
+from mcz.poses.derivatives import accelerations_of, velocities_of
+from mcz.poses.motion_like import joint_numbers, scale_to
+from mcz.poses.trajectories import chosen_points, point_names
 from mcz.skeleton import Joints, joint_columns
 from mcz.types import Reals
 

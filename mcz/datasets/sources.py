@@ -18,8 +18,8 @@ from mcz.datasets.caches import Arrays
 from mcz.datasets.fields import Field, Rows, Subject, features_of, subject_of
 from mcz.datasets.members import Member
 from mcz.kinematics.chain import Floats
-from mcz.poses.moving import values_of
-from mcz.poses.resampling import frames_within, resampled, times_at, turn_scalars
+from mcz.poses.motion_like import values_of
+from mcz.poses.resampling import frames_within, resample_rows, times_at, turn_scalars
 from mcz.poses.scalar_quaternions import scalar_quaternions
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
@@ -175,7 +175,7 @@ def _values(
         first, last = max(0, first - 1), min(member.n_source, last + 1)
     old = values_of(clip, (member.first + first, member.first + last), needed)
     times = replace(times, before=times.before - first)
-    new = resampled(clip.skeleton, old, times)
+    new = resample_rows(clip.skeleton, old, times)
     if times.share.any():
         turn_scalars(scalar_quaternions(clip.skeleton, None, old), old, new, times)
     return new

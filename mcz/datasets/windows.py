@@ -21,7 +21,7 @@ from mcz.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler, WindowS
 from mcz.datasets.sources import BLOCK, Recipe, Sources, timeline_of_member
 from mcz.errors import OptionError, OutOfRangeError
 from mcz.indexing import row_numbers
-from mcz.poses.conversions import continuous
+from mcz.poses.conversions import continuous_signs
 from mcz.reading.file import File
 from mcz.types import JsonObject, Reals
 
@@ -226,7 +226,7 @@ class Dataset:
     def _finish(self, name: str, array: Reals) -> None:
         """Give quaternions the signs that keep them together, whichever blocks they are from."""
         if FIELDS[name].signed:
-            array[:] = continuous(np.asarray(array, np.float64))
+            array[:] = continuous_signs(np.asarray(array, np.float64))
 
     def _parts(self, member: Member, start: int, stop: int) -> dict[str, list[Reals]]:
         """The arrays of frames of a clip as parts of blocks, which nobody may change."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcz.codecs.contract import Codec, Recoding, Request
+from mcz.codecs.contract import Codec, RecodeRequest, Request
 from mcz.codecs.parameters import TARGETS
 from mcz.editing.cutting import coded_together, groups_of
 from mcz.errors import MotionError, OptionError
@@ -269,7 +269,9 @@ def _streams(
     """The streams of ``groups`` in all segments."""
     assert info.codec.recode is not None
     spans, options = info.spans, recorded_options(info.codec, clip.quality or {})
-    coded = info.codec.recode(Recoding(info.header, source, groups, spans, options, reader.fetch))
+    coded = info.codec.recode(
+        RecodeRequest(info.header, source, groups, spans, options, reader.fetch)
+    )
     return {
         (number, group): streams[at :: len(groups)]
         for number, streams in enumerate(coded)

@@ -135,10 +135,10 @@ def changed_source(digests: dict[str, str]) -> str:
     """
     for path, digest in digests.items():
         try:
-            found = _digest(PACKAGE / path)
+            current = _digest(PACKAGE / path)
         except OSError:
             continue
-        if found != digest:
+        if current != digest:
             return path
     return ""
 

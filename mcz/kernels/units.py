@@ -60,7 +60,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     ),
     "motion": (
         "mcz.conversion.scenes.key_kernels",
-        "mcz.kinematics.single_kernels",
+        "mcz.kinematics.frame_kernels",
         "mcz.recovery.kernels",
         "mcz.transforms.post_filter_kernels",
     ),

@@ -158,7 +158,7 @@ class Chain:
         turns += [(VECTOR, min(vector))] if vector else []
         turns.sort(key=itemgetter(1))
         back = None if matrix is None else matrix.T
-        tails = tuple(_back(back, np.array(tail)) for tail in joint.tails)
+        tails = tuple(_to_local(back, np.array(tail)) for tail in joint.tails)
         length = float(np.sqrt(tails[0] @ tails[0])) if tails else 0.0
         return Link(
             parent=joint.parent,
@@ -203,8 +203,8 @@ class Chain:
             return arm, arm, IDENTITY if link.change is None else link.change
         above = pose.axes[link.parent]
         scaled = self.scaled(self.links[link.parent], arm, columns)
-        origin = pose.origins[link.parent] + along(above, scaled)
-        return arm, origin, above if link.change is None else times(above, link.change)
+        origin = pose.origins[link.parent] + to_world(above, scaled)
+        return arm, origin, above if link.change is None else multiply_matrices(above, link.change)
 
     def add(
         self, pose: Pose, link: Link, hung: tuple[Floats, Floats, Floats], columns: Floats
@@ -225,11 +225,11 @@ class Chain:
                 axes = self._quaternion(axes, columns[list(link.quaternion)], spins)
             elif axis == VECTOR:
                 vectors = columns[list(link.vector)] * self.radians
-                spins += [along(axes, spin) for spin in spins_of_vectors(vectors).swapaxes(0, 1)]
-                axes = times(axes, matrices_of_vectors(vectors))
+                spins += [to_world(axes, spin) for spin in spins_of_vectors(vectors).swapaxes(0, 1)]
+                axes = multiply_matrices(axes, matrices_of_vectors(vectors))
             else:
                 spins.append(axes[:, axis])
-                axes = turned(axes, axis, columns[column] * self.radians)
+                axes = rotate_axes(axes, axis, columns[column] * self.radians)
         return axes
 
     def _arm(self, link: Link, columns: Floats) -> Floats:
@@ -242,7 +242,7 @@ class Chain:
             for component, column in link.moves:
                 arm[component] += columns[column]
         if link.parent_back is not None:
-            arm = times(link.parent_back[:, :, None], arm[:, None])[:, 0]
+            arm = multiply_matrices(link.parent_back[:, :, None], arm[:, None])[:, 0]
         if link.parent >= 0:
             arm = self.lengthened(self.links[link.parent], arm, columns)
         return arm
@@ -268,7 +268,7 @@ class Chain:
         """The position of a tail of ``joint`` in the world, (3, F) or (3, 1)."""
         link = self.links[joint]
         vector = self.lengthened(link, link.tails[k][:, None], columns)
-        return pose.origins[joint] + along(pose.axes[joint], self.scaled(link, vector, columns))
+        return pose.origins[joint] + to_world(pose.axes[joint], self.scaled(link, vector, columns))
 
     @staticmethod
     def _quaternion(axes: Floats, parts: Floats, spins: list[Floats]) -> Floats:
@@ -281,14 +281,14 @@ class Chain:
         # 2 Im(e conj(q)) / |q|^2 is the rotation vector of a change of q along e, before q.
         two = 2.0 / square
         changes = ((-x, -y, -z), (w, z, -y), (-z, w, x), (y, -x, w))
-        spins += [along(axes, np.stack(vector) * two) for vector in changes]
-        return times(axes, matrices_of_quaternions(parts))
+        spins += [to_world(axes, np.stack(vector) * two) for vector in changes]
+        return multiply_matrices(axes, matrices_of_quaternions(parts))
 
 
 IDENTITY: Floats = np.eye(3)[:, :, None]
 
 
-class Same:
+class SkeletonKey:
     """A skeleton as a key: the very same object, for comparing thousands of joints takes long."""
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -298,16 +298,16 @@ class Same:
         return id(self.skeleton)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Same) and other.skeleton is self.skeleton
+        return isinstance(other, SkeletonKey) and other.skeleton is self.skeleton
 
 
 def chain_of(skeleton: Skeleton) -> Chain:
     """``Chain(skeleton)``, prepared once where it is asked for block after block."""
-    return _chain_of(Same(skeleton))
+    return _chain_of(SkeletonKey(skeleton))
 
 
 @lru_cache(maxsize=4)
-def _chain_of(key: Same) -> Chain:
+def _chain_of(key: SkeletonKey) -> Chain:
     return Chain(key.skeleton)
 
 
@@ -317,7 +317,7 @@ def _components(
     return tuple((names.index(kind), start + k) for k, kind in enumerate(kinds) if kind in names)
 
 
-def _back(back: Floats | None, vector: Floats) -> Floats:
+def _to_local(back: Floats | None, vector: Floats) -> Floats:
     """``vector`` along the local axes, (3,)."""
     return vector if back is None else back @ vector
 
@@ -329,11 +329,11 @@ def orientation(joint: Joint, radians: float) -> Floats | None:
     matrix = IDENTITY
     for letter in reversed(joint.axis_order):  # about fixed axes: the last is outermost
         k = "XYZ".index(letter)
-        matrix = turned(matrix, k, np.array([joint.axis[k] * radians]))
+        matrix = rotate_axes(matrix, k, np.array([joint.axis[k] * radians]))
     return matrix[:, :, 0]
 
 
-def turned(axes: Floats, axis: int, angle: Floats) -> Floats:
+def rotate_axes(axes: Floats, axis: int, angle: Floats) -> Floats:
     """``axes`` R, R the rotation by ``angle`` in radians, (F,), about axis 0, 1 or 2."""
     j, k = (axis + 1) % 3, (axis + 2) % 3
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -346,7 +346,7 @@ def turned(axes: Floats, axis: int, angle: Floats) -> Floats:
     return result
 
 
-def times(left: Floats, right: Floats) -> Floats:
+def multiply_matrices(left: Floats, right: Floats) -> Floats:
     """The products of matrices, (3, 3, F or 1) by (3, n, F or 1)."""
     result: Floats = (
         left[:, 0, None] * right[None, 0]
@@ -356,7 +356,7 @@ def times(left: Floats, right: Floats) -> Floats:
     return result
 
 
-def along(axes: Floats, vector: Floats) -> Floats:
+def to_world(axes: Floats, vector: Floats) -> Floats:
     """The vector whose components along ``axes``, (3, 3, F), are ``vector``, (3, F or 1)."""
     result: Floats = axes[:, 0] * vector[0] + axes[:, 1] * vector[1] + axes[:, 2] * vector[2]
     return result

@@ -17,7 +17,7 @@ from mcz.brief import brief, counted
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.feet import feet_of
+from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import first_points, positions_of
 from mcz.motion import Motion, Skeleton
 from mcz.skeleton import column_of, signs_of
@@ -138,8 +138,8 @@ class FootTracks:
     def __init__(
         self, skeleton: Skeleton, joints: Sequence[int | str] | None, n_frames: int
     ) -> None:
-        found = feet_of(skeleton) if joints is None else [skeleton.find(j) for j in joints]
-        if not found:
+        indices = find_feet(skeleton) if joints is None else [skeleton.find(j) for j in joints]
+        if not indices:
             raise MotionError(
                 f"skeleton {skeleton.name!r}: none of its {counted(skeleton.n_joints, 'joint')} is "
                 "a foot by its name",
@@ -152,9 +152,9 @@ class FootTracks:
                 hint=Hint.UNIT,
             )
         addresses, firsts = skeleton.addresses(), first_points(skeleton)
-        self.joints = tuple(addresses[joint] for joint in dict.fromkeys(found))
+        self.joints = tuple(addresses[joint] for joint in dict.fromkeys(indices))
         self.unit_cm = skeleton.unit_cm
-        self._points = [firsts[joint] for joint in dict.fromkeys(found)]
+        self._points = [firsts[joint] for joint in dict.fromkeys(indices)]
         self.feet = np.full((len(self._points), n_frames, 3), np.nan)
         self.body = np.full((n_frames, 3), np.nan)
 
@@ -185,9 +185,9 @@ class FootTracks:
             runs=tuple(
                 Contact(joint, start + first, n_frames)
                 for joint, track in zip(self.joints, places, strict=True)
-                for floor in [floor_of(track, column_of(up), rule)]
+                for floor in [lowest_height(track, column_of(up), rule)]
                 for start, stop in parts
-                for first, n_frames in runs_of(
+                for first, n_frames in find_runs(
                     track[start:stop], frame_rate, column_of(up), rule, floor
                 )
             ),
@@ -219,20 +219,20 @@ def _means(points: Floats) -> Floats:
     return means
 
 
-def floor_of(track: Floats, up: int, rule: ContactRule = RULE) -> float | None:
+def lowest_height(track: Floats, up: int, rule: ContactRule = RULE) -> float | None:
     """The height of a point at its lowest, None where it is never known."""
     known: Flags = np.asarray(np.isfinite(track).all(axis=1))
     return float(np.percentile(track[known, up], rule.floor)) if known.any() else None
 
 
-def runs_of(
+def find_runs(
     track: Floats, rate: float, up: int, rule: ContactRule = RULE, floor: float | None = None
 ) -> Iterator[tuple[int, int]]:
     """First frame and number of frames of every contact of one point.
 
     ``track`` has its positions in cm, float64 (n_frames, 3), NaN where unknown; ``up`` is the
-    column of the axis that points up, ``rate`` in frames a second, ``floor`` as of ``floor_of``,
-    None: that of this track.
+    column of the up axis, ``rate`` in frames a second, ``floor`` a ``lowest_height``; None: that of
+    this track.
     """
     known: Flags = np.asarray(np.isfinite(track).all(axis=1))
     if not known.any():
@@ -243,7 +243,7 @@ def runs_of(
         height = track[:, up] - lowest
         surely = (speed < rule.speed) & (height < rule.height)
         perhaps = (speed < rule.wide_speed) & (height < rule.wide_height)
-    for first, stop in _joined(perhaps, known, frames_in(rule.gap, rate)):
+    for first, stop in _join_runs(perhaps, known, frames_in(rule.gap, rate)):
         if stop - first >= max(2, frames_in(rule.least, rate)) and surely[first:stop].any():
             yield first, stop - first
 
@@ -257,8 +257,8 @@ def speeds(track: Floats, rate: float, window: float) -> Floats:
     frames = np.arange(len(track))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(track) - 1)
     x, y, z = (track[after] - track[before]).T
-    found: Floats = np.sqrt(x * x + y * y + z * z) * rate / (after - before)
-    return found
+    speed: Floats = np.sqrt(x * x + y * y + z * z) * rate / (after - before)
+    return speed
 
 
 def frames_in(seconds: float, rate: float) -> int:
@@ -266,7 +266,7 @@ def frames_in(seconds: float, rate: float) -> int:
     return int(np.floor(seconds * rate + 0.5))
 
 
-def _joined(flags: Flags, known: Flags, gap: int) -> Iterator[tuple[int, int]]:
+def _join_runs(flags: Flags, known: Flags, gap: int) -> Iterator[tuple[int, int]]:
     """First frame and end of every run of ``flags``, runs with up to ``gap`` between them joined.
 
     What is between them must be ``known``.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kinematics.chain import Floats, turned
+from mcz.kinematics.chain import Floats, rotate_axes
 
 # The most common order of BVH files first.
 ORDERS = ("zyx", "zxy", "yxz", "xyz", "xzy", "yzx")
@@ -32,11 +32,11 @@ def euler_angles(turns: Floats, order: str) -> Floats:
     i, j, k = ("xyz".index(letter) for letter in order)
     sign = _sign(order)
     third = np.arctan2(-sign * turns[i, j], turns[i, i])
-    third = _held(third, np.hypot(turns[i, i], turns[i, j]) > LOCKED)
-    rest = turned(turns, k, -third)
+    third = _hold_last(third, np.hypot(turns[i, i], turns[i, j]) > LOCKED)
+    rest = rotate_axes(turns, k, -third)
     first = np.arctan2(sign * rest[k, j], rest[j, j])
     second = np.arctan2(sign * rest[i, k], rest[i, i])
-    return np.unwrap(nearest(np.stack([first, second, third], axis=1)), axis=0)
+    return np.unwrap(nearest_solutions(np.stack([first, second, third], axis=1)), axis=0)
 
 
 def _sign(order: str) -> float:
@@ -48,13 +48,13 @@ def _entry(turns: Floats, order: str, row: int, column: int) -> Floats:
     return entry
 
 
-def _held(angles: Floats, known: Floats) -> Floats:
+def _hold_last(angles: Floats, known: Floats) -> Floats:
     """``angles``, where not ``known`` those of the last frame that is, 0 before the first."""
     last = np.maximum.accumulate(np.where(known, np.arange(len(angles)), -1))
     return np.where(last >= 0, angles[last], 0.0)
 
 
-def nearest(angles: Floats) -> Floats:
+def nearest_solutions(angles: Floats) -> Floats:
     """Choose (a, b, c) or (a + pi, pi - b, c + pi) per frame, the one nearer to the frame before.
 
     Which of them is nearer does not depend on which of them the frame before took, as both change
@@ -65,5 +65,5 @@ def nearest(angles: Floats) -> Floats:
         np.abs(np.angle(np.exp(1j * (now[1:] - angles[:-1])))).sum(axis=1)
         for now in (angles, other)
     )
-    taken = np.concatenate([[False], np.cumsum(changes < stays) % 2 == 1])[: len(angles)]
-    return np.where(taken[:, None], other, angles)
+    is_other = np.concatenate([[False], np.cumsum(changes < stays) % 2 == 1])[: len(angles)]
+    return np.where(is_other[:, None], other, angles)

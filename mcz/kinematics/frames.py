@@ -10,10 +10,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from mcz.kinematics.chain import IDENTITY, Chain, Floats, Same
-from mcz.kinematics.points import forget, listed_points, point_position
-from mcz.kinematics.single_kernels import Joints, Points, place_frames, turn_frames
-from mcz.kinematics.tables import is_elaborate, tables_of
+from mcz.kinematics.chain import IDENTITY, Chain, Floats, SkeletonKey
+from mcz.kinematics.frame_kernels import Joints, Points, place_frames, turn_frames
+from mcz.kinematics.kernel_tables import is_elaborate, tables_of
+from mcz.kinematics.points import discard_infinite, listed_points, point_position
 from mcz.motion import Skeleton
 
 
@@ -38,12 +38,12 @@ class FramePoses:
 
     def above(self, joints: Sequence[int]) -> list[int]:
         """These joints and all above them, parents before children."""
-        found: set[int] = set()
+        ancestors: set[int] = set()
         for joint in joints:
-            while joint >= 0 and joint not in found:
-                found.add(joint)
+            while joint >= 0 and joint not in ancestors:
+                ancestors.add(joint)
                 joint = self.chain.links[joint].parent
-        return sorted(found)
+        return sorted(ancestors)
 
     def joints_of(self, points: Sequence[int]) -> list[int]:
         """The joints that the points are fastened to."""
@@ -70,7 +70,7 @@ class FramePoses:
             known = self._tables[1]
             chosen = Points(known.joints[list(points)], known.tails[list(points)])
             self._place(values, self.joints_of(points), chosen, out, np.empty((0, 0, 3, 3)))
-        forget(out)
+        discard_infinite(out)
         return out
 
     def origins(self, values: Floats, joints: Sequence[int]) -> Floats:
@@ -83,7 +83,7 @@ class FramePoses:
         else:
             chosen = Points(np.array(joints, np.int64), np.zeros((len(joints), 3)))
             self._place(values, joints, chosen, out, np.empty((0, 0, 3, 3)))
-        forget(out)
+        discard_infinite(out)
         return out
 
     def world(self, values: Floats, joints: Sequence[int]) -> Floats:
@@ -138,9 +138,9 @@ def _rows(values: Floats) -> Floats:
 
 def frame_poses_of(skeleton: Skeleton) -> FramePoses:
     """``FramePoses(skeleton)``, prepared once for a skeleton that is asked for again and again."""
-    return _frame_poses_of(Same(skeleton))
+    return _frame_poses_of(SkeletonKey(skeleton))
 
 
 @lru_cache(maxsize=8)
-def _frame_poses_of(key: Same) -> FramePoses:
+def _frame_poses_of(key: SkeletonKey) -> FramePoses:
     return FramePoses(key.skeleton)

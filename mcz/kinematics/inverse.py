@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from mcz.errors import MotionError
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.descent import refine
-from mcz.kinematics.euler import ORDERS, nearest
-from mcz.kinematics.guess import Guess
-from mcz.kinematics.nearest_turns import centered, small
+from mcz.kinematics.euler import ORDERS, nearest_solutions
+from mcz.kinematics.initial_pose import InitialPose
+from mcz.kinematics.rotation_fit import center_angles, smallest_angles
 from mcz.kinematics.rotation_vectors import continuous
 from mcz.kinematics.targets import Targets
 from mcz.motion import Skeleton
@@ -54,7 +54,7 @@ def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) 
     OptionError for virtual markers without a length unit.
     """
     targets = Targets(skeleton, markers=markers is not None)
-    seen, known = _seen(targets, points, markers)
+    seen, known = _targets_seen(targets, points, markers)
     if not seen.shape[2]:
         return np.zeros((0, skeleton.n_channels))
     return _Solution(targets, seen, known).values()
@@ -85,7 +85,7 @@ class _Solution:
         return np.ascontiguousarray(self.columns.T)
 
     def _guess(self) -> Floats:
-        guess, n_frames = Guess(self.targets), self.seen.shape[2]
+        guess, n_frames = InitialPose(self.targets), self.seen.shape[2]
         parts = [slice(start, start + GUESSED) for start in range(0, n_frames, GUESSED)]
         return np.concatenate(
             [guess.columns(self.seen[:, :, rows], self.known[:, rows]) for rows in parts], axis=1
@@ -100,13 +100,13 @@ class _Solution:
         return refine(self.targets, start, seen, known, prior, weight, steps)
 
     def _take(
-        self, found: tuple[Floats, Floats], limit: Floats | None, frames: Any = slice(None)
+        self, solution: tuple[Floats, Floats], limit: Floats | None, frames: Any = slice(None)
     ) -> None:
         """Take what was found for ``frames``, where its errors are within ``limit``."""
-        columns, errors = found
-        taken = np.ones(len(errors), np.bool_) if limit is None else errors <= limit
-        self.columns[:, frames] = np.where(taken, columns, self.columns[:, frames])
-        self.errors[frames] = np.where(taken, errors, self.errors[frames])
+        columns, errors = solution
+        accepted = np.ones(len(errors), np.bool_) if limit is None else errors <= limit
+        self.columns[:, frames] = np.where(accepted, columns, self.columns[:, frames])
+        self.errors[frames] = np.where(accepted, errors, self.errors[frames])
 
     def _again(self, weight: Floats) -> None:
         """Frames that ended far off start again from angles beside those where they ended."""
@@ -119,8 +119,8 @@ class _Solution:
             turning = np.concatenate([self.angles, self.vectors])
             beside = random.normal(0.0, BESIDE, (len(turning), len(frames)))
             start[turning] += beside / self.targets.chain.radians
-            found = self._refined(start, start, weight, MOST_STEPS, frames)
-            self._take(found, self.errors[frames], frames)
+            solution = self._refined(start, start, weight, MOST_STEPS, frames)
+            self._take(solution, self.errors[frames], frames)
 
     def _continue(self) -> None:
         """Make what turns continuous over time, by whole turns and by the other Euler angles."""
@@ -131,10 +131,10 @@ class _Solution:
                 self.columns[vector] = continuous(self.columns[vector] * radians) / radians
             angles = self.columns[columns].T * radians
             if link.freedoms in ORDERS:
-                angles = nearest(angles)
-                angles = small(np.unwrap(angles, axis=0))
+                angles = nearest_solutions(angles)
+                angles = smallest_angles(np.unwrap(angles, axis=0))
             else:
-                angles = centered(np.unwrap(angles, axis=0))
+                angles = center_angles(np.unwrap(angles, axis=0))
             self.columns[columns] = angles.T / radians
 
     def _mend(self, weight: Floats) -> None:
@@ -203,7 +203,9 @@ def _between(jumps: Ints, n_frames: int) -> NDArray[np.bool_]:
     return between
 
 
-def _seen(targets: Targets, points: Floats, markers: Floats | None) -> tuple[Floats, Floats]:
+def _targets_seen(
+    targets: Targets, points: Floats, markers: Floats | None
+) -> tuple[Floats, Floats]:
     """Positions (n_targets, 3, F), 0 where unknown, and 1 where known, else 0, (n_targets, F)."""
     skeleton = targets.skeleton
     n_markers = 0 if markers is None else 3 * skeleton.n_joints

@@ -46,14 +46,14 @@ def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
         samples_per_frame=first.samples_per_frame,
         mask=None if valid.all() else valid,
     )
-    made = replace(
+    markers = replace(
         motion,
         skeleton=marker_skeleton(skeleton, virtual_markers=virtual_markers),
         signals=(signal, *motion.signals[1:]),
         metadata=dict(motion.metadata) | {"source-note": _note(motion)},
         source=None,
     )
-    return made.at_times(motion.timeline)
+    return markers.at_times(motion.timeline)
 
 
 def marker_skeleton(

@@ -9,7 +9,7 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
-from mcz.kinematics.chain import Chain, Floats, Pose, chain_of, times
+from mcz.kinematics.chain import Chain, Floats, Pose, chain_of, multiply_matrices
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
@@ -53,7 +53,7 @@ def origins_of(skeleton: Skeleton, values: Floats) -> Floats:
     for rows, _, pose in chain_of(skeleton).poses(values):
         for joint, origin in enumerate(pose.origins):
             origins[rows, joint] = origin.T
-    forget(origins)
+    discard_infinite(origins)
     return origins
 
 
@@ -86,8 +86,8 @@ def places_of(
     skeleton: Skeleton, values: Floats, *, markers: bool = False, shell_cm: float | None = None
 ) -> Places:
     """``positions_of`` and, as wanted, the others, from one pass over the joints."""
-    found = _Positions(skeleton, values, points=True, markers=markers, shell_cm=shell_cm)
-    return Places(found.points, found.markers, found.shell)
+    positions = _Positions(skeleton, values, points=True, markers=markers, shell_cm=shell_cm)
+    return Places(positions.points, positions.markers, positions.shell)
 
 
 class _Positions:
@@ -128,8 +128,8 @@ class _Positions:
                 points[:, number] = point.T
             if first:
                 by_joint[:, joint] = (point[:, None] + self._distance * pose.axes[joint]).T
-        forget(points)
-        forget(markers)
+        discard_infinite(points)
+        discard_infinite(markers)
 
     def _place_shell(self, chain: Chain, rows: slice, pose: Pose) -> None:
         shell = self.shell[rows]
@@ -137,9 +137,11 @@ class _Positions:
         for joint, (origin, axes, own) in enumerate(
             zip(pose.origins, pose.axes, chain.turned, strict=True)
         ):
-            turned = axes if own is None else times(axes, own.T[:, :, None])  # W, as B = W C
+            turned = (
+                axes if own is None else multiply_matrices(axes, own.T[:, :, None])
+            )  # W, as B = W C
             by_joint[:, joint] = (origin[:, None] + self._radius * turned).T
-        forget(shell)
+        discard_infinite(shell)
 
 
 def marker_distance(skeleton: Skeleton) -> float:
@@ -170,7 +172,7 @@ def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
     return radius_cm / skeleton.unit_cm
 
 
-def forget(points: Floats) -> None:
+def discard_infinite(points: Floats) -> None:
     """Make points NaN of which not every coordinate, in the last axis, is finite."""
     points[~np.isfinite(points).all(axis=-1)] = np.nan
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mcz.errors import OptionError
-from mcz.kinematics.chain import Chain, Floats, Link, Pose, along
+from mcz.kinematics.chain import Chain, Floats, Link, Pose, to_world
 from mcz.kinematics.points import point_position, points_of
 from mcz.motion import Skeleton
 
@@ -94,7 +94,7 @@ class _Block:
         trace = moment[0, 0] + moment[1, 1] + moment[2, 2]
         for column, spin in zip(link.turning, self.pose.spins[joint], strict=True):
             a = spin if column in link.quaternion else spin * self.chain.radians
-            yield column, trace * (a * a).sum(axis=0) - (a * along(moment, a)).sum(axis=0)
+            yield column, trace * (a * a).sum(axis=0) - (a * to_world(moment, a)).sum(axis=0)
 
     def _moves(self, joint: int, link: Link) -> Iterator[tuple[int, Floats]]:
         """Positions: every point below moves alike, as far as the parent's scale makes it."""

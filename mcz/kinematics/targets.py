@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.kinematics.chain import Chain, Floats, Link, Pose, along
+from mcz.kinematics.chain import Chain, Floats, Link, Pose, to_world
 from mcz.kinematics.points import marker_distance, point_position, points_of, reach
 from mcz.motion import Skeleton
 
@@ -93,7 +93,7 @@ class Targets:
 
     def jacobian(self, columns: Floats, pose: Pose, positions: Floats) -> Floats:
         """d positions / d channels for a step of ``units``, (n_channels, n_targets, 3, F)."""
-        made = np.zeros((self.skeleton.n_channels, *positions.shape))
+        jacobian = np.zeros((self.skeleton.n_channels, *positions.shape))
         for joint, link in enumerate(self.chain.links):
             numbers = self.below[joint]
             if not len(numbers):
@@ -101,12 +101,12 @@ class Targets:
             if link.turns:
                 arms = positions[numbers] - pose.origins[joint]
                 for column, spin in zip(link.turning, pose.spins[joint], strict=True):
-                    made[column, numbers] = _cross(spin / self.lever, arms)
+                    jacobian[column, numbers] = _cross(spin / self.lever, arms)
             for column, step in self._moves(link, columns, pose):
-                made[column, numbers] = step
+                jacobian[column, numbers] = step
             for column, some, step in self._stretches(joint, link, columns, pose):
-                made[column, some] += step
-        return made
+                jacobian[column, some] += step
+        return jacobian
 
     def _moves(self, link: Link, columns: Floats, pose: Pose) -> Iterator[tuple[int, Floats]]:
         for component, column in link.moves:
@@ -116,7 +116,7 @@ class Targets:
                 if link.parent_back is not None:
                     step = link.parent_back @ step
                 step = self.chain.scaled(self.chain.links[link.parent], step, columns)
-                step = along(pose.axes[link.parent], step)
+                step = to_world(pose.axes[link.parent], step)
             yield column, step
 
     def _stretches(
@@ -131,7 +131,7 @@ class Targets:
             for tail, fastened in self._fastened(joint, link)
         }
         if link.direction is not None:
-            step = along(axes, self.chain.scaled(link, link.direction[:, None], columns))
+            step = to_world(axes, self.chain.scaled(link, link.direction[:, None], columns))
             moved = [*tails.values(), *(self.below[child] for child in self.children[joint])]
             for column in link.lengths:
                 for some in moved:

@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_id
+from mcz.codecs import codec_by_id
 from mcz.codecs.contract import LiveDecoder
 from mcz.codecs.known_answers import check_known_answer
 from mcz.container import payloads
@@ -51,7 +51,7 @@ def needs(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
         yield ChunkType.SRCE, fields.source.template
     for signal in fields.signals:
         with suppress(FormatError):  # it is said when the signal is read
-            uses = by_id(signal.codec, signal.codec_version, signal.preset).uses
+            uses = codec_by_id(signal.codec, signal.codec_version, signal.preset).uses
             for id_ in () if uses is None else uses(bytes(signal.header)):
                 yield ChunkType.MODL, id_
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container.writer import Sink
 from mcz.errors import OptionError, SourceError
 from mcz.formats import FORMATS, likely_formats
@@ -129,7 +129,7 @@ def codes_live(codec: str, params: Params) -> bool:
 
     Raises OptionError for a codec or a parameter that there is not.
     """
-    found = by_name(codec)
+    found = codec_by_name(codec)
     if found.live is None:
         return False
     options = found.options(params)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import brief
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container.chunks import REPEATED, ChunkFlag, ChunkType
 from mcz.container.masks import build_mask
@@ -24,8 +24,8 @@ from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
 from mcz.interrupts import held
+from mcz.kinematics.frame_positions import FramePositions
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
-from mcz.kinematics.single import FramePositions
 from mcz.live.figures import Figures
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.reading.stored_clip import with_indices
@@ -120,7 +120,7 @@ class LiveWriter:
         self.entry: int | None = None
         self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
         self._repeated_at = 0  # frame
-        self.codec = by_name(codec)
+        self.codec = codec_by_name(codec)
         self.options = self.codec.options(params)
         self.traffic = LiveTraffic(asked=self.options.get("bitrate"))
         self._rate = frame_rate

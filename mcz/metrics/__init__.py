@@ -6,8 +6,8 @@ agree between machines to about 1e-9, not to the last bit.
 
 from __future__ import annotations
 
-from mcz.metrics.comparing import compare
-from mcz.metrics.comparison import Comparison, JointFigures
+from mcz.metrics.comparison import compare
+from mcz.metrics.figures import Comparison, JointFigures
 from mcz.metrics.sliding import ContactSlide, Sliding
 
 __all__ = ["Comparison", "ContactSlide", "JointFigures", "Sliding", "compare"]

@@ -66,7 +66,7 @@ class Sliding:
 
 
 @dataclass(frozen=True, slots=True)
-class _Measured:
+class _ContactDistances:
     """Distances of a contact after its first frame, NaN where unknown, and both path lengths."""
 
     run: Contact
@@ -94,7 +94,7 @@ def sliding(contacts: Contacts, ours: FootTracks, theirs: FootTracks) -> Sliding
     Both have the same joints in length units of the original; ``contacts`` may be of fewer.
     """
     with np.errstate(all="ignore"):  # what overflows is no figure
-        measured = list(_measured(contacts, ours, theirs))
+        measured = list(_measure_contacts(contacts, ours, theirs))
         slides = tuple(each.slide() for each in measured)
         apart = [each.apart[np.isfinite(each.apart)] for each in measured]
         n_known = sum(map(len, apart))
@@ -104,13 +104,15 @@ def sliding(contacts: Contacts, ours: FootTracks, theirs: FootTracks) -> Sliding
             slides,
             mean_mm=mean_of(float(sum(each.sum() for each in apart)), n_known),
             max_mm=max((s.max_mm for s in slides if s.max_mm is not None), default=None),
-            where=_where(measured),
+            where=_worst_frame(measured),
             path_mm=mean_of(sum(each.path for each in measured), steps),
             path_original_mm=mean_of(sum(each.path_original for each in measured), steps),
         )
 
 
-def _measured(contacts: Contacts, ours: FootTracks, theirs: FootTracks) -> Iterator[_Measured]:
+def _measure_contacts(
+    contacts: Contacts, ours: FootTracks, theirs: FootTracks
+) -> Iterator[_ContactDistances]:
     to_mm = ours.unit_cm * MM
     for run in contacts.runs:
         foot = ours.joints.index(run.joint)
@@ -119,7 +121,7 @@ def _measured(contacts: Contacts, ours: FootTracks, theirs: FootTracks) -> Itera
         apart = _lengths((b - b[:1]) - (a - a[:1]))[1:]
         original, decoded = (_lengths(np.diff(places, axis=0)) for places in (a, b))
         known = np.isfinite(original) & np.isfinite(decoded)
-        yield _Measured(
+        yield _ContactDistances(
             run,
             apart,
             float(decoded[known].sum()),
@@ -128,15 +130,15 @@ def _measured(contacts: Contacts, ours: FootTracks, theirs: FootTracks) -> Itera
         )
 
 
-def _where(measured: list[_Measured]) -> tuple[int, str] | None:
+def _worst_frame(measured: list[_ContactDistances]) -> tuple[int, str] | None:
     """Frame and joint of the greatest difference: of equals the first frame, then joint."""
-    found: list[tuple[float, int, str]] = []
+    worst: list[tuple[float, int, str]] = []
     for each in measured:
         known = np.where(np.isfinite(each.apart), each.apart, -1.0)
         if known.max(initial=-1.0) >= 0:
             at = int(known.argmax())
-            found.append((-float(known[at]), each.run.first + 1 + at, each.run.joint))
-    return min(found, key=lambda one: one[:2])[1:] if found else None
+            worst.append((-float(known[at]), each.run.first + 1 + at, each.run.joint))
+    return min(worst, key=lambda one: one[:2])[1:] if worst else None
 
 
 def _lengths(vectors: Values) -> Values:

@@ -41,10 +41,10 @@ def _less_turns(
     channels: tuple[Channel, ...] | None,
 ) -> Values:
     """``difference`` of two sides without whole turns; ``channels``: a signal's own, or None."""
-    found = without_turns(difference, skeleton, channels)
+    wrapped = without_turns(difference, skeleton, channels)
     if channels is None:
-        found = -without_whole_turns(left, right, -found, skeleton)
-    return found
+        wrapped = -without_whole_turns(left, right, -wrapped, skeleton)
+    return wrapped
 
 
 class ChannelErrors:
@@ -148,9 +148,9 @@ class PointErrors(Distances):
 
     def add_points(self, start: int, left: Values, right: Values) -> None:
         """Points of shape (n_rows, n, 3) from row ``start`` on, NaN where unknown."""
-        known, found = known_points(left), known_points(right)
-        valid = known & found
-        self.mismatched += int((known ^ found).sum())
+        left_known, right_known = known_points(left), known_points(right)
+        valid = left_known & right_known
+        self.mismatched += int((left_known ^ right_known).sum())
         squares = np.where(valid, squared_norms(left - right), 0.0)
         self._squares += float(squares.sum())
         self._power += float(np.where(valid, squared_norms(left), 0.0).sum())
@@ -180,6 +180,33 @@ class ShellErrors(Distances):
         squares = squared_norms(left - right)
         worst = np.maximum(np.maximum(squares[:, 0::3], squares[:, 1::3]), squares[:, 2::3])
         self.add(start, np.sqrt(np.where(whole, worst, 0.0)), whole)
+
+
+class ChangeErrors:
+    """Differences of velocities and accelerations of ``n`` points, in lengths a row, a row squared.
+
+    Blocks of rows follow one another: the last two rows of one are kept for the next.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.velocity, self.acceleration = Distances(n), Distances(n)
+        self._off, self._valid = np.zeros((0, n, 3)), np.zeros((0, n), np.bool_)
+
+    def add_points(self, start: int, left: Values, right: Values) -> None:
+        """Points of shape (n_rows, n, 3) from row ``start`` on, NaN where unknown."""
+        n_before = len(self._off)
+        known = known_points(left) & known_points(right)
+        off = np.concatenate([self._off, np.where(known[:, :, None], left - right, 0.0)])
+        valid = np.concatenate([self._valid, known])
+        for order, sums in ((1, self.velocity), (2, self.acceleration)):
+            first = max(n_before - order, 0)
+            n_rows = len(off) - first - order
+            if n_rows > 0:
+                changed = np.sqrt(squared_norms(np.diff(off[first:], order, axis=0)))
+                both = [valid[first + k : first + k + n_rows] for k in range(order + 1)]
+                counted = np.logical_and.reduce(both)
+                sums.add(start + first + order - n_before, np.where(counted, changed, 0.0), counted)
+        self._off, self._valid = off[-2:], valid[-2:]
 
 
 def known_points(points: Values) -> Flags:

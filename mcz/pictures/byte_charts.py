@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import Dial
 from mcz.container.limits import BASE
@@ -186,7 +186,7 @@ def _plain_ticks(axes: Axes) -> None:
 
 def _points(motion: Motion, name: str, told: Callable[[int, str], None]) -> list[_Point]:
     """A point for each setting that works; raises OptionError where none does."""
-    codec = by_name(name)
+    codec = codec_by_name(name)
     if codec.dial is None:
         raise OptionError(f"codec {name} has nothing to turn: it is lossless, or has one setting")
     points, why = [], ""

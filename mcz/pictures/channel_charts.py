@@ -19,7 +19,7 @@ from mcz.pictures.chart_pages import Sheet
 from mcz.pictures.charts import Chart, legend, line, rows_of, styled
 from mcz.pictures.themes import Theme
 from mcz.poses import velocities
-from mcz.poses.moving import signal_of
+from mcz.poses.motion_like import signal_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from mcz.errors import MczError
 from mcz.kinematics.chain import Floats
 from mcz.motion import Motion
 from mcz.poses import positions
-from mcz.poses.moving import Moving
+from mcz.poses.motion_like import MotionLike
 from mcz.types import Reals
 
 CELLS = 48  # of a line: as many segments are decoded at most
@@ -23,7 +23,7 @@ def is_cheap(clip: Any) -> bool:
     return bool(clip.n_frames * clip.n_channels <= CHEAP)
 
 
-def motion_energy(moving: Moving, cells: int = CELLS) -> Floats | None:
+def motion_energy(moving: MotionLike, cells: int = CELLS) -> Floats | None:
     """The mean speed of all points in ``cells`` equal parts of the frames, float64 (n,).
 
     In length units a second, or a frame where times are unknown; NaN where no position is known,
@@ -44,13 +44,13 @@ def motion_energy(moving: Moving, cells: int = CELLS) -> Floats | None:
         return None
 
 
-def _seconds(moving: Moving) -> Floats:
+def _seconds(moving: MotionLike) -> Floats:
     """From each frame to the next, NaN across a gap; 1 where times are unknown."""
     timeline = moving.timeline
     return np.ones(moving.n_frames - 1) if timeline is None else timeline.steps
 
 
-def _whole(moving: Moving, edges: Any) -> Floats:
+def _whole(moving: MotionLike, edges: Any) -> Floats:
     """The mean speed in each part, from all of its frames."""
     width = max(1, moving.skeleton.n_channels + 12 * moving.skeleton.n_joints)
     size = max(1, BLOCK // width)
@@ -65,7 +65,7 @@ def _whole(moving: Moving, edges: Any) -> Floats:
     return sums / np.where(counts, counts, np.nan)
 
 
-def _sampled(moving: Moving, edges: Any) -> Floats:
+def _sampled(moving: MotionLike, edges: Any) -> Floats:
     """The speed in the middle of each part."""
     middles = (edges[:-1] + edges[1:]) // 2
     found = np.array([_steps(positions(moving, frames=(at, at + 2)))[0] for at in middles.tolist()])

@@ -15,7 +15,7 @@ from mcz.pictures.channel_charts import Wanted, channel_chart, spectrum_chart
 from mcz.pictures.charts import Chart, save
 from mcz.pictures.error_charts import error_chart
 from mcz.pictures.rendering import Progress, checked_size
-from mcz.poses.moving import Frames, Moving, frame_range
+from mcz.poses.motion_like import Frames, MotionLike, frame_range
 from mcz.reading.clip import Clip
 from mcz.reading.source_files import SourceOptions
 
@@ -35,11 +35,11 @@ class Plotted:
 
 
 def plot(
-    moving: Moving,
+    moving: MotionLike,
     path: str | os.PathLike[str],
     what: str | None = None,
     *,
-    other: Moving | None = None,
+    other: MotionLike | None = None,
     joint: int | str | None = None,
     signal: int | str | None = None,
     channels: str | Sequence[str] | None = None,
@@ -83,9 +83,9 @@ def plot(
 
 
 def _chart(
-    moving: Moving,
+    moving: MotionLike,
     what: str,
-    other: Moving | None,
+    other: MotionLike | None,
     wanted: Wanted,
     cut: tuple[int, int],
     codecs: Sequence[str],
@@ -107,7 +107,7 @@ def _chart(
     return channel_chart(motion, wanted, cut[0])
 
 
-def _motion(moving: Moving, cut: tuple[int, int] | None, facts: SourceOptions) -> Motion:
+def _motion(moving: MotionLike, cut: tuple[int, int] | None, facts: SourceOptions) -> Motion:
     """These frames as a motion, with what it does not say itself."""
     if isinstance(moving, Motion):
         motion = moving

@@ -14,7 +14,7 @@ import numpy as np
 from mcz.clock import Timeline
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint, Remark
-from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.pictures.bodies import Ints
 from mcz.pictures.cameras import Viewport
 from mcz.pictures.canvases import Canvas
@@ -24,7 +24,7 @@ from mcz.pictures.sheets import sheet_drawing, sheet_size
 from mcz.pictures.stages import AROUND, Stage, drawing_of, stage_of, words_around
 from mcz.pictures.themes import Theme, theme_of
 from mcz.pictures.tracks import track_of
-from mcz.poses.moving import Frames, Moving, frame_range
+from mcz.poses.motion_like import Frames, MotionLike, frame_range
 from mcz.writing.atomic import replacing
 
 FILMS = {".gif": Fraction(25), ".mp4": Fraction(30), ".webm": Fraction(30)}
@@ -71,7 +71,7 @@ class Look:
 
 
 def render(
-    moving: Moving,
+    moving: MotionLike,
     path: str | os.PathLike[str],
     *,
     frames: Frames = None,
@@ -179,7 +179,7 @@ def _shown_at(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
     return np.asarray(np.searchsorted(places, shown, side="right") - 1, np.int64)
 
 
-def _timeline(moving: Moving, rate: float | Fraction | None) -> Timeline | None:
+def _timeline(moving: MotionLike, rate: float | Fraction | None) -> Timeline | None:
     """The times of frames, at the motion's or else the caller's rate; None while unknown."""
     if moving.timeline is not None or rate is None:
         return moving.timeline
@@ -201,7 +201,7 @@ def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
 class _Job:
     """One picture to make."""
 
-    moving: Moving
+    moving: MotionLike
     path: str | os.PathLike[str]
     look: Look
     timeline: Timeline | None  # None while unknown: no time is shown

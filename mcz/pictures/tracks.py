@@ -13,7 +13,7 @@ import numpy as np
 
 from mcz.errors import MotionError
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.feet import feet_of
+from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import point_set
 from mcz.pictures.bodies import (
     LEFT,
@@ -27,7 +27,7 @@ from mcz.pictures.bodies import (
     radii,
     size_of,
 )
-from mcz.poses.moving import Moving, values_of
+from mcz.poses.motion_like import MotionLike, values_of
 from mcz.skeleton import signs_of
 from mcz.units import unit_cm_of
 
@@ -49,7 +49,7 @@ class Track:
     ``centers`` (n_frames, 3) is where it is, NaN where unknown; ``up`` the axis of the file.
     """
 
-    moving: Moving
+    moving: MotionLike
     body: Body
     frames: Ints
     up: str
@@ -72,7 +72,7 @@ class Track:
         return _blocks(self.moving, self.body, self.frames, self.up, self.scale)
 
 
-def track_of(moving: Moving, frames: Ints, unit: str | None, up: str | None) -> Track:
+def track_of(moving: MotionLike, frames: Ints, unit: str | None, up: str | None) -> Track:
     """The track of these frames, ascending; ``unit`` and ``up`` where the skeleton says none.
 
     Raises MotionError where the motion has no kinematics, no joint, no frame, or no known position.
@@ -109,7 +109,7 @@ def track_of(moving: Moving, frames: Ints, unit: str | None, up: str | None) -> 
     return _measured(track)
 
 
-def unknown(moving: Moving) -> MotionError:
+def unknown(moving: MotionLike) -> MotionError:
     return MotionError("no position is known in these frames: nothing to draw", clip=moving.name)
 
 
@@ -138,7 +138,7 @@ def _measured(track: Track) -> Track:
 
 
 def _blocks(
-    moving: Moving, body: Body, frames: Ints, up: str, scale: float
+    moving: MotionLike, body: Body, frames: Ints, up: str, scale: float
 ) -> Iterator[tuple[Ints, Floats]]:
     skeleton = moving.skeleton
     width = max(1, skeleton.n_channels + 12 * skeleton.n_joints)
@@ -164,14 +164,14 @@ def _turned(places: Floats, up: str) -> Floats:
     return found
 
 
-def _samples_per_frame(moving: Moving) -> int:
+def _samples_per_frame(moving: MotionLike) -> int:
     signal: Any = moving.signals[0]  # of a Motion, or what a Clip says of one
     return int(getattr(signal, "samples_per_frame", 0) or signal.layout.samples_per_frame)
 
 
 def guessed_up(body: Body, places: Floats) -> str:
     """The axis along which all is farthest from the feet; without feet y, of markers z."""
-    feet = feet_of(body.skeleton)
+    feet = find_feet(body.skeleton)
     if feet:
         with np.errstate(all="ignore"):
             known = known_places(places)

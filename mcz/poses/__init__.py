@@ -7,10 +7,10 @@ identity. Everything takes a Motion or a Clip, of which only what is needed is d
 
 from __future__ import annotations
 
-from mcz.poses.moving import times
-from mcz.poses.places import Root, accelerations, point_names, positions, root, velocities
+from mcz.poses.joint_rotations import rotations
+from mcz.poses.motion_like import times
 from mcz.poses.resampling import resample
-from mcz.poses.turns import rotations
+from mcz.poses.trajectories import Root, accelerations, point_names, positions, root, velocities
 
 __all__ = [
     "Root",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.errors import OptionError
-from mcz.kinematics.chain import IDENTITY, Floats, turned
+from mcz.kinematics.chain import IDENTITY, Floats, rotate_axes
 from mcz.kinematics.rotation_vectors import (
     matrices_of_quaternions,
     matrices_of_vectors,
@@ -56,12 +56,12 @@ def from_matrices(matrices: Floats, form: str, order: str = "XYZ") -> Floats:
     known = np.isfinite(flat).all(axis=(1, 2))
     out = np.full((len(flat), *FORMS[form]), np.nan)
     if known.any():
-        out[known] = _converted(flat if known.all() else flat[known], form, order)
+        out[known] = _convert_finite(flat if known.all() else flat[known], form, order)
     shaped = out.reshape(*matrices.shape[:-2], *FORMS[form])
-    return continuous(shaped) if form == "quat" else shaped
+    return continuous_signs(shaped) if form == "quat" else shaped
 
 
-def _converted(matrices: Floats, form: str, order: str) -> Floats:
+def _convert_finite(matrices: Floats, form: str, order: str) -> Floats:
     """Finite matrices (n, 3, 3) as quaternions, rotation vectors or Euler angles."""
     quaternions = quaternions_of_matrices(np.moveaxis(matrices, 0, 2))
     if form == "quat":
@@ -141,7 +141,7 @@ def _matrices_of_euler_angles(angles: Floats, order: str) -> Floats:
     steps = list(zip(order.lower(), angles, strict=True))  # about fixed axes: as turned, reversed
     turns = IDENTITY
     for letter, angle in steps if order.isupper() else reversed(steps):
-        turns = turned(turns, "xyz".index(letter), angle)
+        turns = rotate_axes(turns, "xyz".index(letter), angle)
     return turns
 
 
@@ -154,7 +154,7 @@ def _from_6d(flat: Floats) -> Floats:
     return np.stack([first, second, np.cross(first, second)], axis=2)
 
 
-def continuous(quaternions: Floats) -> Floats:
+def continuous_signs(quaternions: Floats) -> Floats:
     """Quaternions (n_frames, n, 4), w first, with the signs that keep neighbours near each other.
 
     w >= 0 in the first frame and in each after a gap.

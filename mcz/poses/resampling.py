@@ -86,7 +86,7 @@ def resample(
     numbers, times = times_of(timeline, wanted, first)
     own = first.channels is not None
     old = np.asarray(motion.values, np.float64)
-    values = resampled(None if own else motion.skeleton, old, times)
+    values = resample_rows(None if own else motion.skeleton, old, times)
     metadata = dict(motion.metadata)
     if not components and times.share.any():
         quaternions = scalar_quaternions(motion.skeleton, first.channels, old)
@@ -100,7 +100,7 @@ def resample(
     start = float(new[0] * float(wanted)) if len(new) else 0.0
     base = round(start) if abs(start) < 2**52 and abs(start - round(start)) < ALIGNED else 0
     counted = numbers + base + 1
-    made = replace(
+    resampled_motion = replace(
         motion,
         signals=(replace(Signal(values, name=first.name, mask=mask), channels=first.channels),),
         frame_rate=wanted,
@@ -109,7 +109,7 @@ def resample(
         number_step=1,
         metadata=metadata,
     )
-    return made.at_times(Timeline(new, wanted, timeline.rounding))
+    return resampled_motion.at_times(Timeline(new, wanted, timeline.rounding))
 
 
 def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints, Times]:
@@ -125,26 +125,26 @@ def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints
         frames, lie = frames_within(timeline, wanted, run)
         room -= max(0, frames.stop - frames.start)  # too many for len()
         if room < 0:
-            raise too_many(timeline, wanted)
+            raise too_many_frames_error(timeline, wanted)
         parts.append((np.array(frames, np.int64), lie(frames)))
     if not parts:
         return np.empty(0, np.int64), Times(np.empty(0, np.int64), np.empty(0))
-    numbers, found = zip(*parts, strict=True)
+    numbers, places = zip(*parts, strict=True)
     if len(parts) == 1:
-        return numbers[0], found[0]
+        return numbers[0], places[0]
     ends = np.array(timeline.runs, np.int64) - [0, 1]
     half = [np.full((2, len(n)), 0.5) for n in numbers]
-    weights = [h if f.weights is None else f.weights for f, h in zip(found, half, strict=True)]
+    weights = [h if f.weights is None else f.weights for f, h in zip(places, half, strict=True)]
     times = Times(
-        np.concatenate([each.before for each in found]),
-        np.concatenate([each.share for each in found]),
+        np.concatenate([each.before for each in places]),
+        np.concatenate([each.share for each in places]),
         np.repeat(ends, [len(each) for each in numbers], axis=0),
         np.concatenate(weights, axis=1),
     )
     return np.concatenate(numbers), times
 
 
-def too_many(timeline: Timeline, wanted: Fraction) -> OptionError:
+def too_many_frames_error(timeline: Timeline, wanted: Fraction) -> OptionError:
     """The error that new frames are too many to be made."""
     since = timeline.times[-1] - timeline.times[0]
     return OptionError(
@@ -161,17 +161,17 @@ def frames_within(
     if places is not None and rate and places[stop - 1] - places[start] == stop - start - 1:
         step, first = rate / wanted, int(places[start])
         frames = range(ceil(first / step), int((first + stop - start - 1) / step) + 1)
-        return frames, lambda frames: _moved(times_at(frames, step), start - first)
+        return frames, lambda frames: _shift_times(times_at(frames, step), start - first)
     since = (timeline.even[start:stop] - timeline.even[0]) * float(wanted)
     frames = range(ceil(since[0] - ALIGNED), int(since[-1] + ALIGNED) + 1)
-    return frames, lambda frames: _between(np.array(frames, np.float64), since, start)
+    return frames, lambda frames: _locate_frames(np.array(frames, np.float64), since, start)
 
 
-def _moved(times: Times, by: int) -> Times:
+def _shift_times(times: Times, by: int) -> Times:
     return Times(times.before + by, times.share)
 
 
-def _between(frames: Floats, since: Floats, start: int) -> Times:
+def _locate_frames(frames: Floats, since: Floats, start: int) -> Times:
     """The places of ``frames`` among old ones at ``since``, rising, from frame ``start`` on."""
     before = np.clip(np.searchsorted(since, frames, side="right") - 1, 0, max(0, len(since) - 2))
     after = np.minimum(before + 1, len(since) - 1)
@@ -190,7 +190,7 @@ def _between(frames: Floats, since: Floats, start: int) -> Times:
 MOST_FRAMES = 2**28
 
 
-def resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
+def count_resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
     """Number of frames at rate ``wanted``, from the first to at most the last."""
     count = int((n_frames - 1) * wanted / rate) + 1 if n_frames else 0
     if count > MOST_FRAMES:
@@ -205,11 +205,11 @@ def times_at(frames: Iterable[int], step: Fraction) -> Times:
     return Times(before, np.array([rest / step.denominator for _, rest in places]))
 
 
-def resampled(skeleton: Skeleton | None, old: Floats, times: Times) -> Floats:
+def resample_rows(skeleton: Skeleton | None, old: Floats, times: Times) -> Floats:
     """``resample`` of the rows of ``old``; ``skeleton`` None where channels are of no joint."""
     if not times.share.any():
         return old[times.before]
-    new = splines(old, times)
+    new = spline_rows(old, times)
     is_posed = skeleton is not None and any(channel.kind for channel in skeleton.channels)
     if skeleton is not None and is_posed and skeleton.angle_unit:
         chain = chain_of(skeleton)
@@ -228,7 +228,7 @@ def turn_scalars(quaternions: Sequence[Quaternion], old: Floats, new: Floats, ti
         new[between, columns] = slerp_quaternions(old[before, columns], old[after, columns], share)
 
 
-def splines(old: Floats, times: Times) -> Floats:
+def spline_rows(old: Floats, times: Times) -> Floats:
     """Catmull-Rom splines through the rows of ``old``, straight on where a neighbour is missing."""
     runs = times.runs
     low, high = (0, len(old) - 1) if runs is None else (runs[:, 0], runs[:, 1])
@@ -295,15 +295,15 @@ def _vectors(first: Floats, last: Floats, share: Floats) -> Floats:
 def _matrices(chain: Chain, link: Link, old: Floats) -> Floats:
     """The product of a joint's own turns, (n_frames, 3, 3)."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        found = chain.turned_by(link, IDENTITY, np.ascontiguousarray(old.T), [])
-    return np.ascontiguousarray(np.moveaxis(found, 2, 0))
+        turns = chain.turned_by(link, IDENTITY, np.ascontiguousarray(old.T), [])
+    return np.ascontiguousarray(np.moveaxis(turns, 2, 0))
 
 
 def _angles(turns: Floats, order: str, guess: Floats, full: float) -> Floats:
     """The Euler angles of matrices (n, 3, 3), of all solutions those nearest to ``guess``."""
-    found = euler_angles(np.moveaxis(turns, 0, 2), order) * (full / (2 * np.pi))
+    angles = euler_angles(np.moveaxis(turns, 0, 2), order) * (full / (2 * np.pi))
     half = full / 2
-    other = np.stack([found[:, 0] + half, half - found[:, 1], found[:, 2] + half], axis=1)
-    near, far = (each - np.round((each - guess) / full) * full for each in (found, other))
+    other = np.stack([angles[:, 0] + half, half - angles[:, 1], angles[:, 2] + half], axis=1)
+    near, far = (each - np.round((each - guess) / full) * full for each in (angles, other))
     nearer = np.abs(near - guess).sum(axis=1) <= np.abs(far - guess).sum(axis=1)
     return np.where(nearer[:, None], near, far)

@@ -32,22 +32,22 @@ def scalar_quaternions(
     names = _plain_names(skeleton, own)
     places = [at for at in range(len(names) - SIZE + 1) if None not in names[at : at + SIZE]]
     units = {at: _is_unit(values[:, at : at + SIZE]) for at in places}
-    found = [at for at in places if units[at]]
+    starts = [at for at in places if units[at]]
     named = {at for at in places if all(map(_is_named, names[at : at + SIZE]))}
     for at in sorted(named):
-        inside = any(other in found for other in range(at - SIZE + 1, at + SIZE))
+        inside = any(other in starts for other in range(at - SIZE + 1, at + SIZE))
         if units[at] is False and not inside:
             raise OptionError(
-                f"{_listed(names, at)} are named like a quaternion, of another norm{HINT}"
+                f"{_describe_columns(names, at)} are named like a quaternion, of another norm{HINT}"
             )
     apart: list[int] = []
-    for at in found:
-        rivals = [other for other in found if other != at and abs(other - at) < SIZE]
+    for at in starts:
+        rivals = [other for other in starts if other != at and abs(other - at) < SIZE]
         if not rivals or (at in named and named.isdisjoint(rivals)):
             apart.append(at)
         elif named.isdisjoint([at, *rivals]):
             raise OptionError(
-                f"{_listed(names, at)} may be a quaternion, or those beside them{HINT}"
+                f"{_describe_columns(names, at)} may be a quaternion, or those beside them{HINT}"
             )
     return [tuple(range(at, at + SIZE)) for at in apart]
 
@@ -77,7 +77,7 @@ def _is_named(name: str | None) -> bool:
     return name is not None and _NAMED.search(name) is not None
 
 
-def _listed(names: Sequence[str | None], at: int) -> str:
+def _describe_columns(names: Sequence[str | None], at: int) -> str:
     return f"columns {at + 1} to {at + SIZE} ({shown(str(names[at]))}, ...)"
 
 
@@ -89,5 +89,5 @@ def slerp_quaternions(first: Floats, last: Floats, share: Floats) -> Floats:
         angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
         to, near = share[:, None], angle < 1e-6
         start = np.where(near, 1 - to, np.sin((1 - to) * angle))
-        found = start * first + np.where(near, to, np.sin(to * angle)) * last
-        return np.asarray(found / np.sqrt((found * found).sum(axis=1, keepdims=True)))
+        mixed = start * first + np.where(near, to, np.sin(to * angle)) * last
+        return np.asarray(mixed / np.sqrt((mixed * mixed).sum(axis=1, keepdims=True)))

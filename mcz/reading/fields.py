@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
 from mcz.brief import among
-from mcz.codecs import by_id
+from mcz.codecs import codec_by_id
 from mcz.container.chunks import FRAMING, HEADER, ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.metadata import Record
@@ -128,7 +128,9 @@ def _duration(clip: Clip) -> Value:
 def _lossless(clip: Clip) -> Value:
     """Whether every signal's codec is; missing where one is not known."""
     try:
-        return all(by_id(s.codec, s.codec_version, s.preset).lossless for s in _row(clip).signals)
+        return all(
+            codec_by_id(s.codec, s.codec_version, s.preset).lossless for s in _row(clip).signals
+        )
     except UnsupportedError:
         return None
 

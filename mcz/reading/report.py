@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mcz.clock import time_facts
-from mcz.codecs.basis_models import name_of
+from mcz.codecs.basis_models import known_model_name
 from mcz.container import note_records
 from mcz.container.chunks import ChunkType
 from mcz.container.reader import Container
 from mcz.container.segments import GROUP_NOTES
 from mcz.errors import FormatError, SkeletonWarning, UnsupportedError
 from mcz.formats import FORMATS, Format, arrays_of
-from mcz.kinematics.rest import figure_height
+from mcz.kinematics.rest_pose import figure_height
 from mcz.motion import Motion, Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
@@ -152,7 +152,7 @@ def _clip_info(file: File, clip: Clip, sizes: Sizes) -> JsonObject:
         "quality_bytes": sizes.quality,
         "model_bytes": sizes.models,
         "models": [
-            {"id": id_.hex(), "name": name_of(id_)}
+            {"id": id_.hex(), "name": known_model_name(id_)}
             for signal in clip.signals
             for id_ in models_used(signal)
         ],

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, TypeVar, cast
 
-from mcz.codecs import CODECS, HOMES
+from mcz.codecs import CODECS, ENTRIES
 from mcz.errors import FormatError
 from mcz.formats import FORMATS
 from mcz.jobs import ONE, Answer, useful
@@ -70,4 +70,4 @@ def can_be_shared(file: File) -> bool:
 def only_own() -> bool:
     """Whether every codec and format is one that another process has, too."""
     formats = all(source.read.__module__.startswith(PACKAGE) for source in FORMATS.values())
-    return formats and set(CODECS) <= set(HOMES)
+    return formats and set(CODECS) <= set(ENTRIES)

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from mcz.clock import TIMES, times_form_fault
-from mcz.codecs import CODECS, by_id
+from mcz.codecs import CODECS, codec_by_id
 from mcz.codecs.contract import Codec, Layout, Model, Span
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
@@ -61,7 +61,7 @@ class SignalInfo:
     @property
     def codec(self) -> Codec:
         """Raises UnsupportedError where this reader lacks the codec."""
-        return self.own_codec or by_id(self.codec_id, self.codec_version, self.preset)
+        return self.own_codec or codec_by_id(self.codec_id, self.codec_version, self.preset)
 
     @property
     def exact(self) -> tuple[int, ...]:

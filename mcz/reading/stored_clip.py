@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_id
+from mcz.codecs import codec_by_id
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow
@@ -182,7 +182,7 @@ class StoredClip:
         """Name of the codec of the motion signal, ``codec N`` where it is unknown."""
         row = self._row.signals[0]
         try:
-            return by_id(row.codec, row.codec_version, row.preset).name
+            return codec_by_id(row.codec, row.codec_version, row.preset).name
         except UnsupportedError:
             return f"codec {row.codec}"
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.errors import OptionError
-from mcz.kinematics.chain import Chain, Floats, times
+from mcz.kinematics.chain import Chain, Floats, multiply_matrices
 from mcz.kinematics.euler import ORDERS, euler_order
 from mcz.motion import (
     ORIGIN,
@@ -71,9 +71,9 @@ def _places(chain: Chain, values: Floats, above: Mapping[int, int]) -> dict[int,
             place = pose.origins[joint]
             if parent >= 0:
                 axes, own = pose.axes[parent], chain.turned[parent]
-                world = axes if own is None else times(axes, own.T[:, :, None])
+                world = axes if own is None else multiply_matrices(axes, own.T[:, :, None])
                 step = place - pose.origins[parent]
-                place = times(back(world), step[:, None])[:, 0]
+                place = multiply_matrices(back(world), step[:, None])[:, 0]
             places[joint][:, rows] = place
     return places
 

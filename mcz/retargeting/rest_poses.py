@@ -11,7 +11,7 @@ import numpy as np
 from mcz.brief import among
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.kinematics.chain import IDENTITY, Floats
-from mcz.kinematics.rest import rest_positions
+from mcz.kinematics.rest_pose import rest_positions
 from mcz.motion import Skeleton
 from mcz.retargeting.joint_maps import limbs_of
 from mcz.retargeting.matching import nearest_above

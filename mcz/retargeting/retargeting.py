@@ -15,7 +15,7 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import origins_of, point_set
-from mcz.kinematics.chain import IDENTITY, Chain, Floats, times
+from mcz.kinematics.chain import IDENTITY, Chain, Floats, multiply_matrices
 from mcz.kinematics.targets import Targets
 from mcz.motion import Motion, Skeleton
 from mcz.retargeting.edited import check_channels, computed, edited
@@ -117,10 +117,12 @@ class _Retargeted:
             above = nearest_above(self.target, joint, self.pairs)
             there = self.pairs[above] if above >= 0 else -1
             turn = relative(self.theirs, there, other, self.turns)
-            turn = times(times(back(self.rest[above]), turn), self.rest[joint])
-            wanted = times(missed[above], turn)
+            turn = multiply_matrices(
+                multiply_matrices(back(self.rest[above]), turn), self.rest[joint]
+            )
+            wanted = multiply_matrices(missed[above], turn)
             made = set_local_turns(self.ours, joint, wanted, self.columns)
-            missed[joint] = _known(times(back(made), wanted))
+            missed[joint] = _known(multiply_matrices(back(made), wanted))
         self.travel.set(self.columns, self.rest)
         return np.ascontiguousarray(self.columns.T)
 

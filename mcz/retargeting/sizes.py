@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from mcz.kinematics.chain import Floats
-from mcz.kinematics.feet import is_foot
-from mcz.kinematics.rest import rest_positions
+from mcz.kinematics.joint_groups import is_foot
+from mcz.kinematics.rest_pose import rest_positions
 from mcz.motion import Skeleton
 
 

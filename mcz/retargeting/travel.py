@@ -9,8 +9,8 @@ import numpy as np
 
 from mcz.errors import OptionError
 from mcz.kinematics import reach
-from mcz.kinematics.chain import Floats, along
-from mcz.kinematics.rest import rest_positions
+from mcz.kinematics.chain import Floats, to_world
+from mcz.kinematics.rest_pose import rest_positions
 from mcz.motion import POSITION_KINDS, Skeleton
 from mcz.retargeting.edited import moves
 from mcz.retargeting.matching import nearest_above
@@ -48,7 +48,7 @@ class Travel:
                     ways[carrier] = self._way(joint, other)
             elif moves(self.target.joints[joint].channels):
                 step = self.scale * self._step(other)
-                ways[joint] = along(back(rest[above]), step)
+                ways[joint] = to_world(back(rest[above]), step)
         for joint, way in ways.items():
             self._check(joint, way)
         for joint in range(self.target.n_joints):

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.kinematics.chain import IDENTITY, Chain, Floats, Pose, times
+from mcz.kinematics.chain import IDENTITY, Chain, Floats, Pose, multiply_matrices
 from mcz.kinematics.euler import ORDERS
-from mcz.kinematics.nearest_turns import set_turns
-from mcz.kinematics.polished_turns import polish_turns
+from mcz.kinematics.rotation_fit import set_turns
+from mcz.kinematics.rotation_refinement import polish_turns
 
 
 def local_turns(chain: Chain, joint: int, columns: Floats) -> Floats:
@@ -23,7 +23,7 @@ def local_turns(chain: Chain, joint: int, columns: Floats) -> Floats:
     pose = Pose([], [], [], [])
     chain.add(pose, chain.links[joint], (nothing, nothing, hung), columns)
     axes = pose.axes[0]
-    return axes if own is None else times(axes, own.T[:, :, None])
+    return axes if own is None else multiply_matrices(axes, own.T[:, :, None])
 
 
 def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -> Floats:
@@ -39,7 +39,7 @@ def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -
     known = finite(wanted)
     turn = held(wanted, known)
     if own is not None:
-        turn = times(times(own.T[:, :, None], turn), own[:, :, None])
+        turn = multiply_matrices(multiply_matrices(own.T[:, :, None], turn), own[:, :, None])
     set_turns(link, turn, columns, chain.radians)
     if len(link.turns) > 1 and not link.is_whole and link.freedoms not in ORDERS:
         polish_turns(link, turn, columns, chain.radians)
@@ -84,9 +84,9 @@ def relative(chain: Chain, above: int, joint: int, turns: dict[int, Floats]) -> 
         shared += 1
     result = IDENTITY
     for index in reversed(up[shared:]):
-        result = times(result, back(turns[index]))
+        result = multiply_matrices(result, back(turns[index]))
     for index in down[shared:]:
-        result = times(result, turns[index])
+        result = multiply_matrices(result, turns[index])
     return result
 
 

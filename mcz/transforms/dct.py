@@ -45,8 +45,8 @@ def _quarter(n: int) -> Floats:
     for i in range(9, 0, -1):
         cosine = 1.0 - square * cosine / ((2 * i - 1) * (2 * i))
         sine = 1.0 - square * sine / ((2 * i) * (2 * i + 1))
-    found: Floats = np.where(2 * m <= n, cosine, x * sine)  # COS-01
-    return found
+    root: Floats = np.where(2 * m <= n, cosine, x * sine)  # COS-01
+    return root
 
 
 def _root(value: float) -> float:

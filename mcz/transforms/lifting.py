@@ -24,10 +24,10 @@ def _kernels() -> ModuleType:
 
 def lengths(n_rows: int, levels: int) -> list[int]:
     """Rows of the approximation after 0, 1, ... splits; none splits a single row."""
-    found = [n_rows]
-    while len(found) <= levels and found[-1] > 1:
-        found.append((found[-1] + 1) // 2)
-    return found
+    lengths_ = [n_rows]
+    while len(lengths_) <= levels and lengths_[-1] > 1:
+        lengths_.append((lengths_[-1] + 1) // 2)
+    return lengths_
 
 
 def split(signal: Floats) -> tuple[Floats, Floats]:

@@ -111,16 +111,16 @@ def learn_bases(
     if positions.ndim != 3:
         raise OptionError(f"positions have shape {positions.shape}, not (frames, points, axes)")
     n_axes = positions.shape[2]
-    found: list[Learned] = []
-    while len(found) < n_axes:
+    bases: list[Learned] = []
+    while len(bases) < n_axes:
 
-        def told(done: int, at_most: int, before: int = len(found)) -> None:
+        def told(done: int, at_most: int, before: int = len(bases)) -> None:
             if progress is not None:
                 progress(before * at_most + done, n_axes * at_most)
 
-        found.append(
+        bases.append(
             learn_basis(
-                positions[:, :, len(found)],
+                positions[:, :, len(bases)],
                 sparsity=sparsity,
                 iterations=iterations,
                 growth=growth,
@@ -128,7 +128,7 @@ def learn_bases(
                 progress=told,
             )
         )
-    return tuple(found)
+    return tuple(bases)
 
 
 def procrustes(products: Floats) -> Floats:

@@ -59,16 +59,16 @@ class PostFilter:
             self._n_held += 1
             return None
         window = self._rows[self._next - 2 * DELAY - 1 : self._next]
-        made: Floats = _filter_middle(window, self._past, *self._settings)[0]
-        return made
+        filtered: Floats = _filter_middle(window, self._past, *self._settings)[0]
+        return filtered
 
     def finish(self) -> Floats:
         """The rest, at most 12 rows, (n, n_channels); afterwards the filter is as new."""
         rest = self._rows[self._next - self._n_held - DELAY : self._next]
-        made = _filter_middle(np.concatenate((rest, self._unknown())), self._past, *self._settings)
+        rows = _filter_middle(np.concatenate((rest, self._unknown())), self._past, *self._settings)
         self._rows[:DELAY] = self._unknown()
         self._next, self._n_held = DELAY, 0
-        return made
+        return rows
 
     def _unknown(self) -> Floats:
         return np.full((DELAY, self._rows.shape[1]), np.nan)

@@ -214,9 +214,9 @@ def by_name(name: str) -> tuple[int, Wavelet]:
 
     if name not in pywt.wavelist(kind="discrete"):
         raise OptionError(f"wavelet {name!r} is unknown; registered are {', '.join(WAVELETS)}")
-    found = pywt.Wavelet(name)
+    wavelet = pywt.Wavelet(name)
     try:
-        return INLINE, Wavelet(tuple(found.rec_lo), tuple(found.rec_hi))
+        return INLINE, Wavelet(tuple(wavelet.rec_lo), tuple(wavelet.rec_hi))
     except FormatError as error:
         raise OptionError(f"wavelet {name!r}: {error}") from None
 

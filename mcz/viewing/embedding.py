@@ -10,10 +10,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from mcz.brief import brief
-from mcz.codecs import by_name, chosen
+from mcz.codecs import choose_name, codec_by_name
 from mcz.errors import LimitError, MczError
 from mcz.hints import Hint, with_hint
-from mcz.metrics.document import difference
+from mcz.metrics.diff_document import diff_document
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
 from mcz.types import JsonObject, Params, Target
@@ -170,7 +170,7 @@ def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
     from mcz.writing.planning import prepare, under_its_path
     from mcz.writing.tuning import write_motion
 
-    codec, params = by_name(chosen(wanted.codec, wanted.effort)), wanted.params or {}
+    codec, params = codec_by_name(choose_name(wanted.codec, wanted.effort)), wanted.params or {}
     out = io.BytesIO()
     with mcz_open(target, salvage=shelf.salvage, max_decoded=wanted.max_decoded) as file:
         writer = Writer(out, profile=file.container.profile)
@@ -194,7 +194,7 @@ def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> I
             try:
                 original = shelf.told(first.clips[a].motion())
                 coded = shelf.told(other.clips[b].motion())
-                found.append(difference(original, coded, by_joint=True))
+                found.append(diff_document(original, coded, by_joint=True))
             except MczError as error:
                 notes.append(f"{a}: {error.describe(shelf.hints)}")
         yield {"a": names[0], "b": name, "clips": found, "notes": notes}

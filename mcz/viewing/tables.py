@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Iterable
 
 from mcz.annexes import annex_bytes
-from mcz.codecs.basis_models import name_of
+from mcz.codecs.basis_models import known_model_name
 from mcz.errors import MczError
 from mcz.reading.file import File
 from mcz.reading.sizes import models_used
@@ -45,7 +45,7 @@ def tables_for(file: File) -> set[str]:
             models = {id_ for signal in clip.signals for id_ in models_used(signal)}
         except MczError:  # a damaged clip, which the decoder cannot read either
             continue
-        found.update(f"bases_{name}.bin" for id_ in models if (name := name_of(id_)))
+        found.update(f"bases_{name}.bin" for id_ in models if (name := known_model_name(id_)))
     return found
 
 

@@ -115,12 +115,12 @@ class Work:
 
     def encode(self, asked: Params) -> JsonObject:
         """Code a clip anew with a codec and its parameters; say what that makes of it."""
-        from mcz.codecs import by_name
+        from mcz.codecs import codec_by_name
         from mcz.reading.sizes import clip_sizes
         from mcz.writing.file import write
 
         codec, params = text_of(asked, "codec"), params_of(asked)
-        by_name(codec).options(params)
+        codec_by_name(codec).options(params)
         refuse_files(params)
         unit = None if asked.get("unit") is None else text_of(asked, "unit")
         motion = SourceOptions(unit=unit).applied_to(self._motion(asked))
@@ -146,7 +146,7 @@ class Work:
 
     def diff(self, asked: Params) -> JsonObject:
         """How far one clip is from another, as ``mcz diff --by-joint --json`` says it."""
-        from mcz.metrics.document import difference
+        from mcz.metrics.diff_document import diff_document
         from mcz.reading.differences import document_of
         from mcz.reading.sizes import clip_ratios
 
@@ -157,7 +157,7 @@ class Work:
                 found = clip_ratios(file, clip)
                 ratios.append({key: found[key] for key in RATIOS})
         one, other = map(self._motion, sides)
-        document = difference(one, other, by_joint=True)
+        document = diff_document(one, other, by_joint=True)
         document |= {"differences": document_of(one, other)}
         document |= {"ratios_a": ratios[0], "ratios_b": ratios[1]}
         names = [self._file(side).name for side in sides]
@@ -221,14 +221,14 @@ def lossy_codecs() -> list[JsonObject]:
     The keys are those of ``mcz codecs --json``, and ``dial``. The one that is called "lossy" is the
     first.
     """
-    from mcz.codecs import CODECS, by_name
-    from mcz.codecs.listing import document
+    from mcz.codecs import CODECS, codec_by_name
+    from mcz.codecs.listing import codec_document
 
     lossy = sorted(
         (codec for codec in CODECS.values() if not codec.lossless),
-        key=lambda codec: codec is not by_name("lossy"),
+        key=lambda codec: codec is not codec_by_name("lossy"),
     )
-    return [document(codec) | {"dial": dial_of(codec.dial)} for codec in lossy]
+    return [codec_document(codec) | {"dial": dial_of(codec.dial)} for codec in lossy]
 
 
 def dial_of(dial: Dial | None) -> JsonObject | None:

@@ -11,14 +11,14 @@ from pathlib import Path
 
 from mcz import jobs, threads
 from mcz.clock import SAME_RATE
-from mcz.codecs import DEFAULT, by_name, chosen
+from mcz.codecs import DEFAULT, choose_name, codec_by_name
 from mcz.codecs.contract import Codec
 from mcz.container.limits import BASE, LARGE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError, remark_of
 from mcz.formats import Format, format_of, wants_skeleton
 from mcz.hints import Hint, Remark
-from mcz.kinematics.rest import height_note
+from mcz.kinematics.rest_pose import height_note
 from mcz.motion import Skeleton
 from mcz.reading.read import NONE, NOTE, Given, Taken, take
 from mcz.reading.source_files import (
@@ -48,19 +48,19 @@ class EncodingOptions:
     params: Params = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        by_name(self.codec)
+        codec_by_name(self.codec)
 
     @property
     def found(self) -> Codec:
         """The codec of that name."""
-        return by_name(self.codec)
+        return codec_by_name(self.codec)
 
 
 def encoding_options(
     codec: str | None, effort: str | None, params: Params | None
 ) -> EncodingOptions:
     """Options of a codec, or of an ``effort`` in its place; raises OptionError for both."""
-    return EncodingOptions(chosen(codec, effort), dict(params or {}))
+    return EncodingOptions(choose_name(codec, effort), dict(params or {}))
 
 
 @dataclass(frozen=True, slots=True)

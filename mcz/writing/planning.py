@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.clock import TIMES
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, Encoded
 from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
@@ -22,7 +22,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import in_positions
-from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.motion import ROLES, Motion, Signal, Skeleton, Source
 from mcz.reading.source_info import stating_rate
 from mcz.schema import MAX_COUNT, build
@@ -251,7 +251,7 @@ def _signal_plan(
     motion: Motion, index: int, codec: Codec, options: Params, profile: Profile
 ) -> SignalPlan:
     if index and not codec.lossless:
-        codec = by_name(BESIDE)
+        codec = codec_by_name(BESIDE)
         options = codec.options({})
     signal = motion.signals[index]
     if not codec.lossless and signal.channels is not None:

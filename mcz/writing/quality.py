@@ -12,7 +12,7 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.kinematics.feet import feet_of
+from mcz.kinematics.joint_groups import find_feet
 from mcz.metrics import compare
 from mcz.metrics.sums import channel_errors
 from mcz.motion import Exceptions, Motion, Signal
@@ -84,7 +84,7 @@ def quality_entries(
 
 def figures(original: Motion, decoded: Motion) -> JsonObject:
     """The figures of a record by their metric ids, rounded; None where there is none."""
-    contacts = bool(feet_of(original.skeleton))
+    contacts = bool(find_feet(original.skeleton))
     found = compare(original, decoded, contacts=contacts).entries()
     return {key: _rounded(value) for key, value in found.items() if key not in LEFT_OUT}
 

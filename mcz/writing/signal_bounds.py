@@ -18,7 +18,7 @@ from mcz.codecs.channel_size import channel_bytes
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError
 from mcz.formats import recording_of, with_analog_scales
-from mcz.metrics.comparing import named_signals, signal_errors
+from mcz.metrics.comparison import named_signals, signal_errors
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.rules import MAX_SCALE, MIN_SCALE

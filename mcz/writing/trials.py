@@ -21,7 +21,7 @@ from mcz.container.reader import Container
 from mcz.container.source import open_source
 from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.kinematics import positions_of
-from mcz.kinematics.words import joints_of
+from mcz.kinematics.joint_groups import find_joints
 from mcz.metrics import Comparison, compare
 from mcz.metrics.sums import channel_errors
 from mcz.motion import Motion
@@ -258,7 +258,7 @@ def weighted(
     Also returns what the quality record says of it. Raises OptionError where they cannot be kept.
     """
     skeleton = trial.motion.skeleton
-    groups = [(name, joints_of(skeleton, name, QUALITY), limit) for name, limit in limits]
+    groups = [(name, find_joints(skeleton, name, QUALITY), limit) for name, limit in limits]
     given = found.get(WEIGHTS)
     weights = np.ones(skeleton.n_joints) if given is None else np.array(given)
     for _ in range(MOST_WEIGHINGS):

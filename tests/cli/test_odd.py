@@ -19,7 +19,7 @@ import pytest
 import mcz
 from mcz import AccessError, ExistsError, Signal
 from mcz.cli.common import Exit, code_of
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container.writer import Writer
 from mcz.writing.clip_writer import write_clip
 from tests.commands import ENV, Call, run
@@ -171,7 +171,7 @@ def test_a_link_to_nowhere_is_in_the_way(folder: Path, call: Call) -> None:
 def test_names_in_files_never_leave_the_folder(folder: Path, call: Call, name: str) -> None:
     with (folder / "odd.mcz").open("wb") as stream:
         writer = Writer(stream)
-        write_clip(writer, replace(smooth(3), name=name), by_name("raw"), {})
+        write_clip(writer, replace(smooth(3), name=name), codec_by_name("raw"), {})
         writer.finish()
     (folder / "out").mkdir()
     code, _, err = call(

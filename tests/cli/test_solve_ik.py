@@ -12,7 +12,7 @@ import pytest
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
 from mcz.kinematics import point_names, points_and_markers_of
@@ -31,7 +31,7 @@ def write_positions(path: Path, motion: Motion, *, virtual_markers: bool = False
     own = StoredSkeleton(motion.skeleton)
     derived = () if made is motion else (StoredSkeleton(made.skeleton, derives=True),)
     prepared = Prepared(made, (own, *derived))
-    write_plan(writer, plan_clip(prepared, by_name("fast"), {}, BASE))
+    write_plan(writer, plan_clip(prepared, codec_by_name("fast"), {}, BASE))
     writer.finish()
     path.write_bytes(stream.getvalue())
     return path

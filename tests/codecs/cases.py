@@ -12,7 +12,7 @@ import numpy as np
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec
 from tests.codecs.lossy import Direct, markers, wandering
 from tests.motions import smooth
@@ -30,7 +30,7 @@ class Case:
 
     @property
     def codec(self) -> Codec:
-        return by_name(self.name)
+        return codec_by_name(self.name)
 
     @property
     def of_points(self) -> bool:

@@ -10,7 +10,7 @@ from unittest import mock
 import numpy as np
 from hypothesis import strategies as st
 
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless.best_streams import AS_FAST, code_plan
 from mcz.codecs.lossless.references import choose_references
@@ -50,7 +50,7 @@ class Coder:
     def decoded(self, stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> Ordinals:
         layout = Layout(n_rows, (tuple(range(n_channels)),), grids=(grid,) * n_channels)
         request = Request(0, n_rows, (0,))
-        decode = by_name(self.name).decode
+        decode = codec_by_name(self.name).decode
         return decode(b"", layout, [Span(0, n_rows)], request, lambda s, r, g: stream)
 
     def rows(self, stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> object:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
@@ -120,7 +120,7 @@ class Direct:
     def __init__(
         self, codec: str, motion: Motion, *, segment_bytes: int = 2**26, **params: object
     ) -> None:
-        self.codec, self.motion, self.params = by_name(codec), motion, params
+        self.codec, self.motion, self.params = codec_by_name(codec), motion, params
         source = MemorySource(motion, 0, self.codec, segment_bytes)
         coded: Encoded = self.codec.encode(source, self.codec.options(params))
         self.header = coded.header

@@ -12,7 +12,7 @@ import mcz
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.wavelet import awt_choices as choice
 from mcz.codecs.wavelet.awt import CODEC
-from mcz.codecs.wavelet.shared import transform_of
+from mcz.codecs.wavelet.wavelet import transform_of
 from mcz.motion import Motion
 from mcz.writing.signal_source import MemorySource
 from tests.codecs.lossy import saved, wandering

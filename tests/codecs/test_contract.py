@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import CODECS, by_name
+from mcz.codecs import CODECS, codec_by_name
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
 from tests import overlap_codec
 from tests.codecs.cases import CASES, Case, meant, saved, small, written
@@ -350,7 +350,7 @@ def test_huge_values_are_refused_or_coded(name: str, kind: str, huge: float) -> 
 
 @LOSSY_CODEC
 def test_what_a_lossy_signal_cannot_be(name: str) -> None:
-    params = {"domain": "channels"} if by_name(name).positions else {}
+    params = {"domain": "channels"} if codec_by_name(name).positions else {}
     params |= {"step": 0.1} if name == "posewave" else {}
     own = Signal(np.zeros((10, 2)), channels=(Channel("", "a"), Channel("", "b")))
     for signal, words in (
@@ -409,12 +409,12 @@ def test_10000_channels(
 # Parameters
 
 
-DIALED = [name for name in CODECS if by_name(name).dial]
+DIALED = [name for name in CODECS if codec_by_name(name).dial]
 
 
 @pytest.mark.parametrize("name", DIALED)
 def test_a_finer_setting_costs_more_and_errs_less(name: str) -> None:
-    dial, case, motion = by_name(name).dial, Case(name), smooth(200)
+    dial, case, motion = codec_by_name(name).dial, Case(name), smooth(200)
     rising, falling = (1, 3, 6, 100), (10, 1.0, 0.1, 0.01)
     sizes, errors = [], []
     for setting in rising if dial.rises else falling:
@@ -438,7 +438,7 @@ def bad_values(range_: str) -> list[Any]:
 
 @CODEC
 def test_bad_parameters_are_refused_by_name(name: str) -> None:
-    codec, seen = by_name(name), 0
+    codec, seen = codec_by_name(name), 0
     for parameter in codec.parameters:
         if not parameter.range or "path" in parameter.range or "auto" in parameter.range:
             continue

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import CODECS
-from mcz.codecs.contract import Model, id_of
+from mcz.codecs.contract import Model, model_id
 from tests.codecs.cases import CASES, small, written
 from tests.codecs.lossy import Direct
 from tests.repair import flipped, flips, joined, memory_below, parts_of, replaced, use
@@ -89,9 +89,9 @@ def test_a_model_that_is_not_there_cut_or_changed(name: str) -> None:
     if model is None:
         assert coded.codec.uses(coded.header) == ()
         return
-    assert coded.codec.uses(coded.header) == (id_of(model),)
+    assert coded.codec.uses(coded.header) == (model_id(model),)
     for find_model in (None, lambda _: None):
-        with pytest.raises(mcz.UnsupportedError, match=id_of(model).hex()):
+        with pytest.raises(mcz.UnsupportedError, match=model_id(model).hex()):
             coded.read(changes={"layout": replace(coded.layout, find_model=find_model)})
     with pytest.raises(mcz.FormatError):
         layout = replace(coded.layout, find_model=lambda _: Model(99, model.data))

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import CODECS, by_name
+from mcz.codecs import CODECS, codec_by_name
 from mcz.codecs.contract import Layout, LiveDecoder, LiveEncoder, Request, Span, model_finder
 from mcz.errors import LostFrameError
 from mcz.motion import Motion
@@ -38,11 +38,11 @@ Pushed = list[tuple[bytes, bool]]
 
 
 def test_every_live_codec_has_a_case() -> None:
-    live = {name for name in CODECS if by_name(name).live}
+    live = {name for name in CODECS if codec_by_name(name).live}
     assert (
         {case[0] for case in CASES.values()}
         == live
-        == {name for name in CODECS if by_name(name).follow}
+        == {name for name in CODECS if codec_by_name(name).follow}
     )
 
 
@@ -51,7 +51,7 @@ class Live:
 
     def __init__(self, name: str, motion: Motion, **params: Any) -> None:
         codec, own, self.every = CASES[name]
-        self.codec, self.motion = by_name(codec), motion
+        self.codec, self.motion = codec_by_name(codec), motion
         self.options = self.codec.options({**own, **params})
         self.layout: Layout = MemorySource(motion, 0, self.codec, 2**26).layout
         self.encoder = self.new_encoder()
@@ -206,7 +206,7 @@ def test_a_damaged_packet_costs_the_frames_up_to_a_fresh_one(name: str) -> None:
     ],
 )
 def test_what_needs_all_frames_is_refused(name: str, params: dict[str, Any], words: str) -> None:
-    codec = by_name(name)
+    codec = codec_by_name(name)
     layout = Layout(0, ((0, 1, 2),), skeleton=markers(1, 1).skeleton)
     assert codec.live is not None
     with pytest.raises(mcz.OptionError, match=words):

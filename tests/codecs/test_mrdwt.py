@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs.steps import code_of, ratio_of
-from mcz.codecs.wavelet.shared import WaveletHeader
-from mcz.codecs.weights import weights_of
+from mcz.codecs.channel_weights import weights_of
+from mcz.codecs.step_codes import code_of, ratio_of
+from mcz.codecs.wavelet.wavelet import WaveletHeader
 from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS, Motion
 from mcz.schema import parse

@@ -14,14 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import model_finder
 from mcz.codecs.online.units import INTRA, LTR, STR, Unit, build_units, parse_units
 from mcz.errors import LostFrameError
 from mcz.writing.signal_source import MemorySource
 from tests.codecs.lossy import Direct, amc, markers
 
-ONLINE = by_name("online")
+ONLINE = codec_by_name("online")
 PRESETS = ("default", "mod", "rc", "rca")
 
 

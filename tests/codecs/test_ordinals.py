@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.coding.fast import decoder
 from mcz.coding.fast.encoder import StreamBuilder
@@ -73,7 +73,7 @@ def test_segments_of_several_lengths_at_once(grid: Grid) -> None:
     layout, request = Layout(ends[-1], groups, grids=(grid,) * 5), Request(3, ends[-1], (0, 1, 2))
     for lacking in (False, True):
         with mock.patch.object(decoder, "lacks_compiled_kernels", return_value=lacking):
-            found = by_name("fast").decode(
+            found = codec_by_name("fast").decode(
                 b"", layout, spans, request, lambda s, r, g: streams[s][g]
             )
         np.testing.assert_array_equal(found, np.concatenate(tables)[3:])

@@ -31,9 +31,9 @@ def test_unknown_codec_makes_only_that_clip_unsupported(monkeypatch: pytest.Monk
     from mcz.writing.clip_writer import write_clip
 
     writer = Writer(out)
-    write_clip(writer, smooth(), codecs.by_name("raw"), {})
+    write_clip(writer, smooth(), codecs.codec_by_name("raw"), {})
     write_clip(writer, smooth(name="other"), overlap_codec.CODEC, {})
-    write_clip(writer, smooth(name="newer"), replace(codecs.by_name("raw"), version=9), {})
+    write_clip(writer, smooth(name="newer"), replace(codecs.codec_by_name("raw"), version=9), {})
     writer.finish()
     monkeypatch.delitem(codecs.CODECS, overlap_codec.CODEC.name)
     with mcz.open(out.getvalue()) as file:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.posewave.choices import PRESETS
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridKind
@@ -31,7 +31,7 @@ from tests.codecs.lossy import (
 from tests.motions import smooth
 
 NAME = "posewave"
-CODEC = by_name(NAME)
+CODEC = codec_by_name(NAME)
 KINDS = ["tx", "ty", "tz", "rz", "rx", "ry", "rz", "rx"]
 
 

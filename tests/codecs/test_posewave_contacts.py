@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs_of
-from mcz.codecs.posewave.contact_keeper import Keeper, Outcome, Piece
 from mcz.codecs.posewave.contact_plan import Contacts, parse_contacts
+from mcz.codecs.posewave.contact_tracker import ContactTracker, Outcome, Piece
 from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.kinematics.points import first_points, positions_of
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
@@ -153,7 +153,7 @@ def test_contacts_are_found_of_joints_by_name() -> None:
     values = np.array(motion.values)
     values[500:] = values[500]
     still = replace(motion, signals=(Signal(values),))
-    source = MemorySource(still, 0, by_name("posewave"), 2**26)
+    source = MemorySource(still, 0, codec_by_name("posewave"), 2**26)
     found = runs_of(source, "auto")
     assert {run[0] for run in found} <= {"LeftFoot", "RightFoot", "LeftToe", "RightToe"}
     assert max(first + count for _, first, count in found) == 1100
@@ -229,6 +229,6 @@ def test_a_tolerance_that_is_too_small() -> None:
 
 def test_what_cannot_be_held_is_said() -> None:
     skeleton = biped()
-    keeper = Keeper(0.01, outcomes=[Outcome(Piece(0, 10, 5, 10, 0), np.full((5, 3), 0.02))])
+    keeper = ContactTracker(0.01, outcomes=[Outcome(Piece(0, 10, 5, 10, 0), np.full((5, 3), 0.02))])
     with pytest.warns(ContactWarning, match="LeftFoot .* 1 contacts; .* 0.0346 .* 10 to 14"):
         keeper.warn(skeleton, contacts_of(skeleton, (3, 0)))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.codecs import CODECS, by_id
+from mcz.codecs import CODECS, codec_by_id
 from mcz.errors import UnsupportedError
 from tests.motions import smooth
 
@@ -70,4 +70,4 @@ def test_an_unknown_preset_is_ignored_and_kept(name: str, monkeypatch: pytest.Mo
 @pytest.mark.parametrize("id_", [4, 5, 15, 22, 127, 200, 255])
 def test_other_ids_are_unknown(id_: int) -> None:
     with pytest.raises(UnsupportedError, match=f"codec {id_} is unknown"):
-        by_id(id_, 0, 1)
+        codec_by_id(id_, 0, 1)

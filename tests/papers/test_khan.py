@@ -12,7 +12,7 @@ import pytest
 from mcz.bench.cases import Case, Variant
 from mcz.bench.measure import point
 from mcz.cli.common import run as run_command
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.errors import OptionError
 from tools.papers import at_figure, kinds
 from tools.papers.__main__ import command
@@ -44,7 +44,9 @@ def test_all_tables_of_generated_clips(
         shutil.copy(samples / "walk.amc", tmp_path / f"{name}.amc")
 
     def near(case: Case, variant: Variant, key: str, wanted: float, hint: float) -> Any:
-        return point(case, variant, {by_name(variant.codec).dial.parameter: hint}, markers=False)
+        return point(
+            case, variant, {codec_by_name(variant.codec).dial.parameter: hint}, markers=False
+        )
 
     monkeypatch.setattr(kinds, "at_figure", near)
     out = tmp_path / "out"

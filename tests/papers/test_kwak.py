@@ -15,7 +15,7 @@ import mcz
 from mcz.bench import plots
 from mcz.bench.cases import Case
 from mcz.cli.common import run as run_command
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.errors import OptionError
 from tests.papers.walks import put_walk
 from tools import fit_bit_allocation
@@ -144,7 +144,7 @@ def test_a_decoder_that_goes_on_regardless_errs_for_good() -> None:
 
 
 def test_a_live_decoder_goes_on_where_it_can(clip: Clip) -> None:
-    motion, codec = motion_in_positions(clip), by_name("online")
+    motion, codec = motion_in_positions(clip), codec_by_name("online")
     pushed = losses.pushed_by(codec, motion, {"step": 0.5, "gof": 10, "intra_period": 2})
     lost = np.zeros(motion.n_frames, np.bool_)
     whole, _ = received(codec, pushed, lost)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.codecs import HOMES
+from mcz.codecs import ENTRIES
 from mcz.container import payloads
 from mcz.container.packed import decoded
 from mcz.container.packets import FRAME, SEGMENT, Packet
@@ -185,7 +185,9 @@ class Mutation:
             setattr(
                 of,
                 name,
-                self.rng.choice([home.id for home in HOMES.values()]) if name == "codec" else near,
+                self.rng.choice([home.id for home in ENTRIES.values()])
+                if name == "codec"
+                else near,
             )
 
         return self._clip(pieces, edit)

@@ -15,7 +15,7 @@ import numpy as np
 
 import mcz
 from mcz.clock import EXACT, Timeline, check_numbers, numbers_or_rows
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container import payloads
 from mcz.container.limits import BASE, LARGE
 from mcz.container.metadata import Record
@@ -193,7 +193,7 @@ class Migration:
         if not motion.signals_of("times"):
             motion = self._timed(clip, motion)
         kept = clip["codec"] if clip["codec"] in KEPT else "fast"
-        write_clip(self.writer, motion, by_name(self.codec or kept), {})
+        write_clip(self.writer, motion, codec_by_name(self.codec or kept), {})
         if clip["quality"] is not None:
             self.writer.ancillary(CHUNK, quality_payload(clip["quality"]))
         if clip["file"] is not None and motion.source is None:

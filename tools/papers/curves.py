@@ -30,7 +30,7 @@ from mcz.bench.measure import (
     work_of,
     write_file,
 )
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, model_finder
 from mcz.container.limits import BASE
 from mcz.errors import MczError, MotionError
@@ -118,7 +118,7 @@ def curve(case: Case, variant: Variant, data: str = "") -> list[Record]:
 
 
 def _start(loaded: Loaded, variant: Variant) -> float:
-    codec = by_name(variant.codec)
+    codec = codec_by_name(variant.codec)
     in_places = codec.positions and variant.options().get("domain") != "channels"
     return START_CM / (loaded.motion.skeleton.unit_cm or 1.0) if in_places else 1.0
 
@@ -182,7 +182,7 @@ def speeds_beside(case: Case, settings: Sequence[tuple[Variant, float]]) -> list
         row = {"label": variant.label, "setting": setting, "live": False}
         seconds = {"encode": cpu_seconds(encode), "decode": cpu_seconds(decode)}
         rows.append(row | {f"{k}_fps": motion.n_frames / v for k, v in seconds.items()})
-        codec = by_name(variant.codec)
+        codec = codec_by_name(variant.codec)
         if codec.live is not None and params.get("preset") is None:
             options = codec.options(params)
             seconds = live_seconds(prepare(motion, codec, params).motion, codec, options)

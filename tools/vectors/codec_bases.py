@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs import by_name, raw
+from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Encoded, Model, Segment
 from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
@@ -52,7 +52,7 @@ def noted(codec: str, packets: bool = False) -> bytes:
     crafter = Crafter(packets=packets)
     levels = {"N": 2} if codec == "mrdwt" else {}
     motion = replace(motion, signals=(noted,))
-    crafter.clip(motion, grouping="channel", codec=by_name(codec), **levels)
+    crafter.clip(motion, grouping="channel", codec=codec_by_name(codec), **levels)
     return finished(crafter)
 
 
@@ -85,7 +85,7 @@ def coded(
         made = (Segment(start, stop - start, streams) for start, stop in pairwise(edges))
         return Encoded(bytes.fromhex(header), made, resolutions, models, **more)
 
-    plain = by_name(codec)
+    plain = codec_by_name(codec)
     made = replace(
         plain,
         encode=encode,

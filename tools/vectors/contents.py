@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mcz.codecs import CODECS, bitstream
+from mcz.codecs import CODECS, bitstream_name
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, parse_header
 from mcz.container.limits import BASE
@@ -25,10 +25,10 @@ def codecs_of(vector: Vector) -> list[str]:
             fields = parse(payloads.Clip, payload, "CLIP")
         except MczError:
             continue
-        found |= {name for s in fields.signals if (name := bitstream(s.codec))}
+        found |= {name for s in fields.signals if (name := bitstream_name(s.codec))}
     folder = vector.name.split("/")[1]
     if not found and folder in CODECS:
-        found.add(bitstream(CODECS[folder].id) or "")
+        found.add(bitstream_name(CODECS[folder].id) or "")
     return sorted(found)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
-from mcz.codecs.parameters import SCALED, chosen_of
+from mcz.codecs.parameters import SCALED, preset_values
 from mcz.codecs.segments import segment_frames_of
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
@@ -60,10 +60,10 @@ class Plan:
         per, step = self.grid
         with np.errstate(over="ignore"):
             sizes = np.abs(points) * per if per else np.abs(points) / step
-        found = np.floor(sizes + 0.5)
-        if not (found <= MAX_INDEX).all():  # a fit of huge points may be no number
+        indices = np.floor(sizes + 0.5)
+        if not (indices <= MAX_INDEX).all():  # a fit of huge points may be no number
             raise MotionError("qbc: a control point exceeds 2^40 quantizer steps")
-        return np.where(points < 0, -found, found).astype(np.int64)
+        return np.where(points < 0, -indices, indices).astype(np.int64)
 
     def points(self, indices: Ints) -> Floats:
         per, step = self.grid
@@ -88,7 +88,7 @@ def _lever(skeleton: Skeleton | None) -> float:
 
 def plan_of_options(params: Params, layout: Layout) -> Plan:
     """The plan for a clip; raises OptionError for parameters that do not fit."""
-    chosen, published = chosen_of(PRESETS, params), params["preset"] == "khan2014"
+    chosen, published = preset_values(PRESETS, params), params["preset"] == "khan2014"
     limit, decimals = chosen["d2_lmt"], chosen["Q"]
     if decimals is None and not limit > 0:
         raise OptionError("qbc: d2_lmt is 0 and no Q is given, so that there is no step")

@@ -32,8 +32,8 @@ def rounded(value: float, per: float, step: float) -> float:
     """``value`` on the grid, halves away from zero; ``per`` 10^decimals, or 0 for ``step``."""
     scaled = abs(value) * per if per > 0 else abs(value) / step
     index = np.floor(scaled + 0.5)
-    found = index / per if per > 0 else index * step
-    return float(-found if value < 0 else found)
+    nearest = index / per if per > 0 else index * step
+    return float(-nearest if value < 0 else nearest)
 
 
 def middle(points: Floats2, a: int, b: int, ends: Floats2, method: int, out: Floats) -> None:

@@ -24,7 +24,7 @@ from mcz.codecs.contract import (
     Encoded,
     Fetch,
     Layout,
-    Recoding,
+    RecodeRequest,
     Request,
     Segment,
     SignalSource,
@@ -47,10 +47,9 @@ from mcz.codecs.curves.streams import (
     parse_curves,
     parse_first_mark,
     parse_marks,
-    straight,
+    straight_curves,
 )
 from mcz.codecs.gaps import SegmentReader
-from mcz.codecs.groups import Part
 from mcz.codecs.parameters import (
     MAX_DECIMALS,
     SCALED,
@@ -62,7 +61,13 @@ from mcz.codecs.parameters import (
     number,
     preset_parameter,
 )
-from mcz.codecs.segments import SEGMENT_FRAMES, SEGMENT_FRAMES_PARAMETER, Lengths, halving
+from mcz.codecs.segments import (
+    SEGMENT_FRAMES,
+    SEGMENT_FRAMES_PARAMETER,
+    Lengths,
+    segments_by_halving,
+)
+from mcz.codecs.subset_source import SubsetSource
 from mcz.errors import FormatError, OptionError
 from mcz.schema import UVARINT, Checked, Record, bounded, build, field, parse
 from mcz.types import Params
@@ -112,7 +117,7 @@ def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
     code = _Coder(source, n_frames, plan)
     length = _segment_length(source.layout, plan)
     lengths = Lengths(length, bool(plan.segment_frames), delta, LEAST_FRAMES)
-    for first, stop, streams in halving(n_frames, lengths, code):
+    for first, stop, streams in segments_by_halving(n_frames, lengths, code):
         yield Segment(first, stop - first, streams, lead=min(first, delta - 1))
 
 
@@ -148,11 +153,11 @@ def _segment_length(layout: Layout, plan: Plan) -> int:
     return max(delta, min(wanted, most // delta * delta))
 
 
-def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of some joints with new values, with marks and steps of the header."""
     fields = parse(QbcHeader, asked.header, "qbc header")
     plan = plan_of_header(fields, asked.options)
-    part = Part(asked.source, asked.groups, fields.coded_frames)
+    part = SubsetSource(asked.source, asked.groups, fields.coded_frames)
     code = _Coder(part, fields.coded_frames, plan)
     for span in asked.spans:
         yield code(span.first, span.stop)[: asked.source.layout.n_resolutions * len(asked.groups)]
@@ -192,9 +197,9 @@ def _joint_streams(points: Floats, marks: Ints, stop: int, plan: Plan) -> tuple[
     rule = fit_kernels.Rule(plan.method, *plan.grid, int(plan.closed))
     find(points, rounded, marks, plan.limit, rule, is_break)
     breaks = np.flatnonzero(is_break)
-    found = np.zeros((len(breaks) - 1, points.shape[1]))
-    fit_kernels.middles(found, points, rounded, breaks, plan.method)
-    mids = plan.indices(found)
+    middles = np.zeros((len(breaks) - 1, points.shape[1]))
+    fit_kernels.middles(middles, points, rounded, breaks, plan.method)
+    mids = plan.indices(middles)
     ends = plan.indices(points[breaks])
     mark_points = ends[np.searchsorted(breaks, marks)]
     lengths = np.diff(breaks)
@@ -274,13 +279,13 @@ def _read_segment(
         curves = (
             parse_curves(fetch(index, 1, group), marks, frames, "qbc", whole=whole)
             if fine
-            else straight(marks, frames)
+            else straight_curves(marks, frames)
         )
         steps = None
         if fields.step is not None and fields.position_step is not None:  # QBC-27
             are_positions = is_position[list(layout.groups[group])]
             steps = np.array([fields.step, fields.position_step])[are_positions.astype(np.intp)]
-        points = [_points(found, fields, steps) for found in (marks, curves.mids, curves.ends)]
+        points = [_points(indices, fields, steps) for indices in (marks, curves.mids, curves.ends)]
         starts = np.concatenate([points[0][:1], points[2][:-1]])
         block = out[start - request.start : stop - request.start, column : column + n]
         kernels.evaluate(block, start, span.first, starts, points[1], points[2], curves.lengths)

@@ -12,7 +12,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.coding.streams import bare_state, code, halves_of, scale_of, uncode
 from mcz.errors import FormatError
 
@@ -93,14 +93,14 @@ def parse_first_mark(stream: bytes, n_channels: int, name: str) -> Ints:
     return points
 
 
-def straight(marks: Ints, frames: Ints) -> Curves:
+def straight_curves(marks: Ints, frames: Ints) -> Curves:
     """One straight curve from each mark to the next."""
     return Curves(np.diff(frames), marks[1:], (marks[:-1] + marks[1:]) >> 1)  # QBC-25
 
 
 def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
     """The stream of the curves between marks (k, channels) at ``frames`` (k,)."""
-    plain = straight(marks, frames)
+    plain = straight_curves(marks, frames)
     if len(plain.lengths) == len(curves.lengths) and (plain.mids == curves.mids).all():
         return b""
     starts = np.concatenate([marks[:1], curves.ends[:-1]])
@@ -134,22 +134,22 @@ def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
 def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: bool) -> Curves:
     """The curves between marks; raises FormatError on bad bytes."""
     if not stream:
-        return straight(marks, frames)
+        return straight_curves(marks, frames)
     scales = np.array([scale_of(_scale(stream, at, name)) for at in range(2)])
     most = int(frames[-1] - frames[0])
     lengths = np.zeros(most, np.int64)
     ends = np.zeros((most, marks.shape[1]), np.int64)
     mids = np.zeros_like(ends)
-    found = [0]
+    n_curves = [0]
     loops = _kernels()
 
     def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
-        found[0] = loops.code_details(state, data, marks, frames, lengths, ends, mids, scales)
-        return found[0] >= 0
+        n_curves[0] = loops.code_details(state, data, marks, frames, lengths, ends, mids, scales)
+        return n_curves[0] >= 0
 
     # QBC-15
     uncode(stream[2:], start_states("qbc")[DETAILS], loop, f"{name}: a curve", whole=whole)
-    n = found[0]
+    n = n_curves[0]
     return Curves(lengths[:n], ends[:n], mids[:n])
 
 

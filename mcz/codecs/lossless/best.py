@@ -1,4 +1,4 @@
-"""Codec best: the leads of fast, predicted by regressions that learn while they are used.
+"""Codec 2, ``best``: the leads of fast, predicted by regressions that learn while they are used.
 
 SPEC.md, "Codec 2: best", is normative; the names below are its field names.
 
@@ -20,15 +20,14 @@ from mcz.codecs.contract import (
     Encoded,
     Fetch,
     Layout,
-    Recoding,
+    RecodeRequest,
     Request,
     SignalSource,
     Span,
     refuse_extras,
 )
 from mcz.codecs.lossless.best_streams import build_stream, read_stream
-from mcz.codecs.lossless.segments import segment_frames
-from mcz.codecs.segments import Sizing, gather, guessing
+from mcz.codecs.segments import Sizing, gather, lossless_segment_frames, segments_by_guess
 from mcz.coding.fast.decoder import MOST_ROWS, Shape, check_size
 from mcz.errors import FormatError
 from mcz.threads import in_force
@@ -42,7 +41,9 @@ SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MOST_ROWS, spare=1, f
 def encode(source: SignalSource, params: Params) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
     prepare = partial(_prepare, source)
-    return Encoded(b"", guessing(source, params["segment_frames"], SIZING, prepare, in_force()))
+    return Encoded(
+        b"", segments_by_guess(source, params["segment_frames"], SIZING, prepare, in_force())
+    )
 
 
 def _prepare(source: SignalSource, start: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
@@ -51,7 +52,7 @@ def _prepare(source: SignalSource, start: int, stop: int) -> Callable[[], tuple[
     return lambda: tuple(build_stream(ordinals, grids, layout) for _ in layout.groups)
 
 
-def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of all segments with new values."""
     for span in asked.spans:
         yield _prepare(asked.source, span.first, span.stop)()
@@ -86,5 +87,5 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     recode=recode,
-    parameters=(segment_frames("57,000", MOST_ROWS),),
+    parameters=(lossless_segment_frames("57,000", MOST_ROWS),),
 )

@@ -128,11 +128,11 @@ def remember(miss: int, memory: Ints) -> None:
 
 def code_rest(state: Ints, data: Bytes, rest: int, memory: Ints, flow: Ints) -> int:
     """Code what a count is off; FAULT where it is too long."""
-    found = code_miss(state, data, rest, memory, flow)
-    if found == FAULT or found >> 31 != found >> 63:  # BEST-14
+    rest_code = code_miss(state, data, rest, memory, flow)
+    if rest_code == FAULT or rest_code >> 31 != rest_code >> 63:  # BEST-14
         return FAULT
-    remember(found, memory)  # BEST-13
-    return found
+    remember(rest_code, memory)  # BEST-13
+    return rest_code
 
 
 def echo_of(leads: Words2, place: int) -> int:

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
-from mcz.codecs.lossless.echoes import Echo, build_echoes, find_echoes, read_echoes, table_of
+from mcz.codecs.lossless.echoes import Echo, build_echoes, echo_table, find_echoes, read_echoes
 from mcz.codecs.lossless.references import choose_references
 from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
 from mcz.coding.fast.encoder import Plan, StreamBuilder
 from mcz.coding.fast.encoder import kernels as fast_kernels
 from mcz.coding.fast.lanes import fault_of
 from mcz.coding.forms.ids import WITH_UNIT
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError
 from mcz.numbers import Grid
@@ -51,10 +51,10 @@ def kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
 
 
 def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> bytes:
-    """The shortest stream of all methods: ``ordinals`` (rows, channels); ``grids``: in force."""
+    """Build the shortest stream; ``ordinals`` (rows, channels), ``grids`` in force."""
     builder = StreamBuilder(layout.grids, layout.groups)
     plan = builder.plan(ordinals, grids)
-    found: list[bytes] = []
+    streams: list[bytes] = []
     if len(plan.lanes.numbers):
         own = kernels()[0]
         leads = np.ascontiguousarray(plan.lanes.leads.T)
@@ -63,9 +63,10 @@ def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> byt
         for repeated in ([], echoes) if echoes else ([],):
             stream = code_plan(plan, chosen, repeated)
             if _work(chosen, len(leads)) <= WORK * (len(stream) + SPARE):
-                found.append(stream)
-    found.append(bytes((AS_FAST,)) + builder.write(plan)[0])  # last: it gives the heads parents
-    return min(found, key=len)
+                streams.append(stream)
+    # Last, because it changes the heads: it gives them parents.
+    streams.append(bytes((AS_FAST,)) + builder.write(plan)[0])
+    return min(streams, key=len)
 
 
 def _echoes_of(plan: Plan, leads: Words) -> list[Echo]:
@@ -88,7 +89,7 @@ def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[
     head, tail, *_, write = fast_kernels()
     coded, columns = plan.lanes, plan.channels.columns
     n_lanes, n_rows = coded.leads.shape
-    table = table_of(echoes, n_rows, n_lanes)
+    table = echo_table(echoes, n_rows, n_lanes)
     lanes = residual.predictors_of(n_lanes)
     lanes.first[:], lanes.scales[:] = coded.leads[:, 0], coded.scales
     taps = plan.channels.plans[coded.numbers, head.TAPS : head.TAPS + head.N_TAPS]
@@ -137,8 +138,8 @@ class _Model:
         sizes: list[int] = []
         for n in self.references[:, 0].tolist():
             sizes += own.n_linear(n), own.n_quadratic(n), own.N_BLENDED
-        found: Regressions = regression.regressions_of(sizes)
-        return found
+        regressions: Regressions = regression.regressions_of(sizes)
+        return regressions
 
 
 def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
@@ -164,7 +165,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     if stream[0] == ECHOED:
         echoes, at = read_echoes(bits, len(out), (rests.scales < 0).tolist())
         bits = bits[at:]
-    table = table_of(echoes, len(out), n_lanes)
+    table = echo_table(echoes, len(out), n_lanes)
     lanes.leads[:] = 0
     model = _Model(lanes.predictors, table, lanes.leads, rests)
     model.most_work = WORK * (len(stream) + SPARE)

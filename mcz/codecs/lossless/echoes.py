@@ -98,7 +98,7 @@ def _check(echo: Echo, n_rows: int, may_echo: Sequence[bool]) -> None:
             raise FormatError(f"best: an echo of {echo.n_channels} channels from {first} on")
 
 
-def table_of(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:
+def echo_table(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:
     """Place that each number repeats, counted from 1, negative if the sign is flipped.
 
     (n_rows, n_channels); 0 where a number is coded. Without echoes (0, n_channels).
@@ -128,20 +128,20 @@ def find_echoes(numbers: Ints, leads: Words, usable: Ints) -> list[Echo]:
     changes[0] = True
     np.not_equal(own[1:], own[:-1], out=changes[1:])
     weights = _bits(own)
-    taken = np.zeros(own.shape, bool)
+    covered = np.zeros(own.shape, bool)
     found: list[Echo] = []
     for lag, channel, source, minus in _candidates(own, changes):
-        same = ~taken[lag:, channel]
+        same = ~covered[lag:, channel]
         for rows in (own, own_leads):
             before = rows[:-lag, source]
             same &= rows[lag:, channel] == (-1 - before if minus else before)
-        for start, stop in _runs(same):
+        for start, stop in _runs_of_true(same):
             rows_of = slice(lag + start, lag + stop)
             if np.count_nonzero(changes[rows_of, channel]) * weights[channel] > COST:
-                taken[rows_of, channel] = True
+                covered[rows_of, channel] = True
                 place = int(usable[channel]), 1, lag, int(usable[source])
                 found.append(Echo(lag + start, stop - start, *place, minus))
-    return _merged(found)
+    return _merge_echoes(found)
 
 
 def _bits(numbers: Ints) -> NDArray[np.float64]:
@@ -173,13 +173,13 @@ def _candidates(numbers: Ints, changes: Bools) -> Iterator[tuple[int, int, int, 
         yield lag, channel_of, source_of, bool(sign)
 
 
-def _runs(same: Bools) -> Iterator[tuple[int, int]]:
+def _runs_of_true(same: Bools) -> Iterator[tuple[int, int]]:
     """Start and end of each run of True."""
     edges = np.flatnonzero(np.diff(same.astype(np.int8), prepend=0, append=0))
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
-def _merged(echoes: list[Echo]) -> list[Echo]:
+def _merge_echoes(echoes: list[Echo]) -> list[Echo]:
     """The same with those of neighboring channels in one."""
     merged: list[Echo] = []
     for echo in sorted(echoes, key=lambda e: (e.lag, e.row, e.n_rows, e.minus, e.channel)):

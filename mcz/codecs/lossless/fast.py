@@ -1,4 +1,4 @@
-"""Codec fast: linear prediction and adaptive Rice codes, made to be read.
+"""Codec 1, ``fast``: linear prediction and adaptive Rice codes, made to be read.
 
 SPEC.md, "Codec 1: fast", is normative.
 
@@ -20,14 +20,13 @@ from mcz.codecs.contract import (
     Encoded,
     Fetch,
     Layout,
-    Recoding,
+    RecodeRequest,
     Request,
     SignalSource,
     Span,
     refuse_extras,
 )
-from mcz.codecs.lossless.segments import segment_frames
-from mcz.codecs.segments import Sizing, guessing
+from mcz.codecs.segments import Sizing, lossless_segment_frames, segments_by_guess
 from mcz.coding.fast.decoder import (
     MOST_ROWS,
     MOST_VALUES,
@@ -50,7 +49,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     fixed: int = params["segment_frames"]
     most = min(MOST_ROWS if fixed else USUAL_ROWS, MOST_VALUES // max(1, source.layout.n_channels))
     prepare = partial(_prepare, source, _builder(source.layout))
-    return Encoded(b"", guessing(source, fixed, replace(SIZING, most_rows=most), prepare))
+    return Encoded(b"", segments_by_guess(source, fixed, replace(SIZING, most_rows=most), prepare))
 
 
 def _builder(layout: Layout) -> StreamBuilder:
@@ -60,12 +59,12 @@ def _builder(layout: Layout) -> StreamBuilder:
 def _prepare(
     source: SignalSource, builder: StreamBuilder, start: int, stop: int
 ) -> Callable[[], tuple[bytes, ...]]:
-    """The making of the streams of a segment."""
+    """Return a function that builds the streams of a segment."""
     grids, ordinals = source.grids(start), source.ordinals(start, stop)
     return lambda: builder.build(ordinals, grids)
 
 
-def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
     """The streams of all groups with new values."""
     builder = _builder(asked.source.layout)
     for span in asked.spans:
@@ -106,10 +105,10 @@ def _rows(layout: Layout, span: Span) -> int:
 
 
 def _shape(layout: Layout) -> Shape:
-    found = layout.derived.get(CODEC.name)
-    if not isinstance(found, Shape):
-        found = layout.derived[CODEC.name] = Shape(layout.grids, layout.groups)
-    return found
+    shape = layout.derived.get(CODEC.name)
+    if not isinstance(shape, Shape):
+        shape = layout.derived[CODEC.name] = Shape(layout.grids, layout.groups)
+    return shape
 
 
 def subset(layout: Layout, span: Span, groups: Sequence[int], fetch: Fetch) -> tuple[bytes, ...]:
@@ -136,5 +135,5 @@ CODEC = Codec(
     decode=decode,
     subset=subset,
     recode=recode,
-    parameters=(segment_frames("60,000", MOST_ROWS),),
+    parameters=(lossless_segment_frames("60,000", MOST_ROWS),),
 )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import Layout
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
 from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, Space, SpaceFields, space_of
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.errors import FormatError, LostFrameError, MotionError
 from mcz.schema import Record, field, one_of, parse
 

@@ -105,8 +105,8 @@ def _code_step(state: Ints, data: Bytes, step: int, kind: int, memory: Ints, fla
         if length > 9:
             return N_STEPS  # ONLINE-17
     size = 1 << (length - 1) | number(state, data, size, length - 1)
-    found = before - size if negative else before + size
-    return int(found) if 0 <= found < N_STEPS else N_STEPS  # ONLINE-17, ONLINE-18
+    coded = before - size if negative else before + size
+    return int(coded) if 0 <= coded < N_STEPS else N_STEPS  # ONLINE-17, ONLINE-18
 
 
 def _code_golomb(

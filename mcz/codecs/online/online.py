@@ -29,7 +29,6 @@ from mcz.codecs.contract import (
     model_finder,
 )
 from mcz.codecs.gaps import FrameReader, LiveRows
-from mcz.codecs.online.choices import plan_of, set_plan
 from mcz.codecs.online.coder import (
     GOLOMB,
     INTRA,
@@ -45,10 +44,11 @@ from mcz.codecs.online.options import (
     CHANGEABLE,
     PARAMETERS,
     PRESET_IDS,
-    choose,
-    choose_live,
-    settled,
+    choose_live_options,
+    choose_options,
+    settle_options,
 )
+from mcz.codecs.online.rate_control import plan_of, set_plan
 from mcz.codecs.online.units import Unit, build_units, parse_units
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import TARGET_BYTES
@@ -69,8 +69,8 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     Raises MotionError for a value that is not finite, or is too large, OptionError for parameters
     that contradict each other, or a rate where no frame rate is known.
     """
-    chosen = settled(params)
-    choice, order = choose(sample_of(NAME, source), chosen)
+    chosen = settle_options(params)
+    choice, order = choose_options(sample_of(NAME, source), chosen)
     layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
     header = build(_header(choice.fields, order, chosen), f"{NAME} header")
     writer = _Writer(header, layout, chosen)
@@ -121,7 +121,7 @@ class _Writer:
 
     def change(self, options: Params) -> None:
         """Apply parameters from the next group on."""
-        self._waiting = settled({**self.chosen, **(self._waiting or {}), **options})
+        self._waiting = settle_options({**self.chosen, **(self._waiting or {}), **options})
 
 
 def _segments(source: SignalSource, writer: _Writer) -> Iterator[Segment]:
@@ -184,7 +184,7 @@ def decode(
 def _needed(spans: Sequence[Span], request: Request, fetch: Fetch) -> list[tuple[int, Unit]]:
     """The units with which the requested frames can be decoded, each with its first frame."""
     fresh = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
-    found: list[tuple[int, Unit]] = []
+    needed: list[tuple[int, Unit]] = []
     for index in range(max(fresh, default=0), len(spans)):  # DATA-11
         span = spans[index]
         if span.first >= request.stop:
@@ -195,11 +195,11 @@ def _needed(spans: Sequence[Span], request: Request, fetch: Fetch) -> list[tuple
             raise FormatError(f"{NAME}: the segment at {at} begins with kind {units[0].kind}")
         for unit in units:
             if unit.kind == INTRA and at <= request.start:
-                found.clear()
+                needed.clear()
             if at < request.stop:
-                found.append((at, unit))
+                needed.append((at, unit))
             at += unit.n_frames
-    return found
+    return needed
 
 
 def uses(header: bytes) -> tuple[bytes, ...]:
@@ -213,12 +213,12 @@ class _LiveEncoder(LiveEncoder):
     version: int | None = None
 
     def __init__(self, layout: Layout, options: Params) -> None:
-        chosen = settled(options)
-        choice, order = choose_live(layout, chosen)
+        chosen = settle_options(options)
+        choice, order = choose_live_options(layout, chosen)
         self.header = build(_header(choice.fields, order, chosen), f"{NAME} header")
         self.models, self.preset = choice.models, PRESET_IDS[options["preset"]]
-        found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
-        self._writer = _Writer(self.header, found, chosen)
+        resolved = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
+        self._writer = _Writer(self.header, resolved, chosen)
         self._rows = LiveRows(NAME, layout)
 
     def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mcz.codecs.contract import Layout
-from mcz.codecs.online.choices import FLOOR_CM
 from mcz.codecs.online.coder import AS_IS, NAME, REORDERED
+from mcz.codecs.online.rate_control import FLOOR_CM
 from mcz.codecs.online.units import MODES
 from mcz.codecs.parameters import Parameter, choice, integer, number
 from mcz.codecs.space_choices import (
@@ -23,10 +23,10 @@ from mcz.codecs.space_choices import (
     VIRTUAL_MARKERS,
     Choice,
     Sample,
-    at_hand,
-    changes,
+    basis_at_hand,
     choose_space,
     default_step,
+    frame_differences,
     live_sample,
 )
 from mcz.errors import OptionError
@@ -70,7 +70,7 @@ CHANGEABLE = {
 }
 
 
-def settled(params: Params) -> Settings:
+def settle_options(params: Params) -> Settings:
     """All parameters with what the preset says; raises OptionError for a contradiction."""
     values = PRESETS[params["preset"]].items()
     chosen = dict(params) | {n: v if params[n] is None else params[n] for n, v in values}
@@ -86,7 +86,7 @@ def settled(params: Params) -> Settings:
     return chosen
 
 
-def choose(sample: Sample, chosen: Params) -> tuple[Choice, int]:
+def choose_options(sample: Sample, chosen: Params) -> tuple[Choice, int]:
     """The fields of SPACE and the order of points, from what an encoder looks at."""
     which, order = chosen["basis"], AS_IS
     step = chosen["step"] or default_step(sample)
@@ -96,11 +96,11 @@ def choose(sample: Sample, chosen: Params) -> tuple[Choice, int]:
             raise OptionError(f"{NAME}: order reordered has cosines only, not basis {which}")
         sample, which, order = replace(sample, apart=False), "cosines", REORDERED
     elif which == "auto":
-        which = at_hand(sample)  # as live, so that a file is no better than its stream
-    return choose_space(NAME, sample, step, which, changes), order
+        which = basis_at_hand(sample)  # as live, so that a file is no better than its stream
+    return choose_space(NAME, sample, step, which, frame_differences), order
 
 
-def choose_live(layout: Layout, chosen: Params) -> tuple[Choice, int]:
+def choose_live_options(layout: Layout, chosen: Params) -> tuple[Choice, int]:
     """The same before any frame is known."""
     sample, _ = live_sample(NAME, layout, chosen["basis"])
     step = chosen["step"]
@@ -109,7 +109,7 @@ def choose_live(layout: Layout, chosen: Params) -> tuple[Choice, int]:
     if step is None:
         unit = layout.skeleton.unit_cm if layout.skeleton is not None else None
         step = min(max(FLOOR_CM / (unit or 1.0), LEAST), MOST)
-    return choose(sample, {**chosen, "step": step})
+    return choose_options(sample, {**chosen, "step": step})
 
 
 PARAMETERS = (

@@ -106,8 +106,8 @@ def _steady_step(plan: Floats) -> float:
     due = plan[GROUP_BITS] - (plan[FRAMING] + plan[AHEAD] / plan[BUFFER]) * n_frames
     if plan[OWED] > 0:
         due -= plan[EXTRA] / plan[PERIOD]
-    found = np.log2(cost / max(due, LEAST_SHARE * plan[GROUP_BITS])) / FALL
-    return float(min(max(found, FINEST), COARSEST))
+    change = np.log2(cost / max(due, LEAST_SHARE * plan[GROUP_BITS])) / FALL
+    return float(min(max(change, FINEST), COARSEST))
 
 
 def ltr_step(
@@ -117,13 +117,13 @@ def ltr_step(
 
     Where a rate is held, an intra coded one, which nothing predicts, is never wholly 0.
     """
-    found = _ltr_step(plan, coefficients, intra, n_frames, laplace)
+    step = _ltr_step(plan, coefficients, intra, n_frames, laplace)
     if plan[MODE] == MOD:
-        return found
+        return step
     largest = largest_of(coefficients)
     if intra and largest > 0:
-        found = min(found, np.log2(largest) - INTRA_LEVELS)
-    return float(max(found, FINEST))
+        step = min(step, np.log2(largest) - INTRA_LEVELS)
+    return float(max(step, FINEST))
 
 
 def _ltr_step(
@@ -185,10 +185,10 @@ def _settle_steady(plan: Floats, kind: int, used: float, bits: float, empty: boo
     if empty and before > 0:
         cost = min(cost, before)
     if kind == STR:
-        plan[STR_COST] = _followed(plan[STR_COST], cost, FOLLOW / plan[BUFFER])
+        plan[STR_COST] = _follow_rate(plan[STR_COST], cost, FOLLOW / plan[BUFFER])
     elif kind == LTR:
         part = FOLLOW * plan[GROUP_FRAMES] / plan[BUFFER]
-        plan[LTR_COST] = _followed(plan[LTR_COST], cost, part)
+        plan[LTR_COST] = _follow_rate(plan[LTR_COST], cost, part)
     elif plan[PERIOD] > 0:
         usual = plan[LTR_BITS] if plan[LTR_BITS] >= 0 else bits / 4
         plan[EXTRA] = max(bits - usual, 0.0)
@@ -200,5 +200,5 @@ def _settle_steady(plan: Floats, kind: int, used: float, bits: float, empty: boo
         plan[OWED] -= paid
 
 
-def _followed(before: float, now: float, share: float) -> float:
+def _follow_rate(before: float, now: float, share: float) -> float:
     return now if before <= 0 else before + (now - before) * min(share, 1.0)

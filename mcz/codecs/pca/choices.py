@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.pca.streams import MAX_INDEX, MAX_SHIFT, Components
-from mcz.codecs.steps import code_of, ratio_of
+from mcz.codecs.step_codes import code_of, ratio_of
 from mcz.errors import MotionError
 
 Floats = NDArray[np.float64]
@@ -56,7 +56,7 @@ def components_of(values: Floats, q: int, decimals: int | None, *, by_frame: boo
         return Components(0, np.zeros(n_channels, np.int64), np.zeros(0, np.int64), empty, empty.T)
     means = np.zeros(n_channels) if by_frame else values.mean(axis=0)
     rest = values - (values.mean(axis=1, keepdims=True) if by_frame else means)
-    vectors, energies = principal(rest)
+    vectors, energies = principal_components(rest)
     # Without their mean the channels of a frame have a dimension less.
     q = min(q, len(energies), n_channels - 1 if by_frame else n_channels)
     grid = _decimal_grid(decimals) if decimals is not None else _grid(energies, q, means, n_frames)
@@ -72,10 +72,10 @@ def components_of(values: Floats, q: int, decimals: int | None, *, by_frame: boo
         shifts = np.concatenate([[0.0], shifts])
     some = basis.any(axis=1)
     basis, powers = basis[some], shifts[some].astype(np.int64)
-    mean_indices = _rounded(means, grid.mean_step, decimals)
+    mean_indices = _round_components(means, grid.mean_step, decimals)
     left = values - _values(mean_indices, grid.mean_step, decimals)
     real = np.ldexp(basis, -powers[:, None])
-    indices = _rounded(_fitted(real, left), grid.step, decimals)
+    indices = _round_components(_fit_components(real, left), grid.step, decimals)
     used = indices.any(axis=0)
     return Components(
         grid.code,
@@ -86,7 +86,7 @@ def components_of(values: Floats, q: int, decimals: int | None, *, by_frame: boo
     )
 
 
-def principal(rest: Floats) -> tuple[Floats, Floats]:
+def principal_components(rest: Floats) -> tuple[Floats, Floats]:
     """Unit vectors (components, channels) and the energies along them, the greatest first.
 
     The largest entry of each vector is positive.
@@ -112,7 +112,7 @@ def principal(rest: Floats) -> tuple[Floats, Floats]:
     return vectors * np.where(largest < 0, -1.0, 1.0), energies[order] * scale**2
 
 
-def _fitted(basis: Floats, left: Floats) -> Floats:
+def _fit_components(basis: Floats, left: Floats) -> Floats:
     """Coefficients (frames, components) of least squares upon ``basis`` (components, channels)."""
     gram = basis @ basis.T
     if len(gram) and np.linalg.cond(gram) < WELL_CONDITIONED:
@@ -133,13 +133,13 @@ def _decimal_grid(decimals: int) -> Grid:
     return Grid(10.0**-decimals, 10.0**-decimals, 0)
 
 
-def _rounded(values: Floats, step: float, decimals: int | None) -> Ints:
+def _round_components(values: Floats, step: float, decimals: int | None) -> Ints:
     """Integers, halves away from zero; raises MotionError where one is too large."""
     sizes = np.abs(values) / step if decimals is None else np.abs(values) * 10.0**decimals
-    found = np.floor(sizes + 0.5)
-    if not (found <= MAX_INDEX).all():
+    rounded = np.floor(sizes + 0.5)
+    if not (rounded <= MAX_INDEX).all():
         raise MotionError("pca: a coefficient exceeds 2^40 quantizer steps")
-    return np.where(values < 0, -found, found).astype(np.int64)
+    return np.where(values < 0, -rounded, rounded).astype(np.int64)
 
 
 def _values(indices: Ints, step: float, decimals: int | None) -> Floats:

@@ -24,10 +24,10 @@ from mcz.codecs.parameters import (
     SCALED,
     Dial,
     Parameter,
-    chosen_of,
     decimals_parameter,
     integer,
     preset_parameter,
+    preset_values,
 )
 from mcz.codecs.pca.choices import MEAN_STEPS, components_of
 from mcz.codecs.pca.streams import build_stream, parse_stream
@@ -35,10 +35,10 @@ from mcz.codecs.segments import (
     SEGMENT_FRAMES,
     SEGMENT_FRAMES_PARAMETER,
     Lengths,
-    halving,
     segment_frames_of,
+    segments_by_halving,
 )
-from mcz.codecs.steps import ratio_of
+from mcz.codecs.step_codes import ratio_of
 from mcz.errors import FormatError
 from mcz.schema import Checked, Record, build, field, parse
 from mcz.types import Params, Reals, Settings, Values
@@ -69,7 +69,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     Raises MotionError for a value that is not finite, or is too large.
     """
     published = params["preset"] == "khan2014"
-    chosen = chosen_of(PRESETS, params)
+    chosen = preset_values(PRESETS, params)
     frames = segment_frames_of(source.layout, params["segment_frames"], as_published=published)
     decimals = SCALED if chosen["Q"] is None else chosen["Q"]
     header = build(PcaHeader(decimals=decimals), "pca header")
@@ -83,14 +83,14 @@ def _segments(
     frames = SegmentReader("pca", source)
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
-        found = components_of(frames(first, stop), q, decimals, by_frame=published)
-        return (build_stream(found, scaled=decimals is None),) * len(layout.groups)
+        components = components_of(frames(first, stop), q, decimals, by_frame=published)
+        return (build_stream(components, scaled=decimals is None),) * len(layout.groups)
 
     length = min(segment_frames or SEGMENT_FRAMES, layout.most_frames)
     if segment_frames >= layout.n_frames:
         length = layout.n_frames
     lengths = Lengths(length, bool(segment_frames), least=LEAST_FRAMES)
-    for first, stop, streams in halving(layout.n_frames, lengths, code):
+    for first, stop, streams in segments_by_halving(layout.n_frames, lengths, code):
         yield Segment(first, stop - first, streams)
 
 
@@ -129,13 +129,13 @@ def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, wanted: i
     from mcz.codecs.pca import kernels
 
     scaled = decimals == SCALED
-    found = parse_stream(stream, layout.n_channels, span.n_frames, wanted, scaled=scaled)
+    parts = parse_stream(stream, layout.n_channels, span.n_frames, wanted, scaled=scaled)
     if scaled:
-        step = ratio_of(found.step)
-        means, rows = found.means * (step / MEAN_STEPS), found.coefficients * step  # PCA-15
+        step = ratio_of(parts.step)
+        means, rows = parts.means * (step / MEAN_STEPS), parts.coefficients * step  # PCA-15
     else:
-        means, rows = found.means / 10.0**decimals, found.coefficients / 10.0**decimals  # PCA-16
-    basis = np.ldexp(found.basis.astype(np.float64), -found.shifts[:, None])
+        means, rows = parts.means / 10.0**decimals, parts.coefficients / 10.0**decimals  # PCA-16
+    basis = np.ldexp(parts.basis.astype(np.float64), -parts.shifts[:, None])
     out = np.zeros((wanted, layout.n_channels))
     kernels.evaluate(out, _plain(means), _plain(basis), _plain(rows))
     return out

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.predictors import choose_predictor
-from mcz.coding.start import start_states
+from mcz.codecs.predictor_choice import choose_predictor
+from mcz.coding.start_states import start_states
 from mcz.coding.streams import code, halves_of, scale_of, uncode
 from mcz.errors import FormatError, MotionError
 from mcz.schema import read_varint, varint
@@ -36,30 +36,32 @@ class Components:
     coefficients: Ints
 
 
-def build_stream(found: Components, *, scaled: bool) -> bytes:
+def build_stream(components: Components, *, scaled: bool) -> bytes:
     """The stream of a segment; raises MotionError where an integer is too large."""
-    parts = (found.means, found.basis, found.coefficients)
+    parts = (components.means, components.basis, components.coefficients)
     if any(len(part) and np.abs(part).max(initial=0) > MAX_INDEX for part in parts):
         raise MotionError("pca: a coefficient exceeds 2^40 quantizer steps")
-    if not found.means.any() and not len(found.basis):
+    if not components.means.any() and not len(components.basis):
         return b""
-    mean_scale = halves_of(float(np.abs(found.means).mean()), MAX_SCALE)
-    several = len(found.coefficients) > 1  # a first coefficient is not predicted
-    forms = [choose_predictor(column) if several else (0, 0) for column in found.coefficients.T]
-    head = bytes((found.step,)) if scaled else b""
-    sides = bytes(found.shifts.tolist())
+    mean_scale = halves_of(float(np.abs(components.means).mean()), MAX_SCALE)
+    several = len(components.coefficients) > 1  # a first coefficient is not predicted
+    forms = [
+        choose_predictor(column) if several else (0, 0) for column in components.coefficients.T
+    ]
+    head = bytes((components.step,)) if scaled else b""
+    sides = bytes(components.shifts.tolist())
     sides += bytes(min(halves, MAX_SCALE) | predictor << 6 for predictor, halves in forms)
-    head += bytes((mean_scale,)) + varint(len(found.basis)) + sides
-    count = found.means.size + found.basis.size + found.coefficients.size
+    head += bytes((mean_scale,)) + varint(len(components.basis)) + sides
+    count = components.means.size + components.basis.size + components.coefficients.size
     return head + code(
         start_states("pca")[0],
         4 * count + 256,
         lambda state, data: _loop(
             state,
             data,
-            found.means.copy(),
-            found.basis.copy(),
-            found.coefficients.copy(),
+            components.means.copy(),
+            components.basis.copy(),
+            components.coefficients.copy(),
             sides,
             mean_scale,
         ),

@@ -1,1 +1,1 @@
-"""Codec qbc, ``posewave``: wavelets in time, coded in the metric of the pose."""
+"""Codec 3, ``posewave``: wavelets in time, coded in the metric of the pose."""

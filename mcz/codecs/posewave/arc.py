@@ -6,7 +6,7 @@ then whole eighths and quarters, by + - * / in one order. Off by less than 1e-15
 
 from __future__ import annotations
 
-from mcz.codecs.posewave.turns import Rule
+from mcz.codecs.posewave.trigonometry import Rule
 
 STEEP = 0.41421356237309503  # above it an eighth of a turn is taken off
 N_FACTORS = 20
@@ -15,7 +15,7 @@ LAST = 1.0 / (2 * N_FACTORS + 1.0)
 ARC = tuple(1.0 / (2 * k + 1.0) for k in range(N_FACTORS - 1, -1, -1))
 
 
-def arc(y: float, x: float, rule: Rule) -> float:
+def angle_of(y: float, x: float, rule: Rule) -> float:
     """The angle of (x, y), finite, in the unit of ``rule``: at most half a turn; 0 of (0, 0)."""
     up, right = abs(y), abs(x)
     small, large = min(up, right), max(up, right)

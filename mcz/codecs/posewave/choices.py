@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
-from mcz.codecs.posewave.contact_keeper import Keeper
 from mcz.codecs.posewave.contact_plan import ContactsFields
-from mcz.codecs.posewave.exact import partition
+from mcz.codecs.posewave.contact_tracker import ContactTracker
+from mcz.codecs.posewave.exact_channels import partition
 from mcz.codecs.posewave.header import (
     MAX_FINE,
     NAME,
@@ -38,7 +38,7 @@ from mcz.codecs.posewave.priors import number_of
 from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
-from mcz.codecs.steps import code_of
+from mcz.codecs.step_codes import code_of
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics import reach
@@ -83,7 +83,7 @@ class Choice:
 
     header: bytes
     weights: Weights
-    keeper: Keeper | None = None
+    keeper: ContactTracker | None = None
 
 
 def choose(source: SignalSource, params: Params) -> Choice:
@@ -94,7 +94,7 @@ def choose(source: SignalSource, params: Params) -> Choice:
     # With the unit unknown, a skeleton of 90 cm stands for all: only ratios follow from it.
     step_cm = step * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))
     weights = weights_of(step_cm)
-    fields = _fields(skeleton, step, step_cm)
+    fields = _header_fields(skeleton, step, step_cm)
     limits = params.get("limits")
     spreads = _spreads(sample(source, SAMPLED_FRAMES)) if limits is None else limits
     fields |= _plain_steps(skeleton, spreads, step_cm, turning=limits is None)
@@ -124,7 +124,7 @@ def choose(source: SignalSource, params: Params) -> Choice:
 
 def _contacts(
     source: SignalSource, params: Params, in_cm: float
-) -> tuple[list[ContactsFields], Keeper | None]:
+) -> tuple[list[ContactsFields], ContactTracker | None]:
     """The header's field, and what is to be kept; ``in_cm``: length units a centimeter."""
     if not params.get("contacts") or not source.layout.n_frames:
         return [], None
@@ -140,7 +140,7 @@ def _contacts(
     tolerance = params["contact_tolerance"] * in_cm
     runs = runs_of(source, params["contacts"])
     wanted = choose_contacts(skeleton, runs, tolerance, None if rate is None else float(rate))
-    return ([wanted.fields], Keeper(tolerance, wanted.pieces)) if wanted else ([], None)
+    return ([wanted.fields], ContactTracker(tolerance, wanted.pieces)) if wanted else ([], None)
 
 
 def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) -> Choice:
@@ -155,7 +155,7 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
         step = STEP_OF_BOUND * bound_cm
     own = step / (unit or 1.0)
     step_cm = own * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))
-    fields = _fields(skeleton, own, step_cm)
+    fields = _header_fields(skeleton, own, step_cm)
     fields |= _plain_steps(skeleton, np.ones(skeleton.n_channels), step_cm)
     fields |= {"levels": 0, "borrowing": 0}
     fields["start"] |= 1
@@ -164,7 +164,7 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
     return Choice(build_header(**fields), weights_of(step_cm))
 
 
-def guess(target: str, limit: float) -> float | None:
+def guess_step(target: str, limit: float) -> float | None:
     """A step in cm that comes near a mean error, or with which few frames miss a bound."""
     if target == "max_error_cm":
         limit *= MEAN_TO_BOUND
@@ -194,7 +194,7 @@ def weights_of(step_cm: float) -> Weights:
     return Weights(COARSEST_WEIGHT, float(np.interp(math.log(step_cm), places, RATE_WEIGHTS)))
 
 
-def _fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
+def _header_fields(skeleton: Skeleton, step: float, step_cm: float) -> Settings:
     in_cm = step / step_cm  # length units a centimeter
     degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
     first = 2 if step_cm <= FINE_CM else 0
@@ -242,8 +242,8 @@ def _spreads(rows: Floats) -> Floats:
     n = np.maximum(known.sum(axis=0), 1)
     means = np.where(known, rows, 0.0).sum(axis=0) / n
     with np.errstate(over="ignore"):  # values that are refused later
-        found: Floats = np.sqrt((np.where(known, rows - means, 0.0) ** 2).sum(axis=0) / n)
-    return found
+        spreads: Floats = np.sqrt((np.where(known, rows - means, 0.0) ** 2).sum(axis=0) / n)
+    return spreads
 
 
 def _plain_steps(
@@ -284,12 +284,12 @@ def _plain_steps(
 def _greatest_steps(skeleton: Skeleton, fields: Params, limits: Floats, step_cm: float) -> Settings:
     """Steps of angles and positions with which each channel keeps a limit, (n_channels,)."""
     kinds = np.array([channel.kind for channel in skeleton.channels])
-    found = {}
+    steps = {}
     for name, some in (("rotation", ANGLE_KINDS), ("position", POSITION_KINDS)):
         own = limits[np.isin(kinds, some)]
         if len(own):
-            found[name] = min(fields[name], code_of(float(own.min()) * step_cm / SPREAD_CM))
-    return found
+            steps[name] = min(fields[name], code_of(float(own.min()) * step_cm / SPREAD_CM))
+    return steps
 
 
 def best_levels(
@@ -316,30 +316,30 @@ def best_levels(
         error = distortion(header, skeleton, values[::SAMPLED], found)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 
-    return _lowest(tried, score)
+    return _minimize(tried, score)
 
 
-def _lowest(tried: Sequence[int], score: Callable[[int], float]) -> int:
+def _minimize(tried: Sequence[int], score: Callable[[int], float]) -> int:
     """The one with the lowest score, of scores that fall and then rise."""
     scores = [score(tried[k]) for k in (1, 2)]
     at, way = (2, 1) if scores[1] < scores[0] else (1, -1)
     lowest = min(scores)
     while 0 <= at + way < len(tried):
-        found = score(tried[at + way])
-        if found >= lowest:
+        value = score(tried[at + way])
+        if value >= lowest:
             break
-        at, lowest = at + way, found
+        at, lowest = at + way, value
     return tried[at]
 
 
-def distortion(header: Header, skeleton: Skeleton, values: Floats, found: Floats) -> float:
+def distortion(header: Header, skeleton: Skeleton, values: Floats, decoded: Floats) -> float:
     """Mean error of joints and points on their axes, weighted by joint."""
     try:
         chain = chain_of(skeleton)
     except MotionError:  # without angles that mean something: by channel
-        return float(np.mean(np.abs(values - found) / header.greatest)) * header.step
+        return float(np.mean(np.abs(values - decoded) / header.greatest)) * header.step
     away = []
-    for (_, _, ours), (_, _, theirs) in zip(chain.poses(values), chain.poses(found), strict=True):
+    for (_, _, ours), (_, _, theirs) in zip(chain.poses(values), chain.poses(decoded), strict=True):
         for joint in range(skeleton.n_joints):
             moved = (ours.origins[joint] - theirs.origins[joint])[:, None]
             turned = header.radius * (ours.axes[joint] - theirs.axes[joint])

@@ -15,7 +15,6 @@ import numpy as np
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import in_range
-from mcz.codecs.posewave.contact_keeper import Piece
 from mcz.codecs.posewave.contact_plan import (
     MAX_POINTS,
     MAX_RAMP,
@@ -23,13 +22,14 @@ from mcz.codecs.posewave.contact_plan import (
     PointFields,
     path_of,
 )
+from mcz.codecs.posewave.contact_tracker import Piece
 from mcz.codecs.posewave.header import NAME
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import OptionError
 from mcz.indexing import merged_ranges
 from mcz.kinematics.contacts import USUAL_RATE, FootTracks
-from mcz.kinematics.feet import feet_of
+from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import points_of, positions_of
 from mcz.motion import Skeleton
 
@@ -46,7 +46,7 @@ RAMP_SECONDS = 1 / 15
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ContactSettings:
     """Fields of CONTACTS, and the pieces to hold, in the order of their points and frames."""
 
     fields: ContactsFields
@@ -65,7 +65,7 @@ def parse_runs(given: Any) -> Runs:
         return AUTO
     try:
         if isinstance(given, str):
-            given = [_entry(part.strip()) for part in given.split(",")]
+            given = [_parse_entry(part.strip()) for part in given.split(",")]
         runs = tuple((str(name), int(first), int(count)) for name, first, count in given)
     except (TypeError, ValueError):
         raise OptionError(
@@ -90,7 +90,7 @@ def run_words(runs: Runs) -> str:
 in_range("auto, or joints, each with frames (joint:first+count) or without", parse_runs)
 
 
-def _entry(text: str) -> Run:
+def _parse_entry(text: str) -> Run:
     match = _ENTRY.fullmatch(text)
     if match is None:
         raise ValueError(text)
@@ -108,22 +108,22 @@ def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
     if not has_kinematics(skeleton, whole=True):
         raise OptionError(f"contacts: skeleton {skeleton.name!r} has angles of an unknown unit")
     if isinstance(wanted, str):
-        if not feet_of(skeleton):
+        if not find_feet(skeleton):
             raise OptionError(
                 f"contacts: no joint of skeleton {skeleton.name!r} is a foot by its name; name "
                 "those that are, like contacts=ankle_l,ankle_r"
             )
-        return _found(source, skeleton, None)
+        return _detect_runs(source, skeleton, None)
     for name, first, count in wanted:
-        _joint(skeleton, name)
+        _joint_index(skeleton, name)
         if first + count > n_frames:
             raise OptionError(f"contacts: {name}:{first}+{count} goes beyond {n_frames} frames")
     given = tuple(run for run in wanted if run[2])
     alone = [name for name, _, count in wanted if not count]
-    return (*given, *_found(source, skeleton, alone)) if alone else given
+    return (*given, *_detect_runs(source, skeleton, alone)) if alone else given
 
 
-def _found(
+def _detect_runs(
     source: SignalSource, skeleton: Skeleton, joints: Sequence[str] | None
 ) -> tuple[Run, ...]:
     layout = source.layout
@@ -132,20 +132,20 @@ def _found(
         values = reader.next(min(start + BLOCK, layout.n_frames))
         tracks.add(start, positions_of(skeleton, values))
     rate = None if layout.frame_rate is None else float(layout.frame_rate)
-    found = tracks.contacts(rate, skeleton.up_axis)
-    return tuple((run.joint, run.first, run.n_frames) for run in found.runs)
+    contacts = tracks.contacts(rate, skeleton.up_axis)
+    return tuple((run.joint, run.first, run.n_frames) for run in contacts.runs)
 
 
 def choose_contacts(
     skeleton: Skeleton, runs: Iterable[Run], tolerance: float, frame_rate: float | None
-) -> Wanted | None:
+) -> ContactSettings | None:
     """Contact settings that hold ``runs`` to ``tolerance``, in length units; None without runs.
 
     Raises OptionError for a joint that is not there, or for too many.
     """
     by_joint: dict[int, list[tuple[int, int]]] = {}
     for name, first, count in runs:
-        by_joint.setdefault(_joint(skeleton, name), []).append((first, first + count))
+        by_joint.setdefault(_joint_index(skeleton, name), []).append((first, first + count))
     if not by_joint:
         return None
     if len(by_joint) > MAX_POINTS:
@@ -157,7 +157,7 @@ def choose_contacts(
         follows = joints.index(above[-1]) + 1 if above else 0
         tail = points_of(skeleton)[joint][0] + 1
         points.append(PointFields(joint=joint, tail=tail, step=step, follows=follows))
-    for group in _groups(skeleton, joints):
+    for group in _group_joints(skeleton, joints):
         stances = merged_ranges([span for joint in group for span in by_joint[joint]])
         for joint in group:
             for first, stop in merged_ranges(by_joint[joint]):
@@ -165,10 +165,10 @@ def choose_contacts(
                 pieces.append(Piece(joints.index(joint), first, stop - first, first, stance))
         n_stances += len(stances)
     ramp = min(round(RAMP_SECONDS * (frame_rate or USUAL_RATE)), MAX_RAMP)
-    return Wanted(ContactsFields(rounds=ROUNDS, ramp=ramp, points=points), tuple(pieces))
+    return ContactSettings(ContactsFields(rounds=ROUNDS, ramp=ramp, points=points), tuple(pieces))
 
 
-def _groups(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:
+def _group_joints(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:
     """Joints of which one hangs from the other, as a toe from its foot."""
     groups: list[list[int]] = []
     for joint in joints:
@@ -182,7 +182,7 @@ def _groups(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:
     return groups
 
 
-def _joint(skeleton: Skeleton, name: str) -> int:
+def _joint_index(skeleton: Skeleton, name: str) -> int:
     addresses = list(skeleton.addresses())
     if name not in addresses:
         raise OptionError(f"contacts: there is no joint {name!r}")

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.codecs.posewave.apply_kernels import row_out_of
-from mcz.codecs.posewave.contact_plan import START_UNITS, Held
+from mcz.codecs.posewave.contact_plan import START_UNITS, HeldPoints
 from mcz.codecs.posewave.displacement_kernels import Track
 from mcz.codecs.posewave.metric_kernels import factor_rows
 from mcz.codecs.posewave.pose_kernels import Lanes, place_joints
 from mcz.codecs.posewave.pose_kernels import lanes_of as lanes_of
 from mcz.codecs.posewave.skeleton_plan import Plan
-from mcz.codecs.posewave.turns import BEYOND
+from mcz.codecs.posewave.trigonometry import BEYOND
 from mcz.kernels import kernel
 from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints2
 
@@ -26,16 +26,18 @@ LEANING, STANDING = 1, 2  # a point before or after a contact, and in one
 
 
 @kernel
-def place(plan: Plan, held: Held, lanes: Lanes, values: Floats2, found: Floats3) -> None:
+def place_points(
+    plan: Plan, held: HeldPoints, lanes: Lanes, values: Floats2, positions: Floats3
+) -> None:
     """Fill ``found`` (n_points, n_frames, 3) with places in frames ``values`` (n_frames, ...)."""
-    for n in range(found.shape[1]):
+    for n in range(positions.shape[1]):
         place_joints(plan, values, n, lanes, 1)
         for k in range(len(held.joints)):
-            _place_point(plan, held, k, values[n], lanes, found[k, n])
+            _place_point(plan, held, k, values[n], lanes, positions[k, n])
 
 
 @kernel
-def aim(
+def set_shifts(
     places: Floats2, contacts: Track, step: float, ramp: int, shifts: Floats2, active: Ints
 ) -> None:
     """Set the target shift of a point, at ``places`` (n_frames, 3), and when it applies.
@@ -74,9 +76,9 @@ def _lean(end: int, f: int, share: float, shifts: Floats2, active: Ints) -> None
 
 
 @kernel
-def correct(
+def correct_poses(
     plan: Plan,
-    held: Held,
+    held: HeldPoints,
     lanes: Lanes,
     values: Floats2,
     active: Ints2,
@@ -138,15 +140,17 @@ def correct(
 
 def _note_active(active: Ints2, n: int, least: int, which: Ints) -> int:
     """List the points at least that active in a frame; return their number."""
-    found = 0
+    n_active = 0
     for k in range(len(active)):
         if active[k, n] >= least:
-            which[found] = k
-            found += 1
-    return found
+            which[n_active] = k
+            n_active += 1
+    return n_active
 
 
-def _place_point(plan: Plan, held: Held, k: int, row: Floats, lanes: Lanes, point: Floats) -> None:
+def _place_point(
+    plan: Plan, held: HeldPoints, k: int, row: Floats, lanes: Lanes, point: Floats
+) -> None:
     """Compute the position of point ``k``, from its root on, and that of the root."""
     joint, root = held.joints[k], held.roots[k]
     own, origin = lanes.axes[joint + 1], lanes.origins[joint + 1]
@@ -162,7 +166,7 @@ def _place_point(plan: Plan, held: Held, k: int, row: Floats, lanes: Lanes, poin
 
 
 def _note_pulls(
-    plan: Plan, held: Held, k: int, lanes: Lanes, factor: Floats, pulls: Floats2
+    plan: Plan, held: HeldPoints, k: int, lanes: Lanes, factor: Floats, pulls: Floats2
 ) -> None:
     """Write the Jacobian of point ``k`` in the metric: three rows of J R^-1."""
     joint = held.joints[k]

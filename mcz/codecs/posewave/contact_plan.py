@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from construct import Float32l, Int8ul
 
-from mcz.codecs.posewave.skeleton_plan import PLAIN, Plan, limited, orientation
-from mcz.codecs.posewave.turns import RULES
+from mcz.codecs.posewave.skeleton_plan import PLAIN, Plan, limit_number, orientation
+from mcz.codecs.posewave.trigonometry import RULES
 from mcz.errors import FormatError
 from mcz.kernels.types import Floats, Floats2, Ints
 from mcz.motion import Skeleton
@@ -69,7 +69,7 @@ class Contacts:
     follows: tuple[int, ...]
 
 
-class Held(NamedTuple):
+class HeldPoints(NamedTuple):
     """The points of contacts in a segment, as the kernels want them.
 
     ``joints`` (n_points,) and ``tails`` (n_points, 3), along the joint's B; ``roots`` (n_points,)
@@ -91,19 +91,19 @@ def parse_contacts(
     fields: Sequence[ContactsFields], skeleton: Skeleton, where: str
 ) -> Contacts | None:
     """Raises FormatError where the fields do not fit the skeleton."""
-    for found in fields:
-        if not found.points:  # HOLD-03
+    for record in fields:
+        if not record.points:  # HOLD-03
             raise FormatError(f"{where}: contacts of no point")
-        for number, point in enumerate(found.points):
+        for number, point in enumerate(record.points):
             if point.follows > number:  # HOLD-06
                 raise FormatError(f"{where}: point {number + 1} follows point {point.follows}")
         return Contacts(
-            rounds=found.rounds,
-            ramp=found.ramp,
-            joints=tuple(point.joint for point in found.points),
-            tails=np.array([_place(skeleton, p.joint, p.tail, where) for p in found.points]),
-            steps=tuple(point.step for point in found.points),
-            follows=tuple(point.follows for point in found.points),
+            rounds=record.rounds,
+            ramp=record.ramp,
+            joints=tuple(point.joint for point in record.points),
+            tails=np.array([_place(skeleton, p.joint, p.tail, where) for p in record.points]),
+            steps=tuple(point.step for point in record.points),
+            follows=tuple(point.follows for point in record.points),
         )
     return None
 
@@ -113,7 +113,7 @@ def _place(skeleton: Skeleton, joint: int, tail: int, where: str) -> tuple[float
         raise FormatError(f"{where}: contacts of point {tail} of joint {joint}")
     if not tail:
         return 0.0, 0.0, 0.0
-    x, y, z = (limited(x) for x in skeleton.joints[joint].tails[tail - 1])
+    x, y, z = (limit_number(x) for x in skeleton.joints[joint].tails[tail - 1])
     m = orientation(skeleton.joints[joint], RULES[skeleton.angle_unit])
     a, b, c = (m[0][k] * x + m[1][k] * y + m[2][k] * z for k in range(3))
     return a, b, c
@@ -127,12 +127,12 @@ def path_of(parents: Sequence[int] | Ints, joint: int) -> list[int]:
     return path[::-1]
 
 
-def make_held(contacts: Contacts, plan: Plan, columns: Ints, greatest: Floats) -> Held:
+def make_held_points(contacts: Contacts, plan: Plan, columns: Ints, greatest: Floats) -> HeldPoints:
     """The points on a plan; ``columns`` and ``greatest`` steps are those of the kept channels."""
     paths = [path_of(plan.parents, joint) for joint in contacts.joints]
     moving = plan.joints != PLAIN
     chains = [np.flatnonzero(moving & np.isin(plan.joints, path)) for path in paths]
-    return Held(
+    return HeldPoints(
         joints=np.array(contacts.joints, np.int64),
         tails=contacts.tails,
         roots=np.array([path[0] for path in paths], np.int64),

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.contact_plan import Contacts, Held
-from mcz.codecs.posewave.rows import Stream
+from mcz.codecs.posewave.contact_plan import Contacts, HeldPoints
+from mcz.codecs.posewave.row_coder import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.errors import FormatError
@@ -118,7 +118,7 @@ class Corrections:
     ``contact_kernels``.
     """
 
-    def __init__(self, contacts: Contacts, plan: Plan, held: Held, values: Floats) -> None:
+    def __init__(self, contacts: Contacts, plan: Plan, held: HeldPoints, values: Floats) -> None:
         self.contacts, self.plan, self.held, self.values = contacts, plan, held, values
         self.lanes = _kernels().lanes_of(plan, 1)
         self.places = self.placed(values)
@@ -130,13 +130,13 @@ class Corrections:
 
     def placed(self, values: Floats) -> Floats:
         """Positions of the points in frames ``values``, (n_points, n_frames, 3)."""
-        found = np.empty((len(self.contacts.joints), len(values), 3))
-        _kernels().place(self.plan, self.held, self.lanes, values, found)
-        return found
+        positions = np.empty((len(self.contacts.joints), len(values), 3))
+        _kernels().place_points(self.plan, self.held, self.lanes, values, positions)
+        return positions
 
     def track(self, point: int) -> Track:
-        found: Track = _coding().Track(self.stands[point], self.starts[point], self.moves[point])
-        return found
+        track: Track = _coding().Track(self.stands[point], self.starts[point], self.moves[point])
+        return track
 
     def code(self, coder: Coder, point: int, wanted: Floats, radii: Floats) -> int:
         """Code one point, as ``Coder.point`` does."""
@@ -149,13 +149,13 @@ class Corrections:
         fault = coder.point(padded, step, self.track(point), leader, wanted, radii)
         goal = self.shifts[point], self.active[point]
         goal[0][:], goal[1][:] = 0.0, 0
-        _kernels().aim(places, self.track(point), step, contacts.ramp, *goal)
+        _kernels().set_shifts(places, self.track(point), step, contacts.ramp, *goal)
         return fault
 
     def correct(self) -> None:
         """Change the values so that the points are where they should be."""
         args = self.held, self.lanes, self.values, self.active, self.shifts, self.contacts.rounds
-        _kernels().correct(self.plan, *args)
+        _kernels().correct_poses(self.plan, *args)
 
 
 def room_of_contacts(contacts: Contacts | None, n_frames: int) -> int:
@@ -164,7 +164,7 @@ def room_of_contacts(contacts: Contacts | None, n_frames: int) -> int:
 
 
 def decode_contacts(
-    contacts: Contacts, plan: Plan, held: Held, stream: Stream, values: Floats, where: str
+    contacts: Contacts, plan: Plan, held: HeldPoints, stream: Stream, values: Floats, where: str
 ) -> None:
     """Correct ``values`` (n_frames, n_channels) in place."""
     corrections, coder = Corrections(contacts, plan, held, values), Coder(stream)

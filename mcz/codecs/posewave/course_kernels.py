@@ -54,7 +54,7 @@ def course_of(still: Floats, kept: Ints, greatest: Floats) -> Course:
     )
 
 
-def go_on(course: Course, difference: Floats) -> None:
+def continue_course(course: Course, difference: Floats) -> None:
     """The next row is ``difference`` (n_kept,) away from what was expected."""
     n_rows = course.n_rows[0]
     for k in range(len(course.kept)):
@@ -82,7 +82,7 @@ def take_row(plan: Plan, course: Course, factor: Floats2, row: Floats2) -> None:
     """Go on by a row (1, n_kept) that is in the metric."""
     difference = np.empty(len(course.kept))
     row_out_of(plan, factor[0], row[0], difference)
-    go_on(course, difference)
+    continue_course(course, difference)
 
 
 @kernel
@@ -93,6 +93,6 @@ def take_rows(plan: Plan, lanes: Lanes, course: Course, rows: Floats2, approx: F
     for m in range(len(rows)):
         factor_rows(plan, lanes, course.pose, factor, 1, 1)
         row_out_of(plan, factor[0], rows[m], difference)
-        go_on(course, difference)
+        continue_course(course, difference)
         for k in range(n_kept):
             approx[m, k] = course.pose[0, course.kept[k]]

@@ -6,7 +6,7 @@ function serves encoder and decoder. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.codecs.posewave.state import (
+from mcz.codecs.posewave.model_state import (
     C_ESCAPE,
     C_EXTRA,
     C_SIGN,
@@ -37,16 +37,18 @@ Contexts = tuple[int, int, int, int, int, int, int, int]
 LEVEL, ONE, OTHER, SECOND, SIGN_1, SIGN_2, SIGN_3, DOWN = range(8)
 
 
-def opinion(model: Model, slot: int, one: Ints, other: Ints, second: Ints) -> tuple[int, int, int]:
+def predict_bit(
+    model: Model, slot: int, one: Ints, other: Ints, second: Ints
+) -> tuple[int, int, int]:
     """The mixed chance of a 1, that after second thoughts, and the mixed one stretched."""
     slots, at, inputs = model.slots, model.at, model.inputs
     stretch, trust = model.stretch, model.trust
     dot = (one[N_OPINIONS] + other[N_OPINIONS]) * BIAS
     for k in range(N_OPINIONS):
         known = slots[(at[k] + slot) & INSIDE]
-        said = (stretch[(known >> 12) & 4095] * trust[known & 255]) >> 16
-        inputs[k] = said
-        dot += (one[k] + other[k]) * said
+        trusted = (stretch[(known >> 12) & 4095] * trust[known & 255]) >> 16
+        inputs[k] = trusted
+        dot += (one[k] + other[k]) * trusted
     x = min(max(dot >> 16, -LIMIT), LIMIT) + 2048
     chance = model.squash[x & 4095]
     node, share = (x >> 7) & 31, x & 127
@@ -55,10 +57,10 @@ def opinion(model: Model, slot: int, one: Ints, other: Ints, second: Ints) -> tu
     return chance, min(max(final, LEAST_CHANCE), 65536 - LEAST_CHANCE), x
 
 
-def learn(
+def learn_bit(
     model: Model, slot: int, one: Ints, other: Ints, second: Ints, bit: int, chance: int, x: int
 ) -> None:
-    """Update all models with a coded bit, after ``opinion``."""
+    """Update all models with a coded bit, after ``predict_bit``."""
     slots, at, inputs, rates = model.slots, model.at, model.inputs, model.rates
     error = (bit << 16) - chance
     inputs[N_OPINIONS] = BIAS
@@ -78,19 +80,19 @@ def learn(
     second[node + 1] += ((target - second[node + 1]) * share) >> 14
 
 
-def decide(model: Model, data: Bytes, bit: int, slot: int, where: Contexts) -> int:
+def code_decision(model: Model, data: Bytes, bit: int, slot: int, where: Contexts) -> int:
     """Code a decision, then let the model learn."""
     one, other = model.weights[where[ONE], slot], model.weights[where[OTHER], slot]
     second = model.second[where[SECOND], slot]
-    chance, final, x = opinion(model, slot, one, other, second)
+    chance, final, x = predict_bit(model, slot, one, other, second)
     bit = code(model.coder, data, bit, final)
-    learn(model, slot, one, other, second, bit, chance, x)
+    learn_bit(model, slot, one, other, second, bit, chance, x)
     return bit
 
 
 def code_error(model: Model, data: Bytes, error: int, where: Contexts) -> int:
     """Code by how far an integer misses its rounded mean, and return it."""
-    if decide(model, data, 1 if error != 0 else 0, 0, where) == 0:
+    if code_decision(model, data, 1 if error != 0 else 0, 0, where) == 0:
         return 0
     far = (1 if error < 0 else 0) ^ where[DOWN] ^ 1
     signs = C_SIGN + where[SIGN_1], C_SIGN + where[SIGN_2], C_SIGN + where[SIGN_3]
@@ -99,7 +101,7 @@ def code_error(model: Model, data: Bytes, error: int, where: Contexts) -> int:
     size = abs(error)
     bucket, found = bucket_of(size), 1
     while found < N_SLOTS:
-        if decide(model, data, 1 if bucket > found else 0, found, where) == 0:
+        if code_decision(model, data, 1 if bucket > found else 0, found, where) == 0:
             break
         found += 1
     size = code_rest(model.coder, data, size, found, where[LEVEL])
@@ -139,7 +141,7 @@ def cost_of(model: Model, error: int, where: Contexts) -> int:
     """Estimate the cost of ``code_error``, in units of ``COST_UNIT``, without side effects."""
     one, other = model.weights[where[ONE]], model.weights[where[OTHER]]
     second, costs = model.second[where[SECOND]], model.costs
-    _, chance, _ = opinion(model, 0, one[0], other[0], second[0])
+    _, chance, _ = predict_bit(model, 0, one[0], other[0], second[0])
     if error == 0:
         return int(costs[(65536 - chance) >> 4])
     total = costs[chance >> 4]
@@ -150,7 +152,7 @@ def cost_of(model: Model, error: int, where: Contexts) -> int:
     model.at[0] += far * N_SLOTS
     bucket, found = bucket_of(abs(error)), 1
     while found < N_SLOTS:
-        _, chance, _ = opinion(model, found, one[found], other[found], second[found])
+        _, chance, _ = predict_bit(model, found, one[found], other[found], second[found])
         total += costs[(chance if bucket > found else 65536 - chance) >> 4]
         if bucket <= found:
             break

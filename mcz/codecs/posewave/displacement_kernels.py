@@ -156,10 +156,10 @@ def _code_start(state: Ints, data: Bytes, move: Ints) -> int:
     moved = 1 if move[0] != 0 or move[1] != 0 or move[2] != 0 else 0
     if adaptive(state, data, moved, C_MOVED):
         for i in range(3):
-            found = code_number(state, data, 0, START, move[i])
-            if abs(found) > MAX_DISPLACEMENT:  # HOLD-11
+            value = code_number(state, data, 0, START, move[i])
+            if abs(value) > MAX_DISPLACEMENT:  # HOLD-11
                 return 1
-            move[i] = found
+            move[i] = value
     return 0
 
 
@@ -252,7 +252,7 @@ def _learn(learner: Learner, axis: int, features: Floats, moved: float) -> None:
         learner.weights[axis, i] += learner.usual[i]
 
 
-def _solve(squares: Floats2, products: Floats, found: Floats, scratch: Floats2) -> None:
+def _solve(squares: Floats2, products: Floats, solution: Floats, scratch: Floats2) -> None:
     """(squares + ridge) found = products, by L D L'; row 9 of ``scratch`` has D."""
     for i in range(N_FEATURES):
         for k in range(i + 1):
@@ -272,8 +272,8 @@ def _solve(squares: Floats2, products: Floats, found: Floats, scratch: Floats2) 
         i = N_FEATURES - 1 - back
         entry = scratch[N_FEATURES + 1, i] / scratch[N_FEATURES, i]
         for n in range(i + 1, N_FEATURES):
-            entry -= scratch[n, i] * found[n]
-        found[i] = entry
+            entry -= scratch[n, i] * solution[n]
+        solution[i] = entry
 
 
 def _choose(learner: Learner, before: Ints, wanted: Floats, radius: float, chosen: Ints) -> None:

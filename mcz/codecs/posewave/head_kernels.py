@@ -53,11 +53,11 @@ def code_number(state: Ints, data: Bytes, first: int, own: int, value: int) -> i
             return 1 << MAX_LENGTH
     if length == 0:
         return 0
-    found = 1
+    coded = 1
     if length > 1:
         at = first + C_SECOND + MAX_LENGTH * own + length
-        found = 2 + adaptive(state, data, size >> (length - 2) & 1, at)
+        coded = 2 + adaptive(state, data, size >> (length - 2) & 1, at)
     if length > 2:
-        found = found << (length - 2) | number(state, data, size, length - 2)
+        coded = coded << (length - 2) | number(state, data, size, length - 2)
     negative = adaptive(state, data, 1 if value < 0 else 0, first + C_SIGN + own)
-    return -found if negative else found
+    return -coded if negative else coded

@@ -19,7 +19,7 @@ from mcz.codecs.posewave.contact_plan import Contacts, ContactsFields, parse_con
 from mcz.codecs.posewave.model import Start, start_tables
 from mcz.codecs.posewave.orders import N_ORDERS, check_orders
 from mcz.codecs.posewave.priors import Prior, priors
-from mcz.codecs.steps import code_of, ratio_of
+from mcz.codecs.step_codes import code_of, ratio_of
 from mcz.errors import FormatError
 from mcz.motion import (
     ANGLE_KINDS,
@@ -242,12 +242,12 @@ def _prior(number: int, n_channels: int) -> Prior | None:
         return None
     if number > len(priors()):  # PWAVE-41
         raise FormatError(f"{NAME}: prior {number}, the last is {len(priors())}")
-    found = priors()[number - 1]
-    if len(found.variances) != n_channels:  # PWAVE-42
+    prior = priors()[number - 1]
+    if len(prior.variances) != n_channels:  # PWAVE-42
         raise FormatError(
-            f"{NAME}: {n_channels} channels, prior {number} is of {len(found.variances)}"
+            f"{NAME}: {n_channels} channels, prior {number} is of {len(prior.variances)}"
         )
-    return found
+    return prior
 
 
 def _orders(fields: Sequence[AxisOrderFields], skeleton: Skeleton) -> dict[int, int]:
@@ -256,9 +256,9 @@ def _orders(fields: Sequence[AxisOrderFields], skeleton: Skeleton) -> dict[int, 
     ends = [-1, *joints, skeleton.n_joints]
     if any(after <= before for before, after in pairwise(ends)):  # PWAVE-15
         raise FormatError(f"{NAME}: axis orders of joints {joints} of {skeleton.n_joints}")
-    found = {order.joint: order.code for order in fields}
-    check_orders(found, skeleton, NAME)
-    return found
+    codes = {order.joint: order.code for order in fields}
+    check_orders(codes, skeleton, NAME)
+    return codes
 
 
 def _spread(octaves: int) -> float:
@@ -267,11 +267,11 @@ def _spread(octaves: int) -> float:
 
 def _exact(groups: Sequence[int], layout: Layout) -> NDArray[np.bool_]:
     """Mask of the exact channels."""
-    found, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
+    exact, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
     for before, group in pairwise([-1, *groups]):
         if group <= before:  # PWAVE-32
             raise FormatError(f"{NAME}: group {group} is exact, named behind {before}")
         if group > last:  # PWAVE-33
             raise FormatError(f"{NAME}: group {group} is exact, the last is {last}")
-        found[list(layout.groups[group])] = True
-    return found
+        exact[list(layout.groups[group])] = True
+    return exact

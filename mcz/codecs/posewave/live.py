@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from mcz.codecs import contract
 from mcz.codecs.contract import Layout, Model
 from mcz.codecs.gaps import LiveRows
-from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.choices import PRESETS, live_choice
 from mcz.codecs.posewave.header import NAME, parse_header
+from mcz.codecs.posewave.model_state import MAX_EXPONENT
 from mcz.codecs.posewave.segment import decode_segment
-from mcz.codecs.posewave.state import MAX_EXPONENT
+from mcz.codecs.posewave.segment_chain import SegmentChain
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import FormatError, LostFrameError, OptionError
-from mcz.kinematics.single import FramePositions
+from mcz.kinematics.frame_positions import FramePositions
 from mcz.types import Params
 
 Floats = NDArray[np.float64]
@@ -52,7 +52,7 @@ class LiveEncoder(contract.LiveEncoder):
         self.header, self._weight = choice.header, choice.weights.approximations
         fields = parse_header(self.header, layout)
         self.version = fields.version
-        self._chain = Chain(fields, self.skeleton)
+        self._chain = SegmentChain(fields, self.skeleton)
         self._bound = math.inf if bound is None else bound / (self.skeleton.unit_cm or 1.0)
         self._places = None if bound is None else FramePositions(self.skeleton)
         self._every = options["segment_frames"] or JOINING
@@ -87,7 +87,7 @@ class LiveDecoder:
 
     def __init__(self, header: bytes, layout: Layout) -> None:
         self._fields, self._skeleton = parse_header(header, layout), skeleton_of(NAME, layout)
-        self._chain = Chain(self._fields, self._skeleton)
+        self._chain = SegmentChain(self._fields, self._skeleton)
         self._broken = True  # until something fresh comes
 
     def push(self, stream: bytes, fresh: bool) -> Floats:

@@ -61,17 +61,17 @@ class Metric:
 
     def stiffened(self, factor: float) -> Metric:
         """The metric with ``factor`` times what is added to the diagonal by the greatest steps."""
-        found = copy(self)
+        clone = copy(self)
         stiffer = bounded_regularization(self.regularization * factor)
-        found.plan = self.plan._replace(regularization=stiffer)
-        return found
+        clone.plan = self.plan._replace(regularization=stiffer)
+        return clone
 
     def factors(self, poses: Floats) -> Floats:
         """Factors of ``poses``, (n_poses, n_kept): (n_poses, n_entries)."""
         values = np.repeat(self.still[None], len(poses), axis=0)
         values[:, self.kept] = poses
-        found: Floats = kernels().factor(self.plan, values)
-        return found
+        factors: Floats = kernels().factor(self.plan, values)
+        return factors
 
     def empty(self) -> Floats:
         """Room for the factor of a single pose."""
@@ -79,10 +79,10 @@ class Metric:
 
     def into(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """Differences of values, (n_rows, n_kept), in the metric, each at the pose ``which``."""
-        found: Floats = apply_kernels().into_metric(self.plan, factors, rows, which)
-        return found
+        coordinates: Floats = apply_kernels().into_metric(self.plan, factors, rows, which)
+        return coordinates
 
     def out_of(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """The inverse of ``into``."""
-        found: Floats = apply_kernels().out_of_metric(self.plan, factors, rows, which)
-        return found
+        channels: Floats = apply_kernels().out_of_metric(self.plan, factors, rows, which)
+        return channels

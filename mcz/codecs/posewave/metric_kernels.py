@@ -30,12 +30,12 @@ def factor(plan: Plan, values: Floats) -> Floats:
     """The factors at poses ``values`` (n_poses, n_channels): (n_poses, n_entries)."""
     if values.shape[1] != plan.n_channels:
         raise ValueError(f"poses of shape {values.shape} for {plan.n_channels} channels")
-    found = np.empty((len(values), plan.n_entries))
+    factors = np.empty((len(values), plan.n_entries))
     if len(values) == 1:
-        factor_one(plan, lanes_of(plan, 1), values, found)
+        factor_one(plan, lanes_of(plan, 1), values, factors)
     else:
-        factor_batches(plan, lanes_of(plan, LANES), values, found, LANES)
-    return found
+        factor_batches(plan, lanes_of(plan, LANES), values, factors, LANES)
+    return factors
 
 
 @kernel
@@ -223,7 +223,7 @@ def inverse_root(value: float) -> float:
     large = value >= 2.0
     value = value * 0.5 if large else value
     scale = scale * HALF_ROOT if large else scale
-    found = 1.2796 - 0.2929 * value
+    estimate = 1.2796 - 0.2929 * value
     for _ in (0, 1, 2, 3):
-        found = found * (1.5 - 0.5 * value * found * found)
-    return found * scale
+        estimate = estimate * (1.5 - 0.5 * value * estimate * estimate)
+    return estimate * scale

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.annexes import annex_bytes
-from mcz.codecs.posewave.priors import SEEN, Prior
-from mcz.codecs.posewave.state import (
+from mcz.codecs.posewave.model_state import (
     BLOCK,
     LANES,
     N_FEATURES,
@@ -30,6 +29,7 @@ from mcz.codecs.posewave.state import (
     USUAL,
     Model,
 )
+from mcz.codecs.posewave.priors import SEEN, Prior
 from mcz.coding import mixing
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.kernels.types import Floats, Ints
@@ -104,8 +104,8 @@ def _bytes(lines: list[str]) -> Ints:
 
 def _digits(lines: list[str]) -> Ints:
     text = np.frombuffer("".join(lines).encode(), "u1").astype(np.int64)
-    found: Ints = np.where(text < ord("a"), text - ord("0"), text - ord("a") + 10)
-    return found
+    digits: Ints = np.where(text < ord("a"), text - ord("0"), text - ord("a") + 10)
+    return digits
 
 
 def wide_of(n_channels: int) -> int:
@@ -199,12 +199,12 @@ def trust_table() -> Ints:
 def log_table() -> Ints:
     """floor(6 log2(1 + k / 4)) for k from 0 to 1023: the most e with 4^6 2^e <= (4 + k)^6."""
     powers = [4**6 << e for e in range(60)]
-    found, e = [], 0
+    table, e = [], 0
     for k in range(N_LOGS):
         while powers[e + 1] <= (4 + k) ** 6:
             e += 1
-        found.append(e)
-    return np.array(found, np.int64)
+        table.append(e)
+    return np.array(table, np.int64)
 
 
 @cache

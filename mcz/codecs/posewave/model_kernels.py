@@ -16,24 +16,7 @@ from mcz.codecs.posewave.decision_kernels import (
     cost_of,
     mixed_chance,
 )
-from mcz.codecs.posewave.prediction_kernels import (
-    MEMORY,
-    learn_in_time,
-    predict_in_time,
-    spread,
-    take_in,
-)
-from mcz.codecs.posewave.size_kernels import (
-    FOUND,
-    LEAST_SIZE,
-    MOST_SIZE,
-    ONE,
-    TWO,
-    gather_magnitudes,
-    learn_sizes,
-    log_of,
-)
-from mcz.codecs.posewave.state import (
+from mcz.codecs.posewave.model_state import (
     BEFORE_1,
     BEFORE_2,
     C_EXPONENT,
@@ -61,6 +44,23 @@ from mcz.codecs.posewave.state import (
     SIDE_4,
     USUAL,
     Model,
+)
+from mcz.codecs.posewave.prediction_kernels import (
+    MEMORY,
+    learn_in_time,
+    predict_in_time,
+    spread,
+    take_in,
+)
+from mcz.codecs.posewave.size_kernels import (
+    FOUND,
+    LEAST_SIZE,
+    MOST_SIZE,
+    ONE,
+    TWO,
+    gather_magnitudes,
+    learn_sizes,
+    log_of,
 )
 from mcz.coding import mixing
 from mcz.coding.mixing import adaptive, mixed

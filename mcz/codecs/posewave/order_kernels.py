@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.posewave.arc import arc
-from mcz.codecs.posewave.turns import Rule, sine_cosine
+from mcz.codecs.posewave.arc import angle_of
+from mcz.codecs.posewave.trigonometry import Rule, sine_cosine
 from mcz.kernels import kernel
 from mcz.kernels.types import FloatColumns, Floats, Floats2, IntColumns, Ints
 
@@ -22,7 +22,7 @@ LATE = 0.75  # of a turn: so far from the source an encoder tells a turn
 
 
 @kernel
-def turn_over(angles: Floats2, given: Ints, wanted: Ints, rule: Rule) -> None:
+def reorder_axes(angles: Floats2, given: Ints, wanted: Ints, rule: Rule) -> None:
     """Angles of the sequence ``given`` to those of ``wanted``, in place: the first solution."""
     m = np.empty(9)
     i, j, k = wanted[0], wanted[1], wanted[2]
@@ -33,21 +33,21 @@ def turn_over(angles: Floats2, given: Ints, wanted: Ints, rule: Rule) -> None:
         for p in range(3):
             sine, cosine = sine_cosine(row[given[p]], rule)
             _rotate(m, (given[p] + 1) % 3, (given[p] + 2) % 3, sine, cosine)
-        first = arc(-e * m[3 * j + k], m[4 * k], rule)
+        first = angle_of(-e * m[3 * j + k], m[4 * k], rule)
         # What is left when the first is undone has no small numbers in it, also where cos b is 0.
         sine, cosine = sine_cosine(first, rule)
         sine = e * sine
         row[i] = first
-        row[j] = arc(e * m[3 * i + k], cosine * m[4 * k] - sine * m[3 * j + k], rule)
+        row[j] = angle_of(e * m[3 * i + k], cosine * m[4 * k] - sine * m[3 * j + k], rule)
         up = e * (cosine * m[3 * j + i] + sine * m[3 * k + i])
-        row[k] = arc(up, cosine * m[4 * j] + sine * m[3 * k + j], rule)
+        row[k] = angle_of(up, cosine * m[4 * j] + sine * m[3 * k + j], rule)
 
 
 def _rotate(m: Floats, j: int, k: int, sine: float, cosine: float) -> None:
     for i in (0, 3, 6):
-        one, other = m[i + j], m[i + k]
-        m[i + j] = one * cosine + other * sine
-        m[i + k] = other * cosine - one * sine
+        one, other_solution = m[i + j], m[i + k]
+        m[i + j] = one * cosine + other_solution * sine
+        m[i + k] = other_solution * cosine - one * sine
 
 
 def whole_turns(step: float, full: float) -> float:
@@ -57,12 +57,12 @@ def whole_turns(step: float, full: float) -> float:
     return count if ratio >= 0.0 else -count
 
 
-def off(step: float, full: float) -> float:
+def angle_distance(step: float, full: float) -> float:
     """The size of a step, less whole turns."""
     return abs(step - full * whole_turns(step, full))
 
 
-def other(value: float, p: int, half: float) -> float:
+def other_solution(value: float, p: int, half: float) -> float:
     """The p-th angle of the second solution from that of the first, and the other way round."""
     return half - value if p == 1 else value + half
 
@@ -72,13 +72,13 @@ def is_nearer(row: Floats, before: Floats, sequence: Ints, full: float) -> bool:
     one = two = 0.0
     for p in range(3):
         axis = sequence[p]
-        one += off(row[axis] - before[axis], full)
-        two += off(other(row[axis], p, 0.5 * full) - before[axis], full)
+        one += angle_distance(row[axis] - before[axis], full)
+        two += angle_distance(other_solution(row[axis], p, 0.5 * full) - before[axis], full)
     return two < one
 
 
 @kernel
-def follow(angles: Floats2, sequence: Ints, full: float, told: IntColumns) -> None:
+def follow_angles(angles: Floats2, sequence: Ints, full: float, notes: IntColumns) -> None:
     """First solutions to angles that go on from row to row, in place."""
     before, last, turns = np.zeros(3), np.zeros(3), np.zeros(3)
     second = False
@@ -86,30 +86,30 @@ def follow(angles: Floats2, sequence: Ints, full: float, told: IntColumns) -> No
         row = angles[f]
         if f > 0 and is_nearer(row, before, sequence, full):
             second = not second
-        if told[f, 0] != 0:
+        if notes[f, 0] != 0:
             second = not second
         for p in range(3):
             axis = sequence[p]
             value = row[axis]
             before[axis] = value
-            value = other(value, p, 0.5 * full) if second else value
+            value = other_solution(value, p, 0.5 * full) if second else value
             if f > 0:
                 turns[axis] -= whole_turns(value - last[axis], full)  # PWAVE-27
-            turns[axis] += told[f, 1 + axis]
+            turns[axis] += notes[f, 1 + axis]
             last[axis] = value
             row[axis] = value + full * turns[axis]  # PWAVE-27
 
 
 @kernel
-def tell_switches(
+def choose_switches(
     angles: Floats2,
     source: FloatColumns,
     sequence: Ints,
     full: float,
     price: float,
-    told: IntColumns,
+    notes: IntColumns,
 ) -> None:
-    """Fill ``told`` with the switches that bring first solutions ``angles`` near to ``source``.
+    """Fill ``notes`` with the switches that bring first solutions ``angles`` near to ``source``.
 
     Least in all: how far they are off, and ``price`` a switch.
     """
@@ -121,8 +121,10 @@ def tell_switches(
         one = two = 0.0
         for p in range(3):
             axis = sequence[p]
-            one += off(angles[f, axis] - source[f, axis], full)
-            two += off(other(angles[f, axis], p, 0.5 * full) - source[f, axis], full)
+            one += angle_distance(angles[f, axis] - source[f, axis], full)
+            two += angle_distance(
+                other_solution(angles[f, axis], p, 0.5 * full) - source[f, axis], full
+            )
         if f == 0:
             second = price
         elif is_nearer(angles[f], angles[f - 1], sequence, full):
@@ -135,18 +137,18 @@ def tell_switches(
     state = 1 if second < first else 0
     for back in range(n_frames):
         f = n_frames - 1 - back
-        told[f, 0] = switched[f, state]
-        state = (state + told[f, 0] + natural[f]) % 2
+        notes[f, 0] = switched[f, state]
+        state = (state + notes[f, 0] + natural[f]) % 2
 
 
 @kernel
-def tell_turns(angles: Floats2, source: FloatColumns, full: float, told: IntColumns) -> None:
-    """Fill ``told`` with the turns that bring ``angles`` as followed near to ``source``."""
+def choose_turns(angles: Floats2, source: FloatColumns, full: float, notes: IntColumns) -> None:
+    """Fill ``notes`` with the turns that bring ``angles`` as followed near to ``source``."""
     for axis in range(3):
         turns = 0.0
         for f in range(len(angles)):
             away = source[f, axis] - angles[f, axis] - full * turns
             if abs(away) > LATE * full or f == 0:
                 more = whole_turns(away, full)
-                told[f, 1 + axis] = int(more)
+                notes[f, 1 + axis] = int(more)
                 turns += more

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.angles import FULL_TURN
-from mcz.codecs.posewave.turns import BEYOND, RULES
+from mcz.codecs.posewave.trigonometry import BEYOND, RULES
 from mcz.errors import FormatError, MotionError
 from mcz.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Joint, Skeleton
 from mcz.schema import read_varint, varint
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Sequenced = tuple[int, int, int]  # axes as their rotations are multiplied from the left
+AxisSequence = tuple[int, int, int]  # axes as their rotations are multiplied from the left
 
-SEQUENCES: tuple[Sequenced, ...] = (
+SEQUENCES: tuple[AxisSequence, ...] = (
     (0, 1, 2),
     (0, 2, 1),
     (1, 0, 2),
@@ -39,7 +39,7 @@ MAX_TURNS = 2**41
 PRICE = 0.25  # of a switch, in turns
 
 
-class Place(NamedTuple):
+class ReorderedJoint(NamedTuple):
     """A coded joint: its columns by axis x y z, the sequence coded, and the source's."""
 
     columns: Ints
@@ -54,7 +54,7 @@ def kernels() -> ModuleType:
     return order_kernels
 
 
-def own_sequence(joint: Joint, skeleton: Skeleton) -> Sequenced | None:
+def own_sequence(joint: Joint, skeleton: Skeleton) -> AxisSequence | None:
     """Axis sequence of a joint that can be reordered, None otherwise.
 
     It has three rotation channels about three axes, no other, and angles of a known unit.
@@ -89,20 +89,20 @@ class Orders:
     def __init__(self, codes: Mapping[int, int], skeleton: Skeleton) -> None:
         self.rule = RULES[skeleton.angle_unit]
         self.full = FULL_TURN.get(skeleton.angle_unit, 0.0)
-        self.places = [_place(skeleton, joint, code) for joint, code in codes.items()]
+        self.places = [_reordered_joint(skeleton, joint, code) for joint, code in codes.items()]
 
     def coded(self, values: Floats) -> Floats:
         """``values`` of the source, (n_frames, n_channels), as they are coded."""
         if not self.places:
             return values
-        found, nothing = values.copy(), np.zeros((len(values), N_NOTES), np.int64)
+        coded, nothing = values.copy(), np.zeros((len(values), N_NOTES), np.int64)
         for place in self.places:
             if not (np.abs(values[:, place.columns]) < BEYOND).all():
                 raise MotionError("posewave: an angle of 2^40 or more in another order of axes")
             angles = self._turned(values, place, place.own, place.coded)
-            kernels().follow(angles, place.coded, self.full, nothing)
-            found[:, place.columns] = angles
-        return found
+            kernels().follow_angles(angles, place.coded, self.full, nothing)
+            coded[:, place.columns] = angles
+        return coded
 
     def notes_and_values(self, source: Floats, coded: Floats) -> tuple[bytes, Floats]:
         """Notes for a decoder beside ``coded`` values, and the values that it restores."""
@@ -111,10 +111,10 @@ class Orders:
         notes = np.zeros((len(coded), len(self.places), N_NOTES), np.int64)
         for index, place in enumerate(self.places):
             angles = self._turned(coded, place, place.coded, place.own)
-            given, told = source[:, place.columns], notes[:, index]
-            kernels().tell_switches(angles, given, place.own, self.full, PRICE * self.full, told)
-            kernels().follow(angles, place.own, self.full, told)
-            kernels().tell_turns(angles, given, self.full, told)
+            given, own = source[:, place.columns], notes[:, index]
+            kernels().choose_switches(angles, given, place.own, self.full, PRICE * self.full, own)
+            kernels().follow_angles(angles, place.own, self.full, own)
+            kernels().choose_turns(angles, given, self.full, own)
         return _build_notes(notes), self.values(coded, notes)
 
     def take_notes(self, stream: bytes, n_frames: int, where: str) -> tuple[Ints, bytes]:
@@ -124,23 +124,23 @@ class Orders:
 
     def values(self, coded: Floats, notes: Ints) -> Floats:
         """The source's values, by what ``take_notes`` found."""
-        found = coded.copy() if self.places else coded
+        values = coded.copy() if self.places else coded
         for index, place in enumerate(self.places):
             angles = self._turned(coded, place, place.coded, place.own)
-            kernels().follow(angles, place.own, self.full, notes[:, index])
-            found[:, place.columns] = angles
-        return found
+            kernels().follow_angles(angles, place.own, self.full, notes[:, index])
+            values[:, place.columns] = angles
+        return values
 
-    def _turned(self, values: Floats, place: Place, given: Ints, wanted: Ints) -> Floats:
+    def _turned(self, values: Floats, place: ReorderedJoint, given: Ints, wanted: Ints) -> Floats:
         angles = np.ascontiguousarray(values[:, place.columns])
-        kernels().turn_over(angles, given, wanted, self.rule)
+        kernels().reorder_axes(angles, given, wanted, self.rule)
         return angles
 
 
-def _place(skeleton: Skeleton, index: int, code: int) -> Place:
+def _reordered_joint(skeleton: Skeleton, index: int, code: int) -> ReorderedJoint:
     columns = columns_by_axis(skeleton, index)
     own = own_sequence(skeleton.joints[index], skeleton)
-    return Place(*(np.array(x, np.int64) for x in (columns, SEQUENCES[code - 1], own)))
+    return ReorderedJoint(*(np.array(x, np.int64) for x in (columns, SEQUENCES[code - 1], own)))
 
 
 def _build_notes(notes: Ints) -> bytes:

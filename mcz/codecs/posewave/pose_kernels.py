@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcz.codecs.posewave.skeleton_plan import MAX_PATH, QUATERNION, VECTOR, Plan
-from mcz.codecs.posewave.turns import BEYOND, sine_cosine
+from mcz.codecs.posewave.trigonometry import BEYOND, sine_cosine
 from mcz.codecs.posewave.whole_turn_kernels import turn_by_quaternion, turn_by_vector
 from mcz.kernels.types import Floats, Floats2, Floats3
 

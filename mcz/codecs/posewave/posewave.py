@@ -1,4 +1,4 @@
-"""Codec qbc, ``posewave``: wavelets in time, coded in the metric of the pose.
+"""Codec 3, ``posewave``: wavelets in time, coded in the metric of the pose.
 
 SPEC.md, "Codec 3: posewave", is normative; the names below are its field names.
 
@@ -14,6 +14,7 @@ states). A stream holds one resolution of one segment; a segment decodes by itse
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
@@ -32,36 +33,37 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
-from mcz.codecs.posewave.chain import Chain
-from mcz.codecs.posewave.choices import PRESETS, Choice, choose, guess
+from mcz.codecs.posewave.choices import PRESETS, Choice, choose, guess_step
 from mcz.codecs.posewave.contact_choice import parse_runs, run_words
-from mcz.codecs.posewave.exact import (
+from mcz.codecs.posewave.exact_channels import (
     build_exact,
-    cut,
+    cut_header,
     decode_exact,
     joint_words,
     most_frames,
     partition,
 )
 from mcz.codecs.posewave.header import NAME, Header, parse_header
-from mcz.codecs.posewave.limits import joint_limits, limit_words
 from mcz.codecs.posewave.live import LiveDecoder, LiveEncoder
 from mcz.codecs.posewave.segment import decode_segment, encode_segment
+from mcz.codecs.posewave.segment_chain import SegmentChain
 from mcz.codecs.segments import (
     SEGMENT_FRAMES_PARAMETER,
     Lengths,
-    halving,
     segment_frames_of,
+    segments_by_halving,
     skeleton_of,
 )
-from mcz.errors import FormatError
+from mcz.errors import FormatError, OptionError
 from mcz.motion import Skeleton
 from mcz.types import Params, Settings, Values
+from mcz.units import UNIT_CM
 
 Floats = NDArray[np.float64]
 
 MOST_FRAMES = 8192  # of a segment, where the caller leaves it open
 LEAST_FRAMES = 512
+_LIMIT = re.compile(r"(?P<name>.+)=(?P<number>[0-9.e+-]+) ?(?P<unit>[a-z]+)")
 
 
 def promise(options: Params) -> Settings:
@@ -119,7 +121,7 @@ def _segments(
         return tuple(streams.get(place, b"") for place in places)
 
     breaks = source.breaks if header.exact_groups else ()
-    for first, stop, streams in halving(layout.n_frames, lengths, code, breaks):
+    for first, stop, streams in segments_by_halving(layout.n_frames, lengths, code, breaks):
         yield Segment(first, stop - first, streams)
     if keeper and header.contacts:
         keeper.warn(skeleton, header.contacts)
@@ -190,7 +192,7 @@ def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], S
 
     Of exact channels it gives something that is of no account.
     """
-    chain = Chain(header, skeleton)
+    chain = SegmentChain(header, skeleton)
 
     def decode_one(streams: Sequence[bytes], span: Span) -> Floats:
         where = f"{NAME}: segment at {span.first}"
@@ -199,6 +201,39 @@ def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], S
         return decode_segment(header, skeleton, streams, span.n_frames, where)
 
     return decode_one
+
+
+def joint_limits(text: object) -> tuple[tuple[str, float], ...]:
+    """Parse joints or groups and their mean errors in cm; raises OptionError.
+
+    >>> joint_limits("feet=0.5mm, lhand=2cm")
+    (('feet', 0.05), ('lhand', 2.0))
+    """
+    if isinstance(text, tuple):
+        return text
+    limits = []
+    for entry in str(text).split(","):
+        match = _LIMIT.fullmatch(entry.strip())
+        if match is None or match["unit"] not in UNIT_CM:
+            units = ", ".join(UNIT_CM)
+            raise OptionError(f"quality is {entry!r}, not like feet=0.5mm; units are {units}")
+        try:
+            limit = float(match["number"]) * UNIT_CM[match["unit"]]
+        except ValueError:
+            raise OptionError(f"quality is {entry!r}: {match['number']!r} is no number") from None
+        if not 0 < limit < 1e9:
+            raise OptionError(f"quality is {entry!r}: a limit must be more than 0")
+        limits.append((match["name"], limit))
+    return tuple(limits)
+
+
+def limit_words(limits: tuple[tuple[str, float], ...]) -> str:
+    """Inverse of ``joint_limits``.
+
+    >>> limit_words((("feet", 0.05), ("lhand", 2.0)))
+    'feet=0.05cm,lhand=2.0cm'
+    """
+    return ",".join(f"{name}={limit!r}cm" for name, limit in limits)
 
 
 CODEC = Codec(
@@ -211,9 +246,9 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     grouping="all",
-    dial=Dial("step", 1e-9, 1e9, guess=guess),
+    dial=Dial("step", 1e-9, 1e9, guess=guess_step),
     promise=promise,
-    cut=cut,
+    cut=cut_header,
     partition=partition,
     exact=exact_groups,
     live=LiveEncoder,

@@ -7,7 +7,7 @@ one right answer. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.codecs.posewave.state import (
+from mcz.codecs.posewave.model_state import (
     BLOCK,
     LANES,
     N_TAPS,

@@ -65,8 +65,8 @@ def layout_of(skeleton: Skeleton) -> tuple[list[int], list[str]]:
 
 @cache
 def _document() -> JsonObject:
-    found: JsonObject = json.loads(annex_bytes("posewave_priors.json"))
-    return found
+    document: JsonObject = json.loads(annex_bytes("posewave_priors.json"))
+    return document
 
 
 def _read(digits: str, variances: list[int]) -> Prior:

@@ -50,5 +50,5 @@ class Pyramid:
         first = reach >> 1 if level else 0
         padded = np.pad(refinement, reach)
         greatest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
-        found: Ints = greatest[first::reach][: self.rows(level)]
-        return found
+        exponents: Ints = greatest[first::reach][: self.rows(level)]
+        return exponents

@@ -12,13 +12,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.contact_keeper import Keeper
+from mcz.codecs.posewave.contact_tracker import ContactTracker
 from mcz.codecs.posewave.contacts import decode_contacts, room_of_contacts
 from mcz.codecs.posewave.header import NAME, Header
+from mcz.codecs.posewave.level_coder import LevelCoder
 from mcz.codecs.posewave.orders import Orders
 from mcz.codecs.posewave.pyramid import Pyramid
-from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
-from mcz.codecs.posewave.walk import Walk
+from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.errors import FormatError, MotionError
 from mcz.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
 from mcz.transforms import lifting
@@ -64,7 +64,7 @@ def encode_segment(
     values: Floats,
     weights: Weights,
     refinement: Ints | None = None,
-    contacts: Keeper | None = None,
+    contacts: ContactTracker | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """The streams of a segment of unwrapped ``values``, and what a decoder will have of them.
 
@@ -74,9 +74,9 @@ def encode_segment(
     """
     orders = Orders(header.orders, skeleton)
     coded = orders.coded(values)
-    streams, found = encode_coded(header, skeleton, coded, weights, refinement, contacts)
-    notes, found = orders.notes_and_values(values, found)
-    return (notes + streams[0], *streams[1:]), found
+    streams, decoded = encode_coded(header, skeleton, coded, weights, refinement, contacts)
+    notes, decoded = orders.notes_and_values(values, decoded)
+    return (notes + streams[0], *streams[1:]), decoded
 
 
 def encode_coded(
@@ -85,7 +85,7 @@ def encode_coded(
     values: Floats,
     weights: Weights,
     refinement: Ints | None = None,
-    contacts: Keeper | None = None,
+    contacts: ContactTracker | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """Encode a segment of ``values`` whose angles are in the orders of the header."""
     pyramid = Pyramid(len(values), header.levels, header.borrowing)
@@ -100,7 +100,7 @@ def encode_coded(
     head = choose_head(header, values, kept, approx)
     classes, coder = classes_of(skeleton, header.whole), fresh_coder(header.start)
     rows = RowCoder(header, classes, kept, coder, NAME)
-    walk = Walk(header, skeleton, pyramid, kept, head.values(header))
+    walk = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
         room = room_of(pyramid, level, kept) + room_of_contacts(header.contacts, len(values))
@@ -114,13 +114,15 @@ def encode_coded(
         (walk.code_details if level else walk.code_coarsest)(level, code, band, rows.exponents)
         if level < pyramid.n_details:
             streams.append(stream.finish())
-    found = walk.values()
+    decoded = walk.values()
     if header.contacts and kept.any():
         held = walk.held(header.contacts)
-        (contacts or Keeper()).encode(header.contacts, walk.usual.plan, held, stream, values, found)
+        (contacts or ContactTracker()).encode(
+            header.contacts, walk.usual.plan, held, stream, values, decoded
+        )
     streams.append(stream.finish())
     empty = [b""] * (header.levels - pyramid.n_details)
-    return (streams[0], *empty, *streams[1:]), found
+    return (streams[0], *empty, *streams[1:]), decoded
 
 
 def room_of(pyramid: Pyramid, level: int, kept: NDArray[np.bool_]) -> int:
@@ -149,7 +151,7 @@ def decode_segment(
     code_head(stream, kinds_of(skeleton, header.whole), moving, numbers, where)
     head = Head(moving == 1, numbers)
     kept = head.kept(header)
-    walk = Walk(header, skeleton, pyramid, kept, head.values(header))
+    walk = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
     held = walk.held(header.contacts) if header.contacts and kept.any() else None  # HOLD-07
     rows = RowCoder(header, classes, kept, coder, where)
     for level in range(pyramid.n_details + 1):
@@ -172,8 +174,8 @@ def kinds_of(skeleton: Skeleton, whole: bool = False) -> Ints:
     """0 for rotation channels, 1 for positions, 2 for others."""
     kinds = [channel.kind for channel in skeleton.channels]
     turning = ANGLE_KINDS if whole else ROTATION_KINDS
-    found = [0 if k in turning else 1 if k in POSITION_KINDS else 2 for k in kinds]
-    return np.array(found, np.int64)
+    classes = [0 if k in turning else 1 if k in POSITION_KINDS else 2 for k in kinds]
+    return np.array(classes, np.int64)
 
 
 def classes_of(skeleton: Skeleton, whole: bool = False) -> Ints:
@@ -184,11 +186,11 @@ def classes_of(skeleton: Skeleton, whole: bool = False) -> Ints:
         parent = skeleton.joints[index].parent
         if parent >= 0:
             n_below[parent] += n_below[index]
-    found = []
+    classes = []
     for joint, n in zip(skeleton.joints, n_below, strict=True):
         own = 1 if joint.parent < 0 else 2 + (n >= 2) + (n >= 4) + (n >= 8)
-        found += [own if channel.kind in turning else 0 for channel in joint.channels]
-    return np.array(found, np.int64)
+        classes += [own if channel.kind in turning else 0 for channel in joint.channels]
+    return np.array(classes, np.int64)
 
 
 def choose_kept(header: Header, values: Floats) -> NDArray[np.bool_]:

@@ -6,8 +6,7 @@ on first use only.
 
 from __future__ import annotations
 
-from mcz.codecs.posewave.prediction_kernels import total_of
-from mcz.codecs.posewave.state import (
+from mcz.codecs.posewave.model_state import (
     BEFORE_1,
     BEFORE_2,
     BEFORE_3,
@@ -21,6 +20,7 @@ from mcz.codecs.posewave.state import (
     USUAL,
     Model,
 )
+from mcz.codecs.posewave.prediction_kernels import total_of
 from mcz.kernels.types import Floats, Floats2, Ints
 
 OF_ROWS = (

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.posewave.orders import SEQUENCES
-from mcz.codecs.posewave.turns import BEYOND, RULES, Rule, sine_cosine
+from mcz.codecs.posewave.trigonometry import BEYOND, RULES, Rule, sine_cosine
 from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints2
 from mcz.kinematics.points import points_of
 from mcz.motion import (
@@ -114,7 +114,9 @@ def make_plan(
         raise ValueError(f"{len(regularization)} of {len(kept)} channels are kept")
     n_joints = skeleton.n_joints
     weights = (
-        [1.0] * n_joints if joint_weights is None else [limited(float(w)) for w in joint_weights]
+        [1.0] * n_joints
+        if joint_weights is None
+        else [limit_number(float(w)) for w in joint_weights]
     )
     numbers = np.where(kept, np.cumsum(kept) - 1, -1).tolist()  # among the kept, -1 where dropped
     rule = RULES[skeleton.angle_unit]
@@ -129,7 +131,7 @@ def make_plan(
         parents=skeleton.parents,
         changes=_floats(map(_change, _aboves(skeleton, frames), frames), 3, 3),
         arms=_floats(map(_arm, skeleton.joints, _aboves(skeleton, frames)), 3),
-        masses=_masses(skeleton, frames, weights, limited(float(radius)), float(kappa)),
+        masses=_masses(skeleton, frames, weights, limit_number(float(radius)), float(kappa)),
         moves=_ints(moves, 2),
         directions=_floats(directions, 3),
         move_starts=_ints(move_starts),
@@ -150,7 +152,7 @@ def bounded_regularization(given: Floats) -> Floats:
     return np.clip(given, LEAST_REGULARIZATION, GREATEST_REGULARIZATION)
 
 
-def limited(value: float) -> float:
+def limit_number(value: float) -> float:
     """``value``, or 0 where its magnitude is 2^40 or more."""
     return value if abs(value) < BEYOND else 0.0
 
@@ -211,7 +213,7 @@ def _arm(joint: Joint, above: Matrix) -> Vector:
         return 0.0, 0.0, 0.0
     replaced = set() if joint.adds_to_offset else {channel.kind for channel in joint.channels}
     pairs = zip(POSITION_KINDS, joint.offset, strict=True)
-    return _back(above, [0.0 if kind in replaced else limited(x) for kind, x in pairs])
+    return _back(above, [0.0 if kind in replaced else limit_number(x) for kind, x in pairs])
 
 
 def _moves(
@@ -257,11 +259,11 @@ def _turns(
 
 def _whole(joint: Joint, start: int, numbers: list[int]) -> list[list[Turn]]:
     """The quaternion and the rotation vector of a joint, where it has them."""
-    found = (
+    columns = (
         [(axis, column, numbers[column]) for column in first_columns(joint.channels, kinds, start)]
         for axis, kinds in ((QUATERNION, QUATERNION_KINDS), (VECTOR, VECTOR_KINDS))
     )
-    return [part for part in found if part]
+    return [part for part in columns if part]
 
 
 def _rows(
@@ -300,7 +302,7 @@ def _masses(
             place = (0.0, 0.0, 0.0)
             if tail >= 0:
                 x, y, z = joint.tails[tail]
-                place = _back(frame, (limited(x), limited(y), limited(z)))
+                place = _back(frame, (limit_number(x), limit_number(y), limit_number(z)))
             _add_point(own, (1.0 - kappa) / n_points * weights[index], place)
         _add_shell(own, kappa / (3.0 * n_joints) * weights[index], radius, frame)
         result[index] = own

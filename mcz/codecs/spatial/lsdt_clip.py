@@ -12,7 +12,7 @@ states). A window decodes by itself; its length is the delay.
 from __future__ import annotations
 
 from mcz.codecs.contract import Encoded, SignalSource
-from mcz.codecs.parameters import chosen_of, preset_parameter
+from mcz.codecs.parameters import preset_parameter, preset_values
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
 from mcz.codecs.space_choices import (
     BASIS,
@@ -45,7 +45,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
 
     Raises MotionError for a value that is not finite, or is too large.
     """
-    chosen = chosen_of(PRESETS, params)
+    chosen = preset_values(PRESETS, params)
     sample = sample_of(NAME, source)
     step = params["step"] or default_step(sample)
     space = choose_space(NAME, sample, step, params["basis"], cosines)

@@ -31,8 +31,13 @@ from mcz.codecs.contract import (
     model_finder,
 )
 from mcz.codecs.gaps import FrameReader, LiveRows, SegmentReader
-from mcz.codecs.parameters import Dial, chosen_of, preset_parameter
-from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, Lengths, halving, segment_frames_of
+from mcz.codecs.parameters import Dial, preset_parameter, preset_values
+from mcz.codecs.segments import (
+    SEGMENT_FRAMES_PARAMETER,
+    Lengths,
+    segment_frames_of,
+    segments_by_halving,
+)
 from mcz.codecs.space import COURSES, MEAN, SpaceFields, check, space_of, uses_of
 from mcz.codecs.space_choices import (
     BASIS,
@@ -42,9 +47,9 @@ from mcz.codecs.space_choices import (
     THRESHOLD,
     THRESHOLD_PARAMETER,
     VIRTUAL_MARKERS,
-    changes,
     choose_space,
     default_step,
+    frame_differences,
     live_choice,
     sample_of,
 )
@@ -56,7 +61,7 @@ from mcz.codecs.spatial.prefix_streams import (
     fields_of,
     parse_vectors,
 )
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
 from mcz.schema import Record, build, field, parse
@@ -88,10 +93,10 @@ def encode(source: SignalSource, params: Params) -> Encoded:
 
     Raises MotionError for a value that is not finite, or is too large.
     """
-    chosen = chosen_of(PRESETS, params)
+    chosen = preset_values(PRESETS, params)
     sample = sample_of(NAME, source)
     step = params["step"] or default_step(sample)
-    choice = choose_space(NAME, sample, step, params["basis"], changes)
+    choice = choose_space(NAME, sample, step, params["basis"], frame_differences)
     layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
     fields = FrameHeader(space=choice.fields, code=NO_CODES)
     published = params["preset"] == "hou2016"
@@ -129,7 +134,7 @@ def _segments(source: SignalSource, coder: _Coder, given: int) -> Iterator[Segme
         return (coder.build(coder.quantize(frames(first, stop))),)
 
     lengths = Lengths(min(given or SEGMENT_FRAMES, layout.most_frames), bool(given))
-    for first, stop, streams in halving(layout.n_frames, lengths, code):
+    for first, stop, streams in segments_by_halving(layout.n_frames, lengths, code):
         yield Segment(first, stop - first, streams)
 
 
@@ -275,15 +280,15 @@ class _LiveEncoder(LiveEncoder):
     version: int | None = None
 
     def __init__(self, layout: Layout, options: Params) -> None:
-        chosen = chosen_of(PRESETS, options)
+        chosen = preset_values(PRESETS, options)
         choice = live_choice(NAME, layout, options["step"], options["basis"])
         if chosen["coder"] == "prefix":
             raise OptionError(f"{NAME}: prefix codes need all frames, coder mixed does not")
         fields = FrameHeader(space=choice.fields, code=NO_CODES)
         self.header = build(fields, f"{NAME} header")
         self.models = choice.models
-        found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
-        self._coder = _Coder(self.header, found, chosen["threshold"])
+        resolved = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
+        self._coder = _Coder(self.header, resolved, chosen["threshold"])
         self._every = options["segment_frames"] or SEGMENT_FRAMES
         self._at = 0
         self._rows = LiveRows(NAME, layout)

@@ -12,10 +12,10 @@ states). Mean, components and courses are in the file, as a model.
 from __future__ import annotations
 
 from mcz.codecs.contract import Encoded, SignalSource
-from mcz.codecs.parameters import chosen_of
+from mcz.codecs.parameters import preset_values
 from mcz.codecs.space_choices import default_step, sample_of
 from mcz.codecs.spatial import windows
-from mcz.codecs.spatial.window_choices import THRESHOLD, asked_of, parameters_of, plan_of
+from mcz.codecs.spatial.window_choices import THRESHOLD, parameters_of, plan_of, window_options
 from mcz.types import Params, Settings
 
 NAME = "pca-rdo"
@@ -34,7 +34,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     """
     sample = sample_of(NAME, source)
     step = params["step"] or default_step(sample)
-    asked = asked_of(params, chosen_of(PRESETS, params), step)
+    asked = window_options(params, preset_values(PRESETS, params), step)
     plan = plan_of(NAME, source, sample, asked, apart=False, mean=True, courses=True)
     return windows.encode(NAME, source, plan)
 

@@ -62,8 +62,8 @@ def fields_of(blocks: Iterable[Ints]) -> CodeFields:
         vectors, columns = np.nonzero(rows)
         before = np.concatenate([[-1], columns[:-1]])
         before[np.concatenate([[True], np.diff(vectors) > 0])[: len(before)]] = -1
-        found = columns - before[: len(columns)] - 1
-        gaps += np.bincount(_classes(found), minlength=N_CLASSES)
+        skipped = columns - before[: len(columns)] - 1
+        gaps += np.bincount(_classes(skipped), minlength=N_CLASSES)
         values += np.bincount(_classes(np.abs(rows[vectors, columns]) - 1), minlength=N_CLASSES)
     lengths = [list(np.trim_zeros(code_lengths(c.tolist()), "b")) for c in (gaps, values)]
     return CodeFields(coder=PREFIX, gap_lengths=lengths[0], value_lengths=lengths[1])
@@ -73,8 +73,8 @@ def _classes(numbers: Ints) -> Ints:
     """The class of each integer."""
     n = np.frexp(numbers.astype(np.float64))[1].astype(np.int64)  # of 0 to 2^41, exact
     wide = DIRECT + 2 * (n - 5) + (numbers >> np.maximum(n - 2, 0) & 1)
-    found: Ints = np.where(numbers < DIRECT, numbers, wide)
-    return found
+    classes: Ints = np.where(numbers < DIRECT, numbers, wide)
+    return classes
 
 
 def codes_from(fields: CodeFields, where: str) -> Codes | None:

@@ -20,10 +20,10 @@ from mcz.codecs.basis_models import (
     MAX_POINTS,
     MAX_SHIFT,
     Basis,
-    model_of,
-    rounded,
+    build_model,
+    round_vectors,
 )
-from mcz.codecs.contract import Model, SignalSource, id_of
+from mcz.codecs.contract import Model, SignalSource, model_id
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import Parameter, Presets, integer, number, preset_parameter
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
@@ -39,7 +39,7 @@ from mcz.codecs.space import (
 )
 from mcz.codecs.space_choices import CODER, DOMAIN, STEP, VIRTUAL_MARKERS, Sample
 from mcz.codecs.spatial.windows import MAX_WINDOW, Plan
-from mcz.codecs.steps import ratio_of
+from mcz.codecs.step_codes import ratio_of
 from mcz.errors import MotionError
 from mcz.transforms.dct import dct_matrix
 from mcz.types import Params
@@ -79,7 +79,7 @@ class Fit:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class WindowOptions:
     """Settings of the caller; None: the encoder chooses."""
 
     step: float
@@ -91,9 +91,9 @@ class Asked:
     frequencies: int | None
 
 
-def asked_of(params: Params, chosen: Params, step: float) -> Asked:
+def window_options(params: Params, chosen: Params, step: float) -> WindowOptions:
     """The parameters, those on which a preset has a say among ``chosen``."""
-    return Asked(
+    return WindowOptions(
         step,
         chosen["window"],
         chosen["threshold"],
@@ -107,7 +107,9 @@ def asked_of(params: Params, chosen: Params, step: float) -> Asked:
 class Windows:
     """A signal window by window, as often as wanted, in units of the channels' weights."""
 
-    def __init__(self, name: str, source: SignalSource, sample: Sample, asked: Asked) -> None:
+    def __init__(
+        self, name: str, source: SignalSource, sample: Sample, asked: WindowOptions
+    ) -> None:
         self.name, self.source, self.sample = name, source, sample
         n_frames = source.layout.n_frames
         self.n_frames, self.window = n_frames, max(1, min(asked.window, n_frames))
@@ -131,7 +133,7 @@ def plan_of(
     name: str,
     source: SignalSource,
     sample: Sample,
-    asked: Asked,
+    asked: WindowOptions,
     *,
     apart: bool,
     mean: bool,
@@ -157,10 +159,10 @@ def plan_of(
     if windows.n_frames and len(windows.weights):
         if len(windows.weights) > MAX_POINTS * (3 if apart else 1):
             raise MotionError(f"{name}: {len(windows.weights)} channels, at most {MAX_POINTS}")
-        found = fit(windows, apart=apart, mean=mean, courses=courses)
-        bases, n_frequencies = _bases(windows, found, asked)
-        models = (model_of(bases),)
-        fields.basis, fields.model = LEARNED, id_of(models[0])
+        clip_fit = fit(windows, apart=apart, mean=mean, courses=courses)
+        bases, n_frequencies = _bases(windows, clip_fit, asked)
+        models = (build_model(bases),)
+        fields.basis, fields.model = LEARNED, model_id(models[0])
         there = ((APART, apart), (MEAN, mean), (COURSES, courses))
         fields.flags |= sum(flag for flag, is_there in there if is_there)
     return Plan(
@@ -231,18 +233,20 @@ def _principal(products: bytes, n: int) -> tuple[Floats, Floats]:
     return vectors * np.where(largest < 0, -1.0, 1.0), np.maximum(energies[::-1], 0.0)
 
 
-def _bases(windows: Windows, found: Fit, asked: Asked) -> tuple[list[Basis | Floats], int]:
+def _bases(
+    windows: Windows, clip_fit: Fit, asked: WindowOptions
+) -> tuple[list[Basis | Floats], int]:
     """The bases of the model, and the coefficients of a row in time."""
-    room = ROOM if found.courses is None else ROOM // 2
-    most = min(found.columns.shape[1], room // found.columns.size)
+    room = ROOM if clip_fit.courses is None else ROOM // 2
+    most = min(clip_fit.columns.shape[1], room // clip_fit.columns.size)
     spatial = [
         _rounded(vectors[:most], energies[:most], asked.step)
-        for vectors, energies in zip(found.vectors, found.energies, strict=True)
+        for vectors, energies in zip(clip_fit.vectors, clip_fit.energies, strict=True)
     ]
     in_time: Basis | None = None
-    if found.courses is not None and found.course_energies is not None:
-        in_time = _rounded(found.courses, found.course_energies, asked.step)
-    gains = _gains(windows, found, [len(b.shifts) for b in spatial], in_time, asked)
+    if clip_fit.courses is not None and clip_fit.course_energies is not None:
+        in_time = _rounded(clip_fit.courses, clip_fit.course_energies, asked.step)
+    gains = _gains(windows, clip_fit, [len(b.shifts) for b in spatial], in_time, asked)
     ranks, n_frequencies = _counts(gains, spatial, in_time, asked)
     bases: list[Basis | Floats] = [_first(b, r) for b, r in zip(spatial, ranks, strict=True)]
     if in_time is not None:
@@ -250,8 +254,8 @@ def _bases(windows: Windows, found: Fit, asked: Asked) -> tuple[list[Basis | Flo
         used = int(np.flatnonzero(in_time.entries.any(axis=0)).max(initial=0)) + 1
         used = max(used, n_frequencies)
         bases.append(Basis(in_time.shifts, in_time.entries[:, :used]))
-    if found.stored is not None:
-        bases.append(found.stored)
+    if clip_fit.stored is not None:
+        bases.append(clip_fit.stored)
     return bases, n_frequencies
 
 
@@ -260,7 +264,7 @@ def _rounded(vectors: Floats, energies: Floats, step: float) -> Basis:
     least = math.ceil(math.log2(vectors.shape[1]) / 2) + 1  # or a vector is rounded away
     sizes = np.sqrt(energies) / step
     digits = np.ceil(np.log2(np.maximum(sizes, 1.0)) - LESS_DIGITS)
-    return rounded(vectors, np.clip(digits, least, MAX_SHIFT).astype(np.int64))
+    return round_vectors(vectors, np.clip(digits, least, MAX_SHIFT).astype(np.int64))
 
 
 def _first(basis: Basis, count: int) -> Basis:
@@ -268,7 +272,11 @@ def _first(basis: Basis, count: int) -> Basis:
 
 
 def _gains(
-    windows: Windows, found: Fit, counts: Sequence[int], in_time: Basis | None, asked: Asked
+    windows: Windows,
+    clip_fit: Fit,
+    counts: Sequence[int],
+    in_time: Basis | None,
+    asked: WindowOptions,
 ) -> list[Floats]:
     """Gain of each coefficient over all windows, in squared steps: (vectors, frequencies).
 
@@ -278,10 +286,10 @@ def _gains(
     gains = [np.zeros((count, n_frequencies)) for count in counts]
     for values in windows:
         temporal = dct_matrix(len(values))[:n_frequencies]
-        if found.courses is not None and len(values) == windows.window:
-            temporal = found.courses[:n_frequencies] @ dct_matrix(len(values))
-        rows = (temporal @ ((values - found.mean) / asked.step)).T
-        parts = zip(gains, found.columns, found.vectors, strict=True)
+        if clip_fit.courses is not None and len(values) == windows.window:
+            temporal = clip_fit.courses[:n_frequencies] @ dct_matrix(len(values))
+        rows = (temporal @ ((values - clip_fit.mean) / asked.step)).T
+        parts = zip(gains, clip_fit.columns, clip_fit.vectors, strict=True)
         for gain, columns, vectors in parts:
             sizes = np.abs(vectors[: len(gain)] @ rows[columns])
             worth = sizes**2 - 1 / 12 - BIT * (PER_ONE + PER_OCTAVE * np.log2(1 + sizes))
@@ -290,7 +298,7 @@ def _gains(
 
 
 def _counts(
-    gains: Sequence[Floats], spatial: Sequence[Basis], in_time: Basis | None, asked: Asked
+    gains: Sequence[Floats], spatial: Sequence[Basis], in_time: Basis | None, asked: WindowOptions
 ) -> tuple[list[int], int]:
     """The vectors of each matrix and the frequencies with which the sum of gains is greatest."""
     total = np.zeros(gains[0].shape[1])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.spatial.prefix_streams import Codes, build_vectors, parse_vectors
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError
 from mcz.schema import read_varint, varint

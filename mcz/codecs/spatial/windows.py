@@ -126,13 +126,13 @@ class _Quantizer:
             pairs = zip(self.analysis, space.columns, strict=True)
             rows = np.concatenate([part @ in_time[columns] for part, columns in pairs])
             sizes = np.abs(rows)
-            found = np.floor(sizes + 0.5)
-            found[sizes < self.threshold] = 0
-        if not (found <= MAX_INDEX).all():  # NaN too
+            indices = np.floor(sizes + 0.5)
+            indices[sizes < self.threshold] = 0
+        if not (indices <= MAX_INDEX).all():  # NaN too
             raise MotionError(
                 f"{self.name}: a coefficient exceeds 2^40 quantizer steps of {space.step:g}"
             )
-        signed: Floats = np.where(rows < 0, -found, found)
+        signed: Floats = np.where(rows < 0, -indices, indices)
         return signed.astype(np.int64)
 
     def _to_time(self, values: Floats) -> Floats:

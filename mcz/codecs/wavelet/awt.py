@@ -1,6 +1,6 @@
 """Codec 16, preset ``awt``: wavelets in time, coefficients shared out among the channels.
 
-SPEC.md, "Codec 16: wavelet", is normative; ``shared.py`` has what a decoder needs, this file
+SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has what a decoder needs, this file
 what an encoder chooses.
 Source: P. Beaudoin, P. Poulin, M. van de Panne, Adapting wavelet compression to human motion
 capture clips, 2007, as M. A. Khan, An efficient algorithm for compression of motion capture signal
@@ -17,21 +17,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.channel_weights import SAMPLED_FRAMES, weights_of
 from mcz.codecs.contract import Encoded, SignalSource
 from mcz.codecs.parameters import (
     Dial,
     Parameter,
     choice,
-    chosen_of,
     integer,
     number,
     preset_parameter,
+    preset_values,
 )
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
-from mcz.codecs.wavelet import shared
+from mcz.codecs.wavelet import wavelet
 from mcz.codecs.wavelet.awt_choices import choose, coefficients_of, quantizer_of
-from mcz.codecs.wavelet.recoding import recoder
-from mcz.codecs.wavelet.shared import (
+from mcz.codecs.wavelet.reencode import recoder
+from mcz.codecs.wavelet.wavelet import (
     BITSTREAM,
     WAVELET,
     N,
@@ -39,7 +40,6 @@ from mcz.codecs.wavelet.shared import (
     Q,
     transform_of,
 )
-from mcz.codecs.weights import SAMPLED_FRAMES, weights_of
 from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
@@ -60,13 +60,13 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
     layout, published = source.layout, params["preset"] == "khan2014"
-    chosen = chosen_of(PRESETS, params)
+    chosen = preset_values(PRESETS, params)
     average = chosen["a_w"]
     if average is None:
         average = -(-layout.n_frames // FRAMES_A_COEFFICIENT)
     transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = _weights(source, chosen["distortion"])
-    found = choose(
+    choice = choose(
         coefficients_of("awt", source, transform),
         weights,
         average,
@@ -74,9 +74,9 @@ def encode(source: SignalSource, params: Params) -> Encoded:
         iterations=params["iterations"],
         seed=params["seed"],
     )
-    quantizer = quantizer_of(found, weights, chosen["Q"])
+    quantizer = quantizer_of(choice, weights, chosen["Q"])
     frames = segment_frames_of(layout, params["segment_frames"], as_published=published)
-    return shared.encode(source, Plan("awt", transform, quantizer, frames, found.kept))
+    return wavelet.encode(source, Plan("awt", transform, quantizer, frames, choice.kept))
 
 
 def _weights(source: SignalSource, distortion: str) -> Floats:
@@ -91,7 +91,7 @@ def _weights(source: SignalSource, distortion: str) -> Floats:
 
 def _weigh(source: SignalSource, options: Params) -> tuple[Floats, None]:
     """Weights of a clip that was coded with these options; its thresholds are not known."""
-    return _weights(source, chosen_of(PRESETS, options)["distortion"]), None
+    return _weights(source, preset_values(PRESETS, options)["distortion"]), None
 
 
 CODEC = BITSTREAM(

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import SignalSource
-from mcz.codecs.steps import MIDDLE_CODE, code_of
+from mcz.codecs.step_codes import MIDDLE_CODE, code_of
 from mcz.codecs.wavelet.quantizer import DEAD_ZONE, LEAST_UNIT, Quantizer
-from mcz.codecs.wavelet.shared import Transform
+from mcz.codecs.wavelet.wavelet import Transform
 from mcz.codecs.wavelet.windows import Frames
 from mcz.errors import MotionError
 

@@ -1,6 +1,6 @@
 """Codec 16, preset ``dwt``: a wavelet transform in time, one threshold for all channels.
 
-SPEC.md, "Codec 16: wavelet", is normative; ``shared.py`` has what a decoder needs, this file
+SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has what a decoder needs, this file
 what an encoder chooses.
 Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
 multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5; the preset
@@ -16,13 +16,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.channel_weights import weights_of
 from mcz.codecs.contract import Encoded, Layout, SignalSource
-from mcz.codecs.parameters import Dial, Parameter, chosen_of, number, preset_parameter
+from mcz.codecs.parameters import Dial, Parameter, number, preset_parameter, preset_values
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, segment_frames_of, skeleton_of
-from mcz.codecs.wavelet import shared
+from mcz.codecs.wavelet import wavelet
 from mcz.codecs.wavelet.quantizer import make_quantizer
-from mcz.codecs.wavelet.recoding import recoder
-from mcz.codecs.wavelet.shared import (
+from mcz.codecs.wavelet.reencode import recoder
+from mcz.codecs.wavelet.wavelet import (
     BITSTREAM,
     WAVELET,
     N,
@@ -30,7 +31,6 @@ from mcz.codecs.wavelet.shared import (
     Q,
     transform_of,
 )
-from mcz.codecs.weights import weights_of
 from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
@@ -49,12 +49,12 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
     layout, published = source.layout, params["preset"] == "khan2014"
-    chosen = chosen_of(PRESETS, params)
+    chosen = preset_values(PRESETS, params)
     transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = _weights(layout, unit_aware=not published)
     quantizer = make_quantizer(weights, chosen["t_w"], chosen["Q"], "t_w")
     frames = segment_frames_of(layout, params["segment_frames"], as_published=published)
-    return shared.encode(source, Plan("dwt", transform, quantizer, frames))
+    return wavelet.encode(source, Plan("dwt", transform, quantizer, frames))
 
 
 def _weights(layout: Layout, *, unit_aware: bool) -> Floats:

@@ -1,6 +1,6 @@
 """Codec 16, preset ``mrdwt``: a multiresolution wavelet transform in time, thresholds by joint.
 
-SPEC.md, "Codec 16: wavelet", is normative; ``shared.py`` has what a decoder needs, this file
+SPEC.md, "Codec 16: wavelet", is normative; ``wavelet.py`` has what a decoder needs, this file
 what an encoder chooses.
 Source: M. A. Khan, Multiresolution coding of motion capture data for real-time multimedia
 applications, 2016; the preset ``khan2016`` follows the published implementation exactly, the
@@ -15,13 +15,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.channel_weights import RULES, SAMPLED_FRAMES, weights_of
 from mcz.codecs.contract import Encoded, SignalSource
-from mcz.codecs.parameters import Dial, Parameter, choice, chosen_of, number, preset_parameter
+from mcz.codecs.parameters import Dial, Parameter, choice, number, preset_parameter, preset_values
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
-from mcz.codecs.wavelet import shared
+from mcz.codecs.wavelet import wavelet
 from mcz.codecs.wavelet.quantizer import make_quantizer
-from mcz.codecs.wavelet.recoding import recoder
-from mcz.codecs.wavelet.shared import (
+from mcz.codecs.wavelet.reencode import recoder
+from mcz.codecs.wavelet.wavelet import (
     BITSTREAM,
     WAVELET,
     N,
@@ -29,7 +30,6 @@ from mcz.codecs.wavelet.shared import (
     Q,
     transform_of,
 )
-from mcz.codecs.weights import RULES, SAMPLED_FRAMES, weights_of
 from mcz.types import Params, Settings
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     """
     layout, preset = source.layout, params["preset"]
     skeleton = skeleton_of("mrdwt", layout)
-    chosen, published = chosen_of(PRESETS, params), preset == "khan2016"
+    chosen, published = preset_values(PRESETS, params), preset == "khan2016"
     transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = weights_of(
         skeleton,
@@ -66,7 +66,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     quantizer = make_quantizer(weights, chosen["T_g"], chosen["Q"])
     frames = segment_frames_of(layout, params["segment_frames"], as_published=published)
     plan = Plan("mrdwt", transform, quantizer, frames)
-    return shared.encode(source, plan)
+    return wavelet.encode(source, plan)
 
 
 def _weigh(source: SignalSource, options: Params) -> tuple[Floats, float | None]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.steps import code_of, ratio_of
+from mcz.codecs.step_codes import code_of, ratio_of
 from mcz.errors import OptionError
 
 Floats = NDArray[np.float64]
@@ -41,8 +41,8 @@ class Quantizer:
         """No detail that is not zero has a smaller magnitude."""
         if self.decimals is None or not len(self.thresholds):
             return 1
-        found = math.floor(float(self.thresholds.min()) * 10.0**self.decimals + 0.5)
-        return min(max(1, found), GREATEST_LEAST)
+        least = math.floor(float(self.thresholds.min()) * 10.0**self.decimals + 0.5)
+        return min(max(1, least), GREATEST_LEAST)
 
     def indices(self, coefficients: Floats, channel: int, *, detail: bool) -> Ints:
         """The integers of one band of a channel."""
@@ -54,11 +54,12 @@ class Quantizer:
             else:
                 scaled = sizes / (self.unit * ratio_of(self.codes[channel]))
                 small = scaled < DEAD_ZONE
-        found = np.floor(scaled + 0.5)
+        indices = np.floor(scaled + 0.5)
         if detail:
-            found[small] = 0
-        limited = np.where(found <= TOO_LARGE, found, TOO_LARGE)  # NaN too: sums have overflowed
-        return np.where(coefficients < 0, -limited, limited).astype(np.int64)
+            indices[small] = 0
+        # NaN, too, where sums have overflowed
+        capped = np.where(indices <= TOO_LARGE, indices, TOO_LARGE)
+        return np.where(coefficients < 0, -capped, capped).astype(np.int64)
 
 
 def make_quantizer(

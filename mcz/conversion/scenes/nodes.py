@@ -21,7 +21,7 @@ from mcz.conversion.losses import first_gap, left_out
 from mcz.errors import MotionError
 from mcz.hints import Hint
 from mcz.kinematics import point_set
-from mcz.kinematics.chain import Chain, Floats, times
+from mcz.kinematics.chain import Chain, Floats, multiply_matrices
 from mcz.kinematics.frames import frame_poses_of
 from mcz.motion import TURNING_KINDS, Motion, check_poses
 from mcz.poses.conversions import from_matrices
@@ -256,7 +256,7 @@ class _Placed:
             arm = self.chain.lengthened(link, arm, columns)
         arm = self.chain.scaled(link, arm, columns)
         own = self.chain.turned[holder]
-        return arm if own is None else times(own[:, :, None], arm[:, None])[:, 0]
+        return arm if own is None else multiply_matrices(own[:, :, None], arm[:, None])[:, 0]
 
 
 def _turns(motion: Motion, values: Floats, index: int) -> Floats | None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import mcz
-from mcz.kinematics.chain import Chain, Pose, times
+from mcz.kinematics.chain import Chain, Pose, multiply_matrices
 from mcz.retargeting.sides import sides_of
 
 from .spaces import TO_Z_UP, Floats, blender_names, continuous, to_quaternions
@@ -127,7 +127,7 @@ class _Placed:
             axes = np.eye(3)[:, :, None] if own is None else own[:, :, None]
             with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
                 axes = self.chain.turned_by(self.links[index], axes, columns, [])
-            turned = axes if own is None else times(axes, own.T[:, :, None])
+            turned = axes if own is None else multiply_matrices(axes, own.T[:, :, None])
             out[rows] = to_quaternions(np.moveaxis(turned, 2, 0))
         for (index, tail), out in self.shifts.items():
             arm = pose.arms[index] if tail < 0 else self.links[index].tails[tail][:, None]
@@ -143,7 +143,7 @@ class _Placed:
             arm = self.chain.lengthened(link, arm, columns)
         arm = self.chain.scaled(link, arm, columns)
         own = self.chain.turned[holder]
-        return arm if own is None else times(own[:, :, None], arm[:, None])[:, 0]
+        return arm if own is None else multiply_matrices(own[:, :, None], arm[:, None])[:, 0]
 
     def _offset(self, index: int) -> Floats:
         """From the parent at rest; of a joint that would lie on it, where it is first known."""

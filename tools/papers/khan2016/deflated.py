@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.bench.cases import Case, Variant, load
-from mcz.codecs import by_name
-from mcz.codecs.wavelet import shared as wavelet_codec
+from mcz.codecs import codec_by_name
+from mcz.codecs.wavelet import wavelet as wavelet_codec
 from mcz.codecs.wavelet.streams import Coding, parse_streams
 from mcz.schema import parse, varint
 from mcz.transforms.dwt import own_range
@@ -25,7 +25,7 @@ def deflated_bytes(case: Case, variant: Variant, T_g: float) -> int:
 
     Approximations as first differences, details with their runs of zeros, zigzag varints.
     """
-    codec = by_name(variant.codec)
+    codec = codec_by_name(variant.codec)
     source = MemorySource(load(case).motion, 0, codec, SEGMENT_BYTES)
     encoded = codec.encode(source, codec.options(variant.options({"T_g": T_g})))
     (segment,) = encoded.segments

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.bench.measure import Record
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.online.coder import Coder
 from mcz.codecs.online.units import INTRA, STR
 from mcz.live.writer import LiveWriter
@@ -171,7 +171,7 @@ def packets(clip: Clip, target: float) -> list[Record]:
         options: dict[str, Any] = {**base, "step": _step(motion, base, target)}
         stored = rate_point(motion, options)
         per_second = float(motion.frame_rate or 1) / motion.n_frames * 8 / 1000
-        pushed = pushed_by(by_name(NAME), motion, options)
+        pushed = pushed_by(codec_by_name(NAME), motion, options)
         row = {
             "label": label,
             "stored": stored["kbps"],

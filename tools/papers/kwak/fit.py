@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.online.choices import FLOOR_CM
+from mcz.codecs.online.rate_control import FLOOR_CM
 from mcz.motion import Motion
 from tools.papers.kwak.measure import code, errors
 

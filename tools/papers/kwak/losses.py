@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.bench.measure import Record
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, Layout, model_finder
 from mcz.codecs.online.units import INTRA, LTR, STR, parse_units
 from mcz.container.limits import BASE
@@ -170,7 +170,7 @@ class _Run:
 
     @classmethod
     def of(cls, motion: Motion, scheme: Scheme, target: float) -> _Run:
-        codec = by_name(scheme.codec)
+        codec = codec_by_name(scheme.codec)
         pushed = _at_rate(codec, motion, scheme.params, target)
         whole, _ = received(codec, pushed, np.zeros(motion.n_frames, np.bool_))
         kinds = [_kind(codec, *packet) for packet in pushed.packets]
@@ -184,7 +184,7 @@ class _Run:
         if self.scheme.regardless:
             chain = self.scheme.params.get("gof") == NEVER
             return regardless(self.whole, self.kinds, lost, chain=chain)
-        return received(by_name(self.scheme.codec), self.pushed, lost)
+        return received(codec_by_name(self.scheme.codec), self.pushed, lost)
 
     def course(self) -> list[list[float]]:
         """Frames and the mean error in cm there."""

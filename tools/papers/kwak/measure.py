@@ -20,7 +20,7 @@ import mcz
 from mcz.bench.cases import Loaded, Variant, load
 from mcz.bench.ladder import dial_of
 from mcz.bench.measure import Record, cpu_seconds, work_of, write_file
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
 from mcz.codecs.online.units import Unit, parse_units
 from mcz.codecs.space_choices import live_sample
@@ -55,7 +55,7 @@ class Coded:
 
 def code(motion: Motion, options: Mapping[str, Any]) -> Coded:
     """Encode and decode a motion of markers by the codec alone; raises MotionError, OptionError."""
-    codec = by_name(NAME)
+    codec = codec_by_name(NAME)
     source = MemorySource(motion, 0, codec, BASE.segment_bytes)
     encoded = codec.encode(source, codec.options(options))
     segments: list[Segment] = list(encoded.segments)
@@ -95,7 +95,7 @@ def filtered(motion: Motion, values: Floats) -> Floats:
 def rate_point(motion: Motion, options: Mapping[str, Any]) -> Record:
     """Rate, deviation and errors at one setting; raises MotionError, OptionError."""
     found = code(motion, options)
-    sizes = group_bytes(found.units, int(by_name(NAME).options(options)["gof"]))
+    sizes = group_bytes(found.units, int(codec_by_name(NAME).options(options)["gof"]))
     per_second = float(motion.frame_rate or 1) / motion.n_frames * 8 / 1000
     payload = sum(len(unit.data) for unit in found.units)
     sqnr, cm = errors(motion, found.values)
@@ -120,7 +120,7 @@ def live_basis(clip: Clip) -> str:
 
     One who has the whole clip may learn another from it, which no online codec can.
     """
-    source = MemorySource(motion_in_positions(clip), 0, by_name(NAME), BASE.segment_bytes)
+    source = MemorySource(motion_in_positions(clip), 0, codec_by_name(NAME), BASE.segment_bytes)
     return live_sample(NAME, source.layout, "auto")[1]
 
 
@@ -206,7 +206,7 @@ def file_points(
     def measure(setting: float) -> Record:
         return point_of(loaded, variant, {dial.parameter: settings.given(setting)})
 
-    in_places = by_name(variant.codec).positions
+    in_places = codec_by_name(variant.codec).positions
     start = STEP_CM / (motion.skeleton.unit_cm or 1.0) / 4 if in_places else 1.0
     return walk(measure, settings.snap(start), settings.snap)
 
@@ -233,7 +233,7 @@ def speeds(clip: Clip, variants: Sequence[tuple[Variant, Params]]) -> list[Recor
     rows = []
     for variant, more in variants:
         params = variant.options(dict(more))
-        codec = by_name(variant.codec)
+        codec = codec_by_name(variant.codec)
         encode, decode = work_of(motion, variant.codec, params)
         seconds = {"encode": cpu_seconds(encode), "decode": cpu_seconds(decode)}
         row = {"label": variant.label, "settings": dict(more), "live": False}

@@ -19,7 +19,7 @@ from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.curves import qbc, streams
 from mcz.codecs.parameters import SCALED
 from mcz.coding import mixing
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.motion import Motion, Skeleton
 from mcz.schema import varint
 from tools.vectors.build.files import partial
@@ -200,7 +200,7 @@ def segments_of(plan: Plan, made: Sequence[Path]) -> list[Segment]:
 def _streams(plan: Plan, path: Path, first: int, stop: int) -> tuple[bytes, bytes]:
     marks, frames, curves = curves_of(plan, path, first, stop)
     own = marks[: stop - first]
-    plain = streams.straight(marks, frames)
+    plain = streams.straight_curves(marks, frames)
     bent = len(plain.lengths) != len(curves.lengths) or (plain.mids != curves.mids).any()
     coarse, fine = b"", b""
     if own.any() or 0 in path.spoken:

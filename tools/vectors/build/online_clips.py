@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_name, raw
+from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Encoded
 from mcz.codecs.online import coder as online_coder
 from tools.vectors.build.online_units import (
@@ -74,7 +74,7 @@ def codec_of(plan: Plan, coding: type[Coding] = Coding) -> Any:
         "decode": decode,
         "parameters": raw.CODEC.parameters,
     }
-    return replace(by_name(ONLINE), **changes, dial=None)
+    return replace(codec_by_name(ONLINE), **changes, dial=None)
 
 
 def numbered(values: Sequence[int]) -> Callable[[int, int], int]:

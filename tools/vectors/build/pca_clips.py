@@ -18,7 +18,7 @@ from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.pca import kernels, pca
 from mcz.codecs.table_kernels import code_table
 from mcz.coding import mixing
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.coding.streams import scale_of
 from mcz.schema import varint
 

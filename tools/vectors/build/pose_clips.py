@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.posewave import posewave
-from mcz.codecs.posewave.chain import Chain
-from mcz.codecs.posewave.contact_keeper import Keeper, Piece
-from mcz.codecs.posewave.exact import build_exact, groups_of
+from mcz.codecs.posewave.contact_tracker import ContactTracker, Piece
+from mcz.codecs.posewave.exact_channels import build_exact, groups_of
 from mcz.codecs.posewave.header import Header, PosewaveHeader, parse_header
 from mcz.codecs.posewave.segment import Weights, encode_segment
+from mcz.codecs.posewave.segment_chain import SegmentChain
 from mcz.motion import Joint, Skeleton
 from mcz.numbers import Grid
 from tools.records import built
@@ -117,7 +117,10 @@ def parsed(plan: Plan) -> Header:
 
 
 def segments_of(plan: Plan) -> list[Segment]:
-    chain, keeper = Chain(parsed(plan), plan.skeleton), Keeper(plan.tolerance, plan.pieces)
+    chain, keeper = (
+        SegmentChain(parsed(plan), plan.skeleton),
+        ContactTracker(plan.tolerance, plan.pieces),
+    )
     edges = [0, *plan.ends, plan.n_frames] if plan.n_frames else []
     return [
         Segment(
@@ -129,7 +132,7 @@ def segments_of(plan: Plan) -> list[Segment]:
 
 
 def _streams(
-    plan: Plan, chain: Chain, keeper: Keeper, index: int, frames: tuple[int, int]
+    plan: Plan, chain: SegmentChain, keeper: ContactTracker, index: int, frames: tuple[int, int]
 ) -> tuple[bytes, ...]:
     if index in plan.streams:
         return plan.streams[index]

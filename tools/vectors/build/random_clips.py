@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs import by_name, raw
+from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import SCALED
 from mcz.motion import Motion, Signal
@@ -66,7 +66,7 @@ def _lossy(chance: Chance, codec: Codec, values: Any, grouping: str, sizes: Sequ
 
 def _as(name: str, made: Codec) -> Codec:
     """The content of another codec under the id of ``name``."""
-    own = by_name(name)
+    own = codec_by_name(name)
     return replace(own, encode=made.encode, parameters=raw.CODEC.parameters, dial=None)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_name, raw
+from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Encoded, Segment
 from mcz.coding.forms.ids import form_of_grid
 from mcz.motion import Exceptions, Motion, Signal
@@ -201,7 +201,9 @@ def clip_of_ordinals(chance: Chance, name: str) -> Clip:
         return Encoded(b"", iter(made), version=0)
 
     codec = replace(
-        by_name("fast" if name == SPELLED else name), encode=encode, parameters=raw.CODEC.parameters
+        codec_by_name("fast" if name == SPELLED else name),
+        encode=encode,
+        parameters=raw.CODEC.parameters,
     )
     return Clip(codec, motion, "all" if name == "best" else grouping)
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_name, raw
-from mcz.codecs.basis_models import Basis, known_models, model_of
+from mcz.codecs import codec_by_name, raw
+from mcz.codecs.basis_models import Basis, build_model, known_models
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -24,8 +24,8 @@ from mcz.codecs.contract import (
     Request,
     Segment,
     Span,
-    id_of,
     model_finder,
+    model_id,
 )
 from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
 from mcz.codecs.spatial import lsdt_frame, window_streams
@@ -108,7 +108,7 @@ class Plan:
     def model(self) -> Model | None:
         if self.known:
             return known_models()[self.known]
-        return model_of(self.own_bases) if self.own_bases else None
+        return build_model(self.own_bases) if self.own_bases else None
 
     @property
     def starts(self) -> Ints:
@@ -161,7 +161,7 @@ def header(plan: Plan, **parts: bytes) -> bytes:
         "n_frequencies": varint(plan.frequencies or plan.window),
         "flags": bytes((flags,)),
         "basis": bytes((LEARNED if plan.bases or plan.known else 0,)),
-        "model": id_of(model) if model else b"",
+        "model": model_id(model) if model else b"",
         "step": struct.pack("<d", plan.step),
         "weights": weights,
         "coder": bytes((plan.prefix,)),
@@ -229,14 +229,14 @@ def codec_of(plan: Plan) -> Codec:
     def encode(source: Any, params: Any) -> Encoded:
         return Encoded(header(plan), iter(segments_of(plan)), models=own, known=known)
 
-    codec = by_name(plan.codec)
+    codec = codec_by_name(plan.codec)
     return replace(codec, encode=encode, parameters=raw.CODEC.parameters, dial=None, grouping="all")
 
 
 def values_of(plan: Plan) -> NDArray[np.float64]:
     """The values of all frames."""
     made, layout = segments_of(plan), plan.layout
-    values: NDArray[np.float64] = by_name(plan.codec).decode(
+    values: NDArray[np.float64] = codec_by_name(plan.codec).decode(
         header(plan),
         layout,
         [Span(s.first, s.n_frames, fresh=s.fresh) for s in made],

@@ -19,7 +19,7 @@ from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.parameters import SCALED
 from mcz.codecs.wavelet import mrdwt, streams
 from mcz.coding import mixing
-from mcz.coding.start import start_states
+from mcz.coding.start_states import start_states
 from mcz.motion import Motion
 from mcz.schema import varint
 from mcz.transforms import dwt

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs import by_name, raw
+from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Encoded, Model, Segment, SignalSource
 from mcz.container import payloads
 from mcz.container.limits import BASE, LARGE
@@ -87,7 +87,7 @@ def _write(
         return replace(encoded, segments=iter((whole,)))
 
     codec = replace(
-        by_name(fields["codec"]),
+        codec_by_name(fields["codec"]),
         encode=encode,
         parameters=raw.CODEC.parameters,
         dial=None,

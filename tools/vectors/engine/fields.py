@@ -12,7 +12,7 @@ from mcz.codecs.pca.pca import PcaHeader
 from mcz.codecs.posewave.header import PosewaveHeader
 from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.windows import WindowsHeader
-from mcz.codecs.wavelet.shared import WaveletHeader
+from mcz.codecs.wavelet.wavelet import WaveletHeader
 from mcz.container import index_records, note_records, payloads
 from mcz.container.index_records import Index
 from mcz.container.packed import decoded, words

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs import raw
-from mcz.codecs.basis_models import model_of
-from mcz.codecs.contract import id_of
+from mcz.codecs.basis_models import build_model
+from mcz.codecs.contract import model_id
 from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, build_foot
 from mcz.container.packets import END, Packet, build_packet
@@ -414,7 +414,7 @@ def _needs_more(shelf: Whole) -> None:
 
 def _no_model_of_nothing(later: Whole) -> None:
     plan = Plan(CLIP, 4, (), bases=(basis_of(4, 3),))
-    other = swap(id_of(model_of(plan.bases)), bytes(range(16)))
+    other = swap(model_id(build_model(plan.bases)), bytes(range(16)))
     purpose = "A clip of no frames whose model is not there."
     later.add(
         "frames-0-model-missing",

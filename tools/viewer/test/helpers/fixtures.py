@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container.limits import LARGE
 from mcz.container.writer import Writer
 from mcz.motion import Motion, Signal
@@ -40,7 +40,7 @@ def archive(path: Path, motions: list[Motion]) -> None:
     with path.open("xb+") as stream:
         writer = Writer(stream, profile=LARGE)
         for motion in motions:
-            write_clip(writer, motion, by_name("raw"), {})
+            write_clip(writer, motion, codec_by_name("raw"), {})
         writer.finish()
 
 

@@ -7,9 +7,9 @@ from numpy.typing import DTypeLike
 
 from mcz.errors import OptionError
 from mcz.poses.conversions import check_form, check_order, from_matrices
-from mcz.poses.moving import (
+from mcz.poses.motion_like import (
     Frames,
-    Moving,
+    MotionLike,
     as_type,
     frame_range,
     joint_numbers,
@@ -23,7 +23,7 @@ SPACES = ("local", "world")
 
 
 def rotations(
-    moving: Moving,
+    moving: MotionLike,
     form: str = "quat",
     *,
     space: str = "local",
@@ -57,9 +57,9 @@ def rotations(
     needed = chosen if space == "local" else poses.above(chosen)
     values = values_of(moving, span, needed)
     turns = poses.local(values, chosen) if space == "local" else poses.world(values, chosen)
-    found = from_matrices(turns, form, order)
+    converted = from_matrices(turns, form, order)
     if degrees:
         if form not in ("euler", "rotvec"):
             raise OptionError(f"degrees: rotations as {form!r} have no angles")
-        found = np.degrees(found)
-    return as_type(found, dtype)
+        converted = np.degrees(converted)
+    return as_type(converted, dtype)

@@ -14,11 +14,11 @@ from mcz.kinematics import first_points
 from mcz.kinematics import point_names as names_of_points
 from mcz.kinematics.chain import Floats
 from mcz.motion import Skeleton
-from mcz.poses.changes import accelerations_of, velocities_of
 from mcz.poses.conversions import from_matrices
-from mcz.poses.moving import (
+from mcz.poses.derivatives import accelerations_of, velocities_of
+from mcz.poses.motion_like import (
     Frames,
-    Moving,
+    MotionLike,
     as_type,
     frame_range,
     joint_numbers,
@@ -30,7 +30,7 @@ from mcz.skeleton import Joints, column_of, joint_list, signs_of
 from mcz.types import Reals
 
 
-def point_names(moving: Moving | Skeleton, joints: Joints = None) -> tuple[str, ...]:
+def point_names(moving: MotionLike | Skeleton, joints: Joints = None) -> tuple[str, ...]:
     """The names of the points whose ``positions`` are given, in their order.
 
     That is the name of the joint, with " end" where a point is an end site of a BVH. Of Acclaim a
@@ -62,7 +62,7 @@ def chosen_points(skeleton: Skeleton, joints: Joints) -> list[int]:
 
 
 def positions(
-    moving: Moving,
+    moving: MotionLike,
     joints: Joints = None,
     frames: Frames = None,
     *,
@@ -78,11 +78,11 @@ def positions(
     unknown, or all of its channels are plain scalars.
     """
     scale = scale_to(moving.skeleton, unit)
-    found = _positions(moving, joints, frame_range(moving, frames))
-    return as_type(found if scale == 1.0 else found * scale, dtype)
+    places = _positions(moving, joints, frame_range(moving, frames))
+    return as_type(places if scale == 1.0 else places * scale, dtype)
 
 
-def _positions(moving: Moving, joints: Joints, span: tuple[int, int]) -> Floats:
+def _positions(moving: MotionLike, joints: Joints, span: tuple[int, int]) -> Floats:
     points = chosen_points(moving.skeleton, joints)
     poses = poses_of(moving.skeleton)
     needed = poses.above(poses.joints_of(points))
@@ -90,7 +90,7 @@ def _positions(moving: Moving, joints: Joints, span: tuple[int, int]) -> Floats:
 
 
 def velocities(
-    moving: Moving,
+    moving: MotionLike,
     joints: Joints = None,
     frames: Frames = None,
     *,
@@ -105,12 +105,12 @@ def velocities(
     frames has the numbers of the whole. Arguments and errors are those of ``positions``;
     OptionError also where the times are unknown.
     """
-    found = _with_neighbours(moving, joints, frames, unit, 1)
-    return as_type(_cut(velocities_of(found.places, found.steps), found), dtype)
+    window = _read_window(moving, joints, frames, unit, 1)
+    return as_type(_cut_window(velocities_of(window.places, window.steps), window), dtype)
 
 
 def accelerations(
-    moving: Moving,
+    moving: MotionLike,
     joints: Joints = None,
     frames: Frames = None,
     *,
@@ -122,12 +122,12 @@ def accelerations(
     (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or beside a gap that of
     the frame next to it, NaN in a run of fewer than three. Otherwise as ``velocities``.
     """
-    found = _with_neighbours(moving, joints, frames, unit, 2)
-    return as_type(_cut(accelerations_of(found.places, found.steps), found), dtype)
+    window = _read_window(moving, joints, frames, unit, 2)
+    return as_type(_cut_window(accelerations_of(window.places, window.steps), window), dtype)
 
 
 @dataclass(frozen=True, slots=True)
-class _Near:
+class _Window:
     """Places of some frames and of those around them; ``first`` and ``stop`` among ``places``.
 
     ``steps`` are the seconds from each of them to the next, NaN across a gap.
@@ -139,18 +139,18 @@ class _Near:
     stop: int
 
 
-def _with_neighbours(
-    moving: Moving, joints: Joints, frames: Frames, unit: str | None, reach: int
-) -> _Near:
+def _read_window(
+    moving: MotionLike, joints: Joints, frames: Frames, unit: str | None, reach: int
+) -> _Window:
     scale = scale_to(moving.skeleton, unit)
     steps = known_timeline(moving.name, moving.timeline).steps
     start, stop = frame_range(moving, frames)
     low, high = max(0, start - reach), min(moving.n_frames, stop + reach)
     places = _positions(moving, joints, (low, high)) * scale
-    return _Near(places, steps[low : max(low, high - 1)], start - low, stop - low)
+    return _Window(places, steps[low : max(low, high - 1)], start - low, stop - low)
 
 
-def _cut(values: Floats, near: _Near) -> Floats:
+def _cut_window(values: Floats, near: _Window) -> Floats:
     return values[near.first : near.stop]
 
 
@@ -189,7 +189,7 @@ class Root:
 
 
 def root(
-    moving: Moving,
+    moving: MotionLike,
     frames: Frames = None,
     *,
     joint: int | str | None = None,

@@ -8,18 +8,25 @@ from mcz.errors import MotionError
 from mcz.hints import Hint, Remark
 from mcz.kinematics import Places, places_of, point_names, points_of
 from mcz.kinematics.contacts import Contacts, FootTracks
-from mcz.kinematics.feet import feet_of
-from mcz.metrics.alike import has_markers_of, same_axes
-from mcz.metrics.changes import ChangeErrors
-from mcz.metrics.comparison import JointFigures
+from mcz.kinematics.joint_groups import find_feet
+from mcz.metrics.comparability import has_markers_of, same_axes
+from mcz.metrics.figures import JointFigures
 from mcz.metrics.sliding import Sliding, sliding
-from mcz.metrics.sums import Distances, Number, PointErrors, ShellErrors, Values, times
+from mcz.metrics.sums import (
+    ChangeErrors,
+    Distances,
+    Number,
+    PointErrors,
+    ShellErrors,
+    Values,
+    times,
+)
 from mcz.motion import Motion
 
 Feet = Contacts | Sequence[int | str] | bool
 
 
-class PlaceErrors:
+class PositionErrors:
     """Distances of points and, as wanted, of markers, shells and feet, in units of the original.
 
     ``scale`` brings lengths of the decoded side into these. Without ``placed`` there are no points
@@ -65,7 +72,7 @@ class PlaceErrors:
                 )
         elif not isinstance(contacts, bool):
             joints = contacts
-        if not (feet_of(self._a) if joints is None else joints):
+        if not (find_feet(self._a) if joints is None else joints):
             notes.append(Remark("no joint is a foot by its name: no contacts", Hint.FEET))
             return
         n_frames = self._original.n_frames
@@ -93,12 +100,12 @@ class PlaceErrors:
         if has_markers_of(self._a, self._b):  # points and virtual markers as markers
             both = places_of(self._b, values).points
             n = len(self._names)
-            found = Places(both[:, :n], both[:, n:], both[:, :0])
+            places = Places(both[:, :n], both[:, n:], both[:, :0])
         else:
-            found = places_of(self._b, values, markers=markers, shell_cm=self.shell_cm)
+            places = places_of(self._b, values, markers=markers, shell_cm=self.shell_cm)
         if self._scale == 1.0:
-            return found
-        return Places(*(places * self._scale for places in found))
+            return places
+        return Places(*(each * self._scale for each in places))
 
     def point_where(self) -> tuple[int, str] | None:
         """Frame and point of the greatest distance, the first of equals."""

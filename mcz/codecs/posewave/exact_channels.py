@@ -18,7 +18,7 @@ from mcz.codecs.segments import gather
 from mcz.coding.fast.decoder import MOST_ROWS, MOST_VALUES, Shape, read_alone
 from mcz.coding.fast.encoder import StreamBuilder
 from mcz.errors import FormatError, OptionError
-from mcz.kinematics.words import joints_of
+from mcz.kinematics.joint_groups import find_joints
 from mcz.motion import Skeleton
 from mcz.schema import parse
 from mcz.types import Params
@@ -39,10 +39,10 @@ def joint_words(text: object) -> tuple[str, ...]:
     words = text.split(",") if isinstance(text, str) else text
     if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
         raise OptionError(f"{OPTION} is {text!r}, not names of joints")
-    found = tuple(word.strip() for word in words)
-    if not all(found):
+    names = tuple(word.strip() for word in words)
+    if not all(names):
         raise OptionError(f"{OPTION} is {text!r}: a name is missing")
-    return found
+    return names
 
 
 def partition(skeleton: Skeleton, options: Params) -> tuple[Groups, tuple[int, ...]] | None:
@@ -50,7 +50,7 @@ def partition(skeleton: Skeleton, options: Params) -> tuple[Groups, tuple[int, .
     words = options.get(OPTION)
     if words is None:
         return None
-    joints = {joint for word in words for joint in joints_of(skeleton, word, OPTION)}
+    joints = {joint for word in words for joint in find_joints(skeleton, word, OPTION)}
     groups, exact = groups_of(skeleton, joints)
     if not exact:
         raise OptionError(f"{OPTION}: {', '.join(words)} have no channels")
@@ -69,7 +69,9 @@ def groups_of(skeleton: Skeleton, joints: Collection[int]) -> tuple[Groups, tupl
     return tuple(tuple(run) for _, run in runs), exact
 
 
-def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int, ...]) -> bytes:
+def cut_header(
+    header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int, ...]
+) -> bytes:
     """Exact groups can be left alone; rows, of which all lossy joints have a part, cannot be cut.
 
     Raises OptionError for other groups.

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.parameters import MAX_DECIMALS, SCALED, Parameter, decimals_parameter, integer
-from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, halving
-from mcz.codecs.steps import ratio_of
+from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, segments_by_halving
+from mcz.codecs.step_codes import ratio_of
 from mcz.codecs.wavelet.quantizer import Quantizer
 from mcz.codecs.wavelet.streams import Coding, build_streams, parse_streams
 from mcz.codecs.wavelet.windows import Frames
@@ -108,11 +108,11 @@ def transform_of(
 
     ``as_published``: as many as are asked for, however short it is.
     """
-    wavelet_id, found = by_name(wavelet)
+    wavelet_id, taps = by_name(wavelet)
     levels = levels if layout.n_frames else 0
-    while levels and not as_published and layout.n_frames < (found.n_taps - 1) << levels:
+    while levels and not as_published and layout.n_frames < (taps.n_taps - 1) << levels:
         levels -= 1
-    return Transform(wavelet_id, found, levels)
+    return Transform(wavelet_id, taps, levels)
 
 
 def encode(source: SignalSource, plan: Plan) -> Encoded:
@@ -141,7 +141,7 @@ def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
     n_frames = source.layout.n_frames
     frames = Frames(plan.name, source, plan.wavelet, plan.levels)
     code = partial(segment_streams, frames, plan)
-    for first, stop, streams in halving(n_frames, _lengths(source.layout, plan), code):
+    for first, stop, streams in segments_by_halving(n_frames, _lengths(source.layout, plan), code):
         frames.keep(first, stop)
         lead = min(first, plan.wavelet.lead(plan.levels))
         yield Segment(first, stop - first, streams, lead)
@@ -289,12 +289,12 @@ class _Decoder:
 
     def _values(self, indices: NDArray[np.int64], code: int, *, detail: bool) -> Floats:
         """Coefficients from integers."""
-        found = indices.astype(np.float64)
+        values = indices.astype(np.float64)
         if not self.coding.scaled:
-            return np.asarray(found / 10.0**self.fields.decimals)  # MRDWT-32
+            return np.asarray(values / 10.0**self.fields.decimals)  # MRDWT-32
         if detail:
-            found = np.where(indices == 0, 0.0, found - np.copysign(INWARD, found))
-        return np.asarray(found * ((self.fields.unit or 1.0) * ratio_of(code)))  # MRDWT-33
+            values = np.where(indices == 0, 0.0, values - np.copysign(INWARD, values))
+        return np.asarray(values * ((self.fields.unit or 1.0) * ratio_of(code)))  # MRDWT-33
 
 
 def _stream(fetch: Fetch, segment: int, group: int, band: int) -> bytes:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kinematics.chain import IDENTITY, Floats, Link, times, turned
+from mcz.kinematics.chain import IDENTITY, Floats, Link, multiply_matrices, rotate_axes
 
 STEPS = 40
 FLAT = 1e-14  # of the gradient, whose greatest is about 1: no way up any more
@@ -25,43 +25,46 @@ def polish_turns(link: Link, wanted: Floats, columns: Floats, radians: float) ->
     axes, own = [axis for axis, _ in link.turns], link.angles
     angles = columns[own] * radians
     damping = np.full(angles.shape[1], START_DAMPING)
-    made, spins = _turn(axes, angles)
-    near = _nearness(made, wanted)
+    turn, spins = _turn(axes, angles)
+    near = _nearness(turn, wanted)
     for _ in range(STEPS):
-        gradient = np.einsum("kif,if->fk", spins, _vector(wanted, made))
+        gradient = np.einsum("kif,if->fk", spins, _vector(wanted, turn))
         if np.abs(gradient).max(initial=0.0) < FLAT:
             break
         normal = 2 * np.einsum("kif,lif->fkl", spins, spins)
         normal += damping[:, None, None] * np.eye(len(axes))
         step = np.linalg.solve(normal, gradient[:, :, None])[:, :, 0].T
         trial = angles + step
-        made_there, spins_there = _turn(axes, trial)
-        near_there = _nearness(made_there, wanted)
-        better = near_there > near - ROUNDING
+        trial_turn, trial_spins = _turn(axes, trial)
+        trial_near = _nearness(trial_turn, wanted)
+        better = trial_near > near - ROUNDING
         angles = np.where(better, trial, angles)
-        near = np.where(better, near_there, near)
-        made, spins = np.where(better, made_there, made), np.where(better, spins_there, spins)
+        near = np.where(better, trial_near, near)
+        turn, spins = (
+            np.where(better, trial_turn, turn),
+            np.where(better, trial_spins, spins),
+        )
         damping *= np.where(better, EASIER, HARDER)
     columns[own] = angles / radians
 
 
 def _turn(axes: list[int], angles: Floats) -> tuple[Floats, Floats]:
     """The turn by ``angles`` (n, F), (3, 3, F), and what each of them turns about, (n, 3, F)."""
-    made = np.broadcast_to(IDENTITY, (3, 3, angles.shape[1]))
+    rotation = np.broadcast_to(IDENTITY, (3, 3, angles.shape[1]))
     spins = np.empty((len(axes), 3, angles.shape[1]))
     for number, axis in enumerate(axes):
-        spins[number] = made[:, axis]
-        made = turned(made, axis, angles[number])
-    return made, spins
+        spins[number] = rotation[:, axis]
+        rotation = rotate_axes(rotation, axis, angles[number])
+    return rotation, spins
 
 
-def _nearness(made: Floats, wanted: Floats) -> Floats:
+def _nearness(rotation: Floats, wanted: Floats) -> Floats:
     """The trace of R' M, 3 where they are the same, (F,)."""
-    near: Floats = (made * wanted).sum(axis=(0, 1))
+    near: Floats = (rotation * wanted).sum(axis=(0, 1))
     return near
 
 
-def _vector(wanted: Floats, made: Floats) -> Floats:
+def _vector(wanted: Floats, rotation: Floats) -> Floats:
     """Twice the sine of the angle from ``made`` to ``wanted``, times the axis, (3, F)."""
-    left = times(wanted, np.swapaxes(made, 0, 1))
+    left = multiply_matrices(wanted, np.swapaxes(rotation, 0, 1))
     return np.stack([left[2, 1] - left[1, 2], left[0, 2] - left[2, 0], left[1, 0] - left[0, 1]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kinematics.chain import Floats, Link, turned
+from mcz.kinematics.chain import Floats, Link, rotate_axes
 from mcz.kinematics.euler import ORDERS, euler_angles
 from mcz.kinematics.rotation_vectors import (
     continuous,
@@ -25,21 +25,21 @@ def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> No
     """
     if link.is_whole:
         columns[link.turning] = 0.0
-        quaternions = quaternions_of(_kabsch(moment))
+        quaternions = quaternions_of(_nearest_rotations(moment))
         if link.quaternion:
             columns[list(link.quaternion)] = quaternions
         else:
             vectors = continuous(vectors_of_quaternions(quaternions))
             columns[list(link.vector)] = vectors / radians
     elif link.freedoms in ORDERS:
-        angles = small(euler_angles(_kabsch(moment), link.freedoms))
+        angles = smallest_angles(euler_angles(_nearest_rotations(moment), link.freedoms))
         for k, (_, column) in enumerate(link.turns):
             columns[column] = angles[:, k] / radians
     else:
         columns[link.angles] = _angle_by_angle([axis for axis, _ in link.turns], moment) / radians
 
 
-def _kabsch(moment: Floats) -> Floats:
+def _nearest_rotations(moment: Floats) -> Floats:
     """The rotations R with the greatest trace of R' ``moment``, (3, 3, F)."""
     left, _, right = np.linalg.svd(np.moveaxis(moment, 2, 0))
     turn = np.linalg.det(left) * np.linalg.det(right)
@@ -48,16 +48,16 @@ def _kabsch(moment: Floats) -> Floats:
     return result
 
 
-def small(angles: Floats) -> Floats:
+def smallest_angles(angles: Floats) -> Floats:
     """The same rotations by angles (n_frames, 3) nearer to zero on the whole, just as continuous.
 
     Three angles (a, b, c) about different axes turn as (a + pi, pi - b, c + pi) do.
     """
-    both = [centered(angles), centered(angles * [1, -1, 1] + np.pi)]
+    both = [center_angles(angles), center_angles(angles * [1, -1, 1] + np.pi)]
     return min(both, key=lambda angles: float((angles * angles).sum()))
 
 
-def centered(angles: Floats) -> Floats:
+def center_angles(angles: Floats) -> Floats:
     """Angles, (n_frames, n), less whole turns: their means are within half a turn of zero."""
     if not len(angles):
         return angles
@@ -89,9 +89,9 @@ def _angle_by_angle(axes: list[int], moment: Floats) -> Floats:
             for k, axis in enumerate(axes):
                 between = moment
                 for before in range(k):  # T1' moment, then T2' T1' moment
-                    between = _turned_left(between, axes[before], -angles[before])
+                    between = _rotate_left(between, axes[before], -angles[before])
                 for after in range(len(axes) - 1, k, -1):
-                    between = turned(between, axes[after], -angles[after])
+                    between = rotate_axes(between, axes[after], -angles[after])
                 i, j = (axis + 1) % 3, (axis + 2) % 3
                 sine, cosine = between[j, i] - between[i, j], between[i, i] + between[j, j]
                 angles[k] = np.arctan2(sine, cosine)
@@ -101,6 +101,6 @@ def _angle_by_angle(axes: list[int], moment: Floats) -> Floats:
     return np.asarray(np.unwrap(best, axis=1))
 
 
-def _turned_left(matrix: Floats, axis: int, angle: Floats) -> Floats:
+def _rotate_left(matrix: Floats, axis: int, angle: Floats) -> Floats:
     """R ``matrix``, R the rotation by ``angle`` about the axis."""
-    return np.swapaxes(turned(np.swapaxes(matrix, 0, 1), axis, -angle), 0, 1)
+    return np.swapaxes(rotate_axes(np.swapaxes(matrix, 0, 1), axis, -angle), 0, 1)

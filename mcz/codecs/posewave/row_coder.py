@@ -20,7 +20,7 @@ from mcz.codecs.posewave.model import (
     no_rows,
     start_coder,
 )
-from mcz.codecs.posewave.state import N_SMALL
+from mcz.codecs.posewave.model_state import N_SMALL
 from mcz.errors import FormatError, MotionError
 
 Floats = NDArray[np.float64]
@@ -111,9 +111,9 @@ class RowCoder:
 
     def copy(self) -> RowCoder:
         """One that learns by itself, before it begins or goes on."""
-        found = copy(self)
-        found.model = deepcopy(self.model)
-        return found
+        clone = copy(self)
+        clone.model = deepcopy(self.model)
+        return clone
 
     def begin(self, level: int, kind: int, n_rows: int, stream: Stream) -> None:
         """A level, whose ``kind`` says how large its coefficients are on the whole."""

@@ -116,8 +116,8 @@ def rates() -> tuple[Floats, Floats]:
     """Bits of a quantized Laplacian and Gaussian, by log2 of the step over the deviation."""
     kernels = _kernels()
     at = 2.0 ** (np.arange(kernels.N_RATES) / kernels.PER_OCTAVE - kernels.LOW)
-    found = tuple(np.array([bits(float(x)) for x in at]) for bits in (laplacian, gaussian))
-    return found[0], found[1]
+    tables = tuple(np.array([bits(float(x)) for x in at]) for bits in (laplacian, gaussian))
+    return tables[0], tables[1]
 
 
 def laplacian(step: float) -> float:

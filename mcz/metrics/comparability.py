@@ -7,12 +7,12 @@ import numpy as np
 from mcz.errors import MczError, MotionError
 from mcz.hints import Hint, Remark
 from mcz.kinematics import point_names, point_set, positions_of
-from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.metrics.sums import Number, Values
 from mcz.motion import POSITION_KINDS, Motion, Signal, Skeleton
 
 
-def extent(signal: Signal) -> str:
+def frames_text(signal: Signal) -> str:
     rate = signal.samples_per_frame
     return f"{signal.n_frames} frames" + (f" of {rate} rows" if rate > 1 else "")
 

@@ -8,14 +8,14 @@ from dataclasses import asdict
 from mcz.errors import MczError
 from mcz.joint_errors import joint_errors
 from mcz.kinematics import SHELL_CM, point_set
-from mcz.kinematics.feet import feet_of
-from mcz.metrics.comparing import compare
-from mcz.metrics.comparison import Comparison
+from mcz.kinematics.joint_groups import find_feet
+from mcz.metrics.comparison import compare
+from mcz.metrics.figures import Comparison
 from mcz.motion import Motion
 from mcz.types import JsonObject, Params
 
 
-def difference(
+def diff_document(
     a: Motion,
     b: Motion,
     *,
@@ -32,21 +32,21 @@ def difference(
     add those lists. Raises MotionError for motions of different length.
     """
     if contacts is None:
-        contacts = bool(feet_of(a.skeleton))
-    found = compare(a, b, shell_cm=shell_cm, contacts=contacts if a.skeleton.joints else False)
-    entries = _in_clip(found.entries(), start)
+        contacts = bool(find_feet(a.skeleton))
+    comparison = compare(a, b, shell_cm=shell_cm, contacts=contacts if a.skeleton.joints else False)
+    entries = _in_clip(comparison.entries(), start)
     document: JsonObject = {"name_a": a.name, "name_b": b.name, **entries}
-    document["feet"] = _feet(found)
+    document["feet"] = _feet(comparison)
     if by_joint:
-        document["by_joint"] = [_in_clip(each.entries(), start) for each in found.by_joint]
+        document["by_joint"] = [_in_clip(each.entries(), start) for each in comparison.by_joint]
     if contact_list:
-        slides = () if found.sliding is None else found.sliding.slides
+        slides = () if comparison.sliding is None else comparison.sliding.slides
         document["contact_list"] = [
             asdict(slide) | {"first": slide.first + start} for slide in slides
         ]
     document["equal_joints"] = _equal_joints(a, b)
-    document["joints"] = _by_joints(a, b, found, start)
-    return document | {"notes": list(found.notes)}
+    document["joints"] = _by_joints(a, b, comparison, start)
+    return document | {"notes": list(comparison.notes)}
 
 
 def _in_clip(entries: Params, start: int) -> JsonObject:
@@ -57,11 +57,11 @@ def _in_clip(entries: Params, start: int) -> JsonObject:
     }
 
 
-def _feet(found: Comparison) -> JsonObject | None:
+def _feet(comparison: Comparison) -> JsonObject | None:
     """Settings of the contact search; None if there was none."""
-    if found.sliding is None:
+    if comparison.sliding is None:
         return None
-    contacts = found.sliding.contacts
+    contacts = comparison.sliding.contacts
     return {
         "joints": list(contacts.joints),
         "up_axis": contacts.up_axis,
@@ -76,7 +76,7 @@ def _equal_joints(a: Motion, b: Motion) -> list[str]:
     if any(not motion.signals[0].has_poses for motion in (a, b)):
         return []
     theirs = {name: joint for joint, name in enumerate(b.skeleton.addresses())}
-    found = []
+    equal = []
     for joint, name in enumerate(a.skeleton.addresses()):
         kinds = [channel.kind for channel in a.skeleton.joints[joint].channels]
         other = theirs.get(name)
@@ -89,13 +89,13 @@ def _equal_joints(a: Motion, b: Motion) -> list[str]:
             motion.signals[0].masked()[:, list(columns)].astype("<f8").tobytes()
             for motion, columns in both
         ]
-        found += [name] if bits[0] == bits[1] else []
-    return found
+        equal += [name] if bits[0] == bits[1] else []
+    return equal
 
 
-def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> JsonObject | None:
+def _by_joints(a: Motion, b: Motion, comparison: Comparison, start: int) -> JsonObject | None:
     """The distances of joints of the same names, of skeletons whose points are not alike."""
-    if found.points is not None and point_set(a.skeleton) == point_set(b.skeleton):
+    if comparison.points is not None and point_set(a.skeleton) == point_set(b.skeleton):
         return None
     try:
         errors = joint_errors(a, b)

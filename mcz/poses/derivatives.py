@@ -16,11 +16,11 @@ def velocities_of(places: Floats, steps: Floats) -> Floats:
 
     NaN where a frame or both of its neighbors are unknown.
     """
-    before, after, first, last = _slopes(places, steps)
+    before, after, first, last = _one_sided_slopes(places, steps)
     with np.errstate(invalid="ignore"):
-        found: Floats = (before * last + after * first) / (first + last)
-    found = np.where(np.isnan(found), before, found)
-    return np.where(np.isnan(found), after, found)
+        velocities: Floats = (before * last + after * first) / (first + last)
+    velocities = np.where(np.isnan(velocities), before, velocities)
+    return np.where(np.isnan(velocities), after, velocities)
 
 
 def accelerations_of(places: Floats, steps: Floats) -> Floats:
@@ -28,18 +28,18 @@ def accelerations_of(places: Floats, steps: Floats) -> Floats:
 
     NaN where a frame is unknown or stands in a run of fewer than three.
     """
-    before, after, first, last = _slopes(places, steps)
+    before, after, first, last = _one_sided_slopes(places, steps)
     with np.errstate(invalid="ignore"):
         inner: Floats = 2.0 * (after - before) / (first + last)
-    found = inner.copy()
-    missing = np.isnan(found[:-1]) & ~np.isnan(after[:-1])  # the next frame is a neighbor
-    found[:-1][missing] = inner[1:][missing]
-    missing = np.isnan(found[1:]) & ~np.isnan(before[1:])
-    found[1:][missing] = inner[:-1][missing]
-    return found
+    accelerations = inner.copy()
+    missing = np.isnan(accelerations[:-1]) & ~np.isnan(after[:-1])  # the next frame is a neighbor
+    accelerations[:-1][missing] = inner[1:][missing]
+    missing = np.isnan(accelerations[1:]) & ~np.isnan(before[1:])
+    accelerations[1:][missing] = inner[:-1][missing]
+    return accelerations
 
 
-def _slopes(places: Floats, steps: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def _one_sided_slopes(places: Floats, steps: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """The slopes from the frame before and to the next, and the seconds between; NaN: none."""
     seconds = np.full((len(places) + 1, 1, 1), np.nan)
     seconds[1:-1, 0, 0] = steps

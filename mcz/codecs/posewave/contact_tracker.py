@@ -12,9 +12,9 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.contact_plan import START_UNITS, Contacts, Held
+from mcz.codecs.posewave.contact_plan import START_UNITS, Contacts, HeldPoints
 from mcz.codecs.posewave.contacts import Coder, Corrections
-from mcz.codecs.posewave.rows import Stream
+from mcz.codecs.posewave.row_coder import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan
 from mcz.errors import ContactWarning, MotionError
 from mcz.motion import Skeleton
@@ -57,12 +57,12 @@ class Outcome:
 
     @property
     def errors(self) -> Floats:
-        found: Floats = np.sqrt((self.off * self.off).sum(axis=1))
-        return found
+        errors: Floats = np.sqrt((self.off * self.off).sum(axis=1))
+        return errors
 
 
 @dataclass(slots=True)
-class Keeper:
+class ContactTracker:
     """Contacts of a clip as an encoder tracks them: pieces, and their target positions.
 
     ``shifts`` are how far the place that is held is off the source's, by stance, with the frame in
@@ -80,7 +80,7 @@ class Keeper:
         self,
         contacts: Contacts,
         plan: Plan,
-        held: Held,
+        held: HeldPoints,
         stream: Stream,
         source: Floats,
         values: Floats,
@@ -195,7 +195,7 @@ class Keeper:
     ) -> list[Outcome]:
         """Error of each piece against the position in which its contact began."""
         places = corrections.placed(corrections.values)
-        found = []
+        outcomes = []
         for piece in pieces:
             rows = slice(piece.first, piece.stop)
             off = places[piece.point, rows] - targets[piece.point, rows]
@@ -203,5 +203,5 @@ class Keeper:
             if piece.first + self.first == piece.origin:
                 self.origins[origin] = off[0].copy()
             off -= self.origins[origin]
-            found.append(Outcome(piece, off))
-        return found
+            outcomes.append(Outcome(piece, off))
+        return outcomes

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Frames = tuple[int, int] | slice | None
 
 
-class Decoded(Protocol):
+class ClipLike(Protocol):
     """Interface of a Clip as this package uses it."""
 
     name: str
@@ -42,7 +42,7 @@ class Decoded(Protocol):
     ) -> Values: ...
 
 
-Moving = Motion | Decoded
+MotionLike = Motion | ClipLike
 
 
 def poses_of(skeleton: Skeleton) -> FramePoses:
@@ -52,7 +52,7 @@ def poses_of(skeleton: Skeleton) -> FramePoses:
     return frame_poses_of(skeleton)
 
 
-def frame_range(moving: Moving, frames: Frames) -> tuple[int, int]:
+def frame_range(moving: MotionLike, frames: Frames) -> tuple[int, int]:
     """Frames a <= f < b, from a pair or a slice; raises OptionError where they are not there.
 
     A slice counts as numpy's do: ends may be left out, negative or beyond.
@@ -75,7 +75,7 @@ def joint_numbers(skeleton: Skeleton, joints: Joints) -> list[int]:
     return [skeleton.find(joint) for joint in joint_list(joints)]
 
 
-def values_of(moving: Moving, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
+def values_of(moving: MotionLike, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
     """The channels of these joints, float64 (n_frames, n_channels), NaN where invalid.
 
     Columns of other joints may hold anything. Raises MotionError where the rows of the motion are
@@ -110,7 +110,9 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     return skeleton.unit_cm / wanted
 
 
-def times(moving: Moving, frames: Frames = None, *, signal: int | str = 0) -> NDArray[np.float64]:
+def times(
+    moving: MotionLike, frames: Frames = None, *, signal: int | str = 0
+) -> NDArray[np.float64]:
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 
     Those of a signal of times; else, by frame numbers and rate, from ``first_time`` on or, without
@@ -124,7 +126,7 @@ def times(moving: Moving, frames: Frames = None, *, signal: int | str = 0) -> ND
     return timeline.samples(per_frame)[start * per_frame : stop * per_frame]
 
 
-def signal_of(moving: Moving, signal: int | str) -> Any:
+def signal_of(moving: MotionLike, signal: int | str) -> Any:
     """A signal by index or name, the first of its name; raises OptionError."""
     names = [each.name for each in moving.signals]
     if isinstance(signal, str) and signal in names:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.kinematics.chain import Chain, Floats
+from mcz.kinematics.frame_kernels import position_points
+from mcz.kinematics.kernel_tables import is_elaborate, tables_of
 from mcz.kinematics.points import marker_distance, points_and_markers_of, points_of, positions_of
-from mcz.kinematics.single_kernels import position_points
-from mcz.kinematics.tables import is_elaborate, tables_of
 from mcz.motion import Skeleton
 
 __all__ = ["FramePositions"]
@@ -53,7 +53,7 @@ class FramePositions:
     def _one_of_many(self, values: Floats) -> Floats:
         if self._marked:
             both = points_and_markers_of(self._skeleton, values[None])
-            found: Floats = np.concatenate(both, axis=1)[0]
+            positions: Floats = np.concatenate(both, axis=1)[0]
         else:
-            found = positions_of(self._skeleton, values[None])[0]
-        return found
+            positions = positions_of(self._skeleton, values[None])[0]
+        return positions

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Recode, Recoding, SignalSource
-from mcz.codecs.groups import Part
-from mcz.codecs.steps import code_of
+from mcz.codecs.contract import Recode, RecodeRequest, SignalSource
+from mcz.codecs.step_codes import code_of
+from mcz.codecs.subset_source import SubsetSource
 from mcz.codecs.wavelet.quantizer import DEAD_ZONE, Quantizer
-from mcz.codecs.wavelet.shared import NAME, Plan, Transform, WaveletHeader, segment_streams
+from mcz.codecs.wavelet.wavelet import NAME, Plan, Transform, WaveletHeader, segment_streams
 from mcz.codecs.wavelet.windows import Frames
 from mcz.schema import parse
 from mcz.transforms.wavelets import INLINE, Wavelet, by_id
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class _Held(Quantizer):
+class _FixedQuantizer(Quantizer):
     """A quantizer whose least magnitude of a detail is that of the header."""
 
     held: int = 1
@@ -32,8 +32,8 @@ class _Held(Quantizer):
         return self.held
 
     def indices(self, coefficients: Floats, channel: int, *, detail: bool) -> NDArray[np.int64]:
-        found = Quantizer.indices(self, coefficients, channel, detail=detail)
-        return np.where(np.abs(found) < self.held, 0, found) if detail else found
+        indices = Quantizer.indices(self, coefficients, channel, detail=detail)
+        return np.where(np.abs(indices) < self.held, 0, indices) if detail else indices
 
 
 # (source, options) -> the weights (n_channels,) of the signal, which times a threshold are the
@@ -47,12 +47,12 @@ def recoder(weigh: Weigh) -> Recode:
     Elsewhere its encoder's ``weigh`` says what is small.
     """
 
-    def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+    def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
         """The streams of some channels with new values, with the steps of the header."""
         fields = parse(WaveletHeader, asked.header, f"{NAME} header")
         quantizer = _quantizer(fields, asked, *weigh(asked.source, asked.options))
         plan = Plan(NAME, _transform(fields), quantizer, 0)
-        part = Part(asked.source, asked.groups, fields.coded_frames)
+        part = SubsetSource(asked.source, asked.groups, fields.coded_frames)
         frames = Frames(NAME, part, plan.wavelet, plan.levels)
         for span in asked.spans:
             streams = segment_streams(frames, plan, span.first, span.stop)
@@ -72,7 +72,7 @@ def _transform(fields: WaveletHeader) -> Transform:
 
 
 def _quantizer(
-    fields: WaveletHeader, asked: Recoding, weights: Floats, threshold: float | None
+    fields: WaveletHeader, asked: RecodeRequest, weights: Floats, threshold: float | None
 ) -> Quantizer:
     columns = [column for group in asked.groups for column in asked.source.layout.groups[group]]
     own = weights[columns]
@@ -82,14 +82,14 @@ def _quantizer(
             _step_code(group, asked, code_of(float(weight)))
             for group, weight in zip(asked.groups, own, strict=True)
         )
-        return _Held(DEAD_ZONE * unit * own, None, unit, codes, fields.least)
+        return _FixedQuantizer(DEAD_ZONE * unit * own, None, unit, codes, fields.least)
     if threshold is None:
         lowest = float(weights.min()) if weights.any() else 1.0
         threshold = fields.least / 10.0**fields.decimals / lowest
-    return _Held(threshold * own, fields.decimals, 1.0, (0,) * len(own), fields.least)
+    return _FixedQuantizer(threshold * own, fields.decimals, 1.0, (0,) * len(own), fields.least)
 
 
-def _step_code(group: int, asked: Recoding, default: int) -> int:
+def _step_code(group: int, asked: RecodeRequest, default: int) -> int:
     """The step code that a channel has had, ``default`` where it was 0 all along."""
     for segment in range(len(asked.spans)):
         stream = asked.fetch(segment, 0, group)

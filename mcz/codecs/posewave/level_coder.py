@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.contact_plan import Contacts, Held, make_held
+from mcz.codecs.posewave.contact_plan import Contacts, HeldPoints, make_held_points
 from mcz.codecs.posewave.header import Header
 from mcz.codecs.posewave.metric import Metric
 from mcz.codecs.posewave.pyramid import Pyramid
@@ -36,14 +36,14 @@ def kernels() -> ModuleType:
     return course_kernels
 
 
-def between(approx: Floats, n_rows: int) -> Floats:
+def midpoints(approx: Floats, n_rows: int) -> Floats:
     """The poses halfway from each approximation to the next: those of the details."""
     after = np.concatenate([approx[1:], approx[-1:]])
-    found: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5  # PWAVE-22
-    return found
+    middle: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5  # PWAVE-22
+    return middle
 
 
-class Walk:
+class LevelCoder:
     """Goes through the levels of a segment, coarse to fine, from rows that are in the metric."""
 
     def __init__(
@@ -63,22 +63,22 @@ class Walk:
         self.lanes = kernels().lanes_of(self.metric.plan, 1)
         self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
 
-    def copy(self) -> Walk:
+    def copy(self) -> LevelCoder:
         """One that goes on by itself."""
-        found = copy(self)
-        found.course = deepcopy(self.course)
-        return found
+        clone = copy(self)
+        clone.course = deepcopy(self.course)
+        return clone
 
     def values(self) -> Floats:
         """The frames, (n_frames, n_channels), after the last level."""
-        found = np.repeat(self.still[None], len(self.approx), axis=0)
-        found[:, self.kept] = self.approx
-        return found
+        values = np.repeat(self.still[None], len(self.approx), axis=0)
+        values[:, self.kept] = self.approx
+        return values
 
-    def held(self, contacts: Contacts) -> Held:
+    def held(self, contacts: Contacts) -> HeldPoints:
         """The points of contacts, as they hang from the kept channels."""
         greatest = self.header.greatest[self.kept]
-        return make_held(contacts, self.usual.plan, self.kept, greatest)
+        return make_held_points(contacts, self.usual.plan, self.kept, greatest)
 
     def _metric_of(self, level: int) -> Metric:
         """Metric of a level; coarse ones are stiffer, as their poses say less of frames between."""
@@ -128,10 +128,10 @@ class Walk:
         pyramid = self.pyramid
         n_rows = pyramid.rows(level)
         if pyramid.depth(level) > pyramid.borrowing:  # PWAVE-22
-            self.poses, self.level = between(self.approx, n_rows), level
+            self.poses, self.level = midpoints(self.approx, n_rows), level
         self.metric = self._metric_of(level)
-        found: Ints = np.minimum(np.arange(n_rows) >> (level - self.level), len(self.poses) - 1)
-        return found
+        numbers: Ints = np.minimum(np.arange(n_rows) >> (level - self.level), len(self.poses) - 1)
+        return numbers
 
     def _add(self, level: int, which: Ints, rows: Floats, exponents: Ints) -> None:
         live = np.flatnonzero(rows.any(axis=1)) if rows.size else np.zeros(0, np.int64)
@@ -142,12 +142,12 @@ class Walk:
 
     def _through(self, way: Any, which: Ints, rows: Floats) -> Floats:
         """Rows one way through the metric, each at the pose of number ``which``."""
-        found = np.empty_like(rows)
+        mapped = np.empty_like(rows)
         n_rows = min(max(BLOCK_ENTRIES // max(1, self.metric.plan.n_entries), 8), 512)
         for start in range(0, len(rows), n_rows):
             block = slice(start, start + n_rows)
             numbers, at = np.unique(which[block], return_inverse=True)
-            found[block] = way(
+            mapped[block] = way(
                 self.metric.factors(self.poses[numbers]), rows[block], at.astype(np.int64)
             )
-        return found
+        return mapped

@@ -18,7 +18,7 @@ Item = TypeVar("Item", bound=np.generic)
 Read = Callable[[int, int], NDArray[Item]]  # frames first <= f < stop
 
 
-class Part:
+class SubsetSource:
     """The SignalSource of some groups of ``source``, numbered from 0, their channels side by side.
 
     Of the skeleton only their channels are left. Where ``n_frames`` is more than ``source`` has,
@@ -58,12 +58,12 @@ class Part:
     def _held(self, read: Read[Item], start: int, stop: int) -> NDArray[Item]:
         """Read these columns; past the end, repeat the last frame."""
         end = self._n_read
-        found = read(min(start, end), min(stop, end))[:, self._columns]
+        rows = read(min(start, end), min(stop, end))[:, self._columns]
         missing = stop - max(start, end)
         if missing <= 0:
-            return found
+            return rows
         last = read(end - 1, end)[:, self._columns]
-        return np.concatenate([found, *([last] * missing)])
+        return np.concatenate([rows, *([last] * missing)])
 
 
 def _cut(skeleton: Skeleton, columns: set[int]) -> Skeleton:

@@ -8,7 +8,7 @@ from decimal import ROUND_HALF_UP, Decimal
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.kinematics.feet import feet_of
+from mcz.kinematics.joint_groups import find_feet
 from mcz.motion import POSITION_KINDS, Skeleton
 
 NO_LENGTHS = "no bone has a length"
@@ -49,7 +49,7 @@ def figure_height(skeleton: Skeleton) -> float | None:
     those with arms stretched out about as wide.
     """
     names = (joint.name for joint in skeleton.joints)
-    if len(feet_of(skeleton)) < 2 or not any(map(_HEAD.search, names)):
+    if len(find_feet(skeleton)) < 2 or not any(map(_HEAD.search, names)):
         return None
     places = rest_positions(skeleton)
     tails = [

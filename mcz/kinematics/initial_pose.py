@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcz.kinematics.chain import Floats, Link, Pose, times
-from mcz.kinematics.nearest_turns import set_turns
+from mcz.kinematics.chain import Floats, Link, Pose, multiply_matrices
+from mcz.kinematics.rotation_fit import set_turns
 from mcz.kinematics.targets import Targets
 
 FARTHER = 0.01  # the weight of what hangs on the next turning joint, where that is asked at all
@@ -23,7 +23,7 @@ LINE_TO_REST = 1e-2  # the same for what lies on a line
 
 
 @dataclass(frozen=True, slots=True)
-class Fastened:
+class AttachedTargets:
     """Targets attached to a joint: numbers, weights, positions along its axes (n, 3).
 
     ``origin`` is the target at the joint's own origin, -1 where there is none.
@@ -36,7 +36,7 @@ class Fastened:
     to_rest: float
 
 
-class Guess:
+class InitialPose:
     """Prepared once for a skeleton; ``columns`` gives values for a block of frames."""
 
     def __init__(self, targets: Targets) -> None:
@@ -48,7 +48,7 @@ class Guess:
             self._fastened(joint, pose, positions) for joint in range(len(self.chain.links))
         ]
 
-    def _fastened(self, joint: int, pose: Pose, positions: Floats) -> Fastened:
+    def _fastened(self, joint: int, pose: Pose, positions: Floats) -> AttachedTargets:
         """The targets that turn with the joint, and farther ones where those are on a line."""
         origin = pose.origins[joint][:, 0]
         axes = pose.axes[joint][:, :, 0]
@@ -59,7 +59,7 @@ class Guess:
         at_origin = [n for n in own if self.targets.list[n].tail < 0]
         if not at_origin:
             at_origin = self._at_parents_tail(joint)
-        return Fastened(
+        return AttachedTargets(
             numbers,
             np.array(
                 [1.0 if steps[number] == steps[numbers[0]] else FARTHER for number in numbers]
@@ -142,17 +142,17 @@ class Guess:
         columns: Floats,
     ) -> None:
         """Set the joint's angles so that what it carries lies in the directions seen."""
-        held = self.fastened[joint]
-        if not link.turns or not len(held.numbers):
+        body = self.fastened[joint]
+        if not link.turns or not len(body.numbers):
             return
-        weights = known[held.numbers] * held.weights[:, None]
+        weights = known[body.numbers] * body.weights[:, None]
         moment = self._moment(joint, link, hung[1], seen, known, weights)
         axes = np.broadcast_to(hung[2], (3, 3, columns.shape[1]))
-        local = times(np.swapaxes(axes, 0, 1), moment)
+        local = multiply_matrices(np.swapaxes(axes, 0, 1), moment)
         size = np.sqrt((local * local).sum(axis=(0, 1)))
-        local = local + np.eye(3)[:, :, None] * (held.to_rest * size + (size == 0))
+        local = local + np.eye(3)[:, :, None] * (body.to_rest * size + (size == 0))
         set_turns(link, local, columns, self.chain.radians)
-        _hold(link, size > 0, columns)
+        _fill_gaps(link, size > 0, columns)
 
     def _moment(
         self,
@@ -164,12 +164,12 @@ class Guess:
         weights: Floats,
     ) -> Floats:
         """Sum of w b a', (3, 3, F): b as seen and a at rest, from the origin or from the mean."""
-        held = self.fastened[joint]
-        a = np.broadcast_to(held.positions[:, :, None], (*held.positions.shape, weights.shape[1]))
-        b = seen[held.numbers]
-        if held.origin >= 0:
-            own = known[held.origin] > 0
-            base = np.where(own, seen[held.origin], origin)
+        body = self.fastened[joint]
+        a = np.broadcast_to(body.positions[:, :, None], (*body.positions.shape, weights.shape[1]))
+        b = seen[body.numbers]
+        if body.origin >= 0:
+            own = known[body.origin] > 0
+            base = np.where(own, seen[body.origin], origin)
         elif link.moves:  # wherever it is
             total = np.maximum(weights.sum(axis=0), 1e-300)
             a = a - (weights[:, None] * a).sum(axis=0) / total
@@ -191,18 +191,18 @@ class Guess:
         pose: Pose,
     ) -> tuple[Floats, Floats, Floats]:
         """The joint hung where it was seen, its position channels set for that."""
-        held = self.fastened[joint]
+        body = self.fastened[joint]
         if not link.moves:
             return hung
-        if held.origin >= 0:
-            there, origin = known[held.origin] > 0, seen[held.origin]
-        elif held.numbers:
+        if body.origin >= 0:
+            there, origin = known[body.origin] > 0, seen[body.origin]
+        elif body.numbers:
             trial = Pose(list(pose.origins), list(pose.axes), list(pose.arms), list(pose.spins))
             self.chain.add(trial, link, hung, columns)
-            arms = np.einsum("ijf,nj->nif", trial.axes[-1], held.positions)
-            weights = known[held.numbers] * held.weights[:, None]
+            arms = np.einsum("ijf,nj->nif", trial.axes[-1], body.positions)
+            weights = known[body.numbers] * body.weights[:, None]
             total, there = weights.sum(axis=0), weights.sum(axis=0) > 0
-            steps = weights[:, None] * (seen[held.numbers] - arms)
+            steps = weights[:, None] * (seen[body.numbers] - arms)
             origin = steps.sum(axis=0) / np.where(there, total, 1.0)
         else:
             return hung
@@ -215,17 +215,17 @@ class Guess:
         for component, column in link.moves:
             if component not in done:
                 columns[column] = np.where(there, step[component], 0.0)
-                _hold_column(columns[column], there)
+                _interpolate_gaps(columns[column], there)
             done.add(component)
         return self.chain.hang(pose, link, columns)
 
 
-def _hold(link: Link, known: Floats, columns: Floats) -> None:
+def _fill_gaps(link: Link, known: Floats, columns: Floats) -> None:
     for column in link.turning:
-        _hold_column(columns[column], known)
+        _interpolate_gaps(columns[column], known)
 
 
-def _hold_column(track: Floats, known: Floats) -> None:
+def _interpolate_gaps(track: Floats, known: Floats) -> None:
     """Interpolate linearly in time the frames that are not ``known``."""
     rows = np.flatnonzero(known)
     if 0 < len(rows) < len(track):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.kinematics.chain import Chain, Floats
-from mcz.kinematics.single_kernels import Joints, Points
+from mcz.kinematics.frame_kernels import Joints, Points
 
 
 def is_elaborate(chain: Chain) -> bool:

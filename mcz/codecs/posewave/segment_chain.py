@@ -11,32 +11,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.posewave.header import NAME, Header
+from mcz.codecs.posewave.level_coder import LevelCoder
 from mcz.codecs.posewave.pyramid import Pyramid
-from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
+from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import Head, choose_head, classes_of, kinds_of, room_of
-from mcz.codecs.posewave.walk import Walk
 from mcz.errors import FormatError
 from mcz.motion import Skeleton
 
 Floats = NDArray[np.float64]
 
 
-class Chain:
+class SegmentChain:
     """State carried from segment to segment; after a refused one only a fresh one decodes."""
 
     def __init__(self, header: Header, skeleton: Skeleton) -> None:
         self.header, self.skeleton = header, skeleton
         self._classes = classes_of(skeleton, header.whole)
         self._kinds = kinds_of(skeleton, header.whole)
-        self._walk: Walk | None = None  # None: nothing can go on
+        self._walk: LevelCoder | None = None  # None: nothing can go on
         self._rows: RowCoder | None = None
 
-    def copy(self) -> Chain:
+    def copy(self) -> SegmentChain:
         """One that goes on by itself."""
-        found = copy(self)
+        clone = copy(self)
         if self._walk is not None and self._rows is not None:
-            found._walk, found._rows = self._walk.copy(), self._rows.copy()
-        return found
+            clone._walk, clone._rows = self._walk.copy(), self._rows.copy()
+        return clone
 
     def decode(self, stream: bytes, n_frames: int, where: str, *, fresh: bool) -> Floats:
         """The values of a segment, (n_frames, n_channels); raises FormatError for bad bytes."""
@@ -82,15 +82,15 @@ class Chain:
         self._walk, self._rows = walk, rows
         return rows.stream.finish(), walk.values()
 
-    def _so_far(self, where: str) -> tuple[Walk, RowCoder]:
+    def _so_far(self, where: str) -> tuple[LevelCoder, RowCoder]:
         if self._walk is None or self._rows is None:  # DATA-11
             raise FormatError("goes on from a segment that is not there", where=where)
         return self._walk, self._rows
 
-    def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[Walk, RowCoder]:
+    def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[LevelCoder, RowCoder]:
         header = self.header
         pyramid = Pyramid(n_frames, 0, 0)
-        walk = Walk(header, self.skeleton, pyramid, head.moving, head.values(header))
+        walk = LevelCoder(header, self.skeleton, pyramid, head.moving, head.values(header))
         rows = RowCoder(header, self._classes, head.moving, coding.coder, NAME)
         rows.begin(0, pyramid.kind(0), n_frames, coding)
         return walk, rows
