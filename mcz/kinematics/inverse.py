@@ -1,12 +1,11 @@
 """Inverse kinematics: values whose points, and virtual markers, lie where they were seen.
 
-There is no right answer, only a good one: the least sum of squared distances, and of what meets
-them alike the values that are nearest to rest and to the frames around. All frames at once: a
-guess from the roots down (``guess.py``), a descent from there (``descent.py``), others for frames
-that ended far off, or stand out from those beside them, and, where distances remain, a last one
-that lets values that those hardly decide follow the frames around. A frame costs the same however
-many there are; of what is large only a block of frames is in memory.
-What is chosen in it stands in mcz/kinematics/README.md.
+There is no exact answer: the solution has the least sum of squared distances and, among equals,
+the values nearest to rest and to the neighbor frames. All frames are solved at once: an initial
+pose from the roots down (``initial_pose.py``), Gauss-Newton steps from there (``descent.py``), a
+restart for frames that end far off or stand out, and, where distances remain, a last pass that
+smooths values that those hardly determine. The cost per frame is constant; large arrays are held
+for a block of frames only. mcz/kinematics/README.md has the choices.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A skeleton as compiled loops know it: ``single_kernels`` has the loops."""
+"""A skeleton as compiled loops know it: ``frame_kernels`` has the loops."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Angles about given axes -> the angles nearby whose turn is nearest to a wanted one.
 
 Damped Gauss-Newton steps, each frame damped for itself. They end where one angle at a time, as in
-``nearest_turns.py``, gets on slowly: at two axes that fall together.
+``rotation_fit.py``, gets on slowly: at two axes that fall together.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Segments of ``posewave``: streams from frames, and back.
 
-SPEC.md, "Codec 3: posewave", is normative; ``walk.py`` goes from level to level.
+SPEC.md, "Codec 3: posewave", is normative; ``level_coder.py`` goes from level to level.
 """
 
 from __future__ import annotations
