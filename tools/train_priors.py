@@ -75,7 +75,7 @@ def coarsest_rows(header: Header, skeleton: Skeleton, values: Floats) -> tuple[F
     """The rows of level 0, in steps, and the channels that are kept."""
     weights = choices.weights_of(header.step * (skeleton.unit_cm or 1.0))
     streams, _ = encode_segment(header, skeleton, values, weights)
-    _, data = Orders(header.orders, skeleton).take_notes(streams[0], len(values), "training")
+    _, data = Orders(header.orders, skeleton).read_notes(streams[0], len(values), "training")
     coder, classes = fresh_coder(header.start), classes_of(skeleton, header.whole)
     stream = Stream(coder, 0, data)
     moving, numbers = np.zeros((2, len(classes)), np.int64)

@@ -13,15 +13,14 @@ from mcz.errors import OptionError, UnsupportedError
 
 
 class CodecEntry(NamedTuple):
-    """The ids of a codec, and the module that has it."""
+    """Ids of a codec, and its module."""
 
     id: int
     preset: int
     module: str
 
 
-# A module is imported when its codec is asked for: importing all takes longer than most commands
-# work.
+# Modules are imported on first use: importing all takes longer than most commands run.
 ENTRIES = {
     "raw": CodecEntry(0, 0, "raw"),
     "fast": CodecEntry(1, 0, "lossless.fast"),
@@ -43,7 +42,7 @@ PRIVATE = range(128, 256)  # ids that SPEC.md never gives a meaning
 
 
 class Codecs(MutableMapping[str, Codec]):
-    """The codecs by their names."""
+    """The codecs by name, imported on first use."""
 
     def __init__(self) -> None:
         self._homes = dict(ENTRIES)
@@ -70,7 +69,7 @@ class Codecs(MutableMapping[str, Codec]):
         return len(self._homes)
 
     def find(self, id_: int, preset: int) -> str | None:
-        """The name of the codec of these ids, or of the first that decodes ``id_``."""
+        """Return the name of the codec with these ids, or of the first that decodes ``id_``."""
         return self._first(id_, preset) or self._first(id_)  # CODEC-07
 
     def _first(self, id_: int, preset: int | None = None) -> str | None:
@@ -87,7 +86,7 @@ ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 
 def codec_by_name(name: str) -> Codec:
-    """The codec called ``name``, or by a name of ``ALIASES``; raises OptionError for another."""
+    """Return the codec of a name or alias; raises OptionError if there is none."""
     if ALIASES.get(name, name) not in CODECS:
         raise OptionError(
             f"no codec is called {name!r}; there are: {among([*ALIASES, *CODECS], name)}"
@@ -96,7 +95,7 @@ def codec_by_name(name: str) -> Codec:
 
 
 def choose_name(codec: str | None, effort: str | None) -> str:
-    """The codec of that name or of that effort, by default ``DEFAULT``; raises OptionError."""
+    """Return the name for a codec or an effort, ``DEFAULT`` for neither; raises OptionError."""
     if codec is not None and effort is not None:
         raise OptionError(f"codec {codec!r} and effort {effort!r}: one of them, not both")
     if effort is not None and effort not in EFFORTS:
@@ -105,14 +104,14 @@ def choose_name(codec: str | None, effort: str | None) -> str:
 
 
 def bitstream_name(id_: int) -> str | None:
-    """The name of the bitstream of a codec, None where it is not known."""
+    """Return the name of the bitstream of a codec id, None if unknown."""
     return SHARED.get(id_) or CODECS.find(id_, 0)
 
 
 def codec_by_id(id_: int, version: int, preset: int) -> Codec:
-    """The codec with this id; raises UnsupportedError where it or its version is not known.
+    """Return the codec with this id; raises UnsupportedError if it or its version is unknown.
 
-    The codec has the preset that is asked for, where that is not known as one of the bitstream.
+    An unknown ``preset`` gives a codec of the bitstream with that preset.
     """
     name = CODECS.find(id_, preset)
     if name is None:

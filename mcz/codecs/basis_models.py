@@ -48,7 +48,7 @@ class Basis:
 
 
 def round_vectors(vectors: Floats, shift: int | Sequence[int] | Ints = FINE) -> Basis:
-    """``vectors``, as rows, in integers of ``shift`` binary digits, or of so many each."""
+    """Round row ``vectors`` to integers with ``shift`` binary digits, the same or one per row."""
     shifts = np.broadcast_to(np.asarray(shift, np.int64), len(vectors)).copy()
     return Basis(shifts, np.rint(np.ldexp(vectors, shifts[:, None])).astype(np.int64))
 

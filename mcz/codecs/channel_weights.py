@@ -50,7 +50,7 @@ def weights_of(skeleton: Skeleton, sample: Floats, rule: str, *, unit_aware: boo
 def _by_sensitivity(
     skeleton: Skeleton, sample: Floats, turns: NDArray[np.bool_], degrees: Floats
 ) -> Floats:
-    """Thresholds that move the points alike: T_g is that of a rotation of average effect.
+    """Thresholds with equal effect on the points; T_g is that of a rotation of average effect.
 
     ``degrees`` (n_channels,) is what a degree is in the unit of a channel that ``turns``.
     """

@@ -1,4 +1,4 @@
-"""The codec contract: what a codec is given, what it gives back, what it declares.
+"""The codec contract: inputs, outputs and declarations of a codec.
 
 SPEC.md, "Codecs", is normative. A codec knows neither the container nor any source format.
 """
@@ -29,9 +29,9 @@ ID_SIZE = 16  # bytes of the id of a model
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A run of frames, coded; ``streams`` lie coarsest resolution first, in it group by group.
+    """An encoded run of frames; ``streams`` by resolution, coarsest first, then by group.
 
-    The segment bears upon frames first - lead to first + n_frames + tail - 1.
+    The segment affects frames first - lead to first + n_frames + tail - 1.
     ``fresh``: it decodes without the segment before.
     """
 
@@ -60,23 +60,23 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A learned model, as MODL has it: ``kind`` of the registry, ``data`` as the kind says."""
+    """A learned model (MODL): ``kind`` in the registry, ``data`` in the layout of that kind."""
 
     kind: int
     data: bytes
 
 
-# id of a MODL -> the model, None where the file has none of that id.
+# id of a MODL -> the model, None if the file has none of that id
 FindModel = Callable[[bytes], Model | None]
 
 
 def model_id(model: Model) -> bytes:
-    """The id that a clip names the model by: that of its MODL."""
+    """Id of a model, by which clips refer to its MODL."""
     return hashlib.sha256(b"MODL\0" + varint(model.kind) + model.data).digest()[:ID_SIZE]
 
 
 def model_finder(models: Sequence[Model]) -> FindModel:
-    """Finds those that an encoder has made or named."""
+    """Return a lookup by id among ``models``."""
     return {model_id(model): model for model in models}.get
 
 
@@ -84,7 +84,7 @@ def model_finder(models: Sequence[Model]) -> FindModel:
 class Layout:
     """Facts of a signal that encoder and decoder share.
 
-    ``n_frames`` are the stored ones. ``groups`` lists the channels of each group;
+    ``n_frames`` counts stored frames. ``groups`` lists the channels of each group;
     ``samples_per_frame`` rows make a frame.
     """
 
@@ -95,27 +95,27 @@ class Layout:
     frame_rate: Fraction | None = None
     grids: tuple[Grid, ...] = ()
     n_resolutions: int = 1
-    segment_bytes: int = 2**53  # decoded, 8 a value: the most that a segment may have
-    find_model: FindModel | None = None  # in the file; a decoder's
+    segment_bytes: int = 2**53  # limit of a decoded segment, 8 per value
+    find_model: FindModel | None = None  # models in the file, for a decoder
     n_channels: int = field(init=False, repr=False, compare=False)
     derived: dict[str, object] = field(default_factory=dict, init=False, repr=False, compare=False)
-    # what a codec makes of it once, by the name of the codec
+    # cached by codecs, by the name of the codec
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "n_channels", sum(map(len, self.groups)))
 
     @property
     def most_frames(self) -> int:
-        """The frames that a segment may have, at least 1."""
+        """Greatest number of frames of a segment, at least 1."""
         per_frame = 8 * self.samples_per_frame * max(1, self.n_channels)
         return max(1, self.segment_bytes // per_frame)
 
 
 class SignalSource(Protocol):
-    """The encoder's view of a signal, read by frames, so that it need not be in memory."""
+    """The encoder's view of a signal, read by frames so that it need not fit in memory."""
 
     layout: Layout
-    breaks: Sequence[int]  # frames at which a segment of a codec of ordinals must begin
+    breaks: Sequence[int]  # frames at which a segment of an ordinals codec must begin
 
     def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
         """Grid ordinals of frames start <= f < stop, (rows, n_channels)."""
@@ -136,7 +136,7 @@ class SignalSource(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Frames start <= f < stop of some groups; the finest ``resolution`` details left out."""
+    """Frames start <= f < stop of some groups, without the finest ``resolution`` details."""
 
     start: int
     stop: int
@@ -149,12 +149,12 @@ Fetch = Callable[[int, int, int], bytes]  # (segment, stored resolution, group) 
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """An encoded signal: what goes into CLIP, then the segments as they are made.
+    """An encoded signal: the header in CLIP, then segments, produced lazily.
 
-    ``models`` are written before the clip that refers to them, once a file. ``known`` are those of
-    SPEC.md's annexes that it refers to: a file of the archive profile has them, too. ``version``
-    is the least of the codec's that reads it (None: the codec's own). ``preset`` is that of
-    CLIP (0: the codec's own).
+    ``models`` are written once per file, before the clip that refers to them. ``known`` are those
+    of SPEC.md's annexes that it refers to, which the archive profile stores as well. ``version``:
+    the oldest codec version that reads it (None: the codec's). ``preset``: the preset in CLIP (0:
+    the codec's).
     """
 
     header: bytes
@@ -169,21 +169,21 @@ class Encoded:
 Encode = Callable[[SignalSource, Params], Encoded]
 Decode = Callable[[bytes, Layout, Sequence[Span], Request, Fetch], Values]
 
-# (header, layout, first, stop, groups) -> header of a signal that is left with frames
-# first <= f < stop, both of them ends of segments, and with these groups, ascending.
+# (header, layout, first, stop, groups) -> header of a signal cut to frames first <= f < stop, both
+# segment boundaries, and to these groups, ascending
 Cut = Callable[[bytes, Layout, int, int, tuple[int, ...]], bytes]
 
-# (layout, span, groups, fetch) -> the streams of some groups of a segment, ascending, coded without
-# the others; ``fetch`` counts this segment as 0.
+# (layout, span, groups, fetch) -> the streams of some groups of a segment, ascending, re-encoded
+# without the others; ``fetch`` numbers this segment 0
 Subset = Callable[[Layout, Span, Sequence[int], "Fetch"], tuple[bytes, ...]]
 
 
 @dataclass(frozen=True, slots=True)
 class RecodeRequest:
-    """Groups of a coded signal that are coded anew, with the header that they have.
+    """Request to re-encode some groups of a coded signal under its existing header.
 
-    ``source`` holds the whole signal with its new values, ``options`` are the parameters, where
-    they were recorded, ``fetch`` gives the streams that are replaced.
+    ``source`` has the whole signal with its new values, ``options`` the recorded parameters;
+    ``fetch`` returns the streams to be replaced.
     """
 
     header: bytes
@@ -194,28 +194,28 @@ class RecodeRequest:
     fetch: Fetch
 
 
-# Of each span the streams of the groups, in stored order, which a decoder reads under the header
-# beside the streams of all other groups.
+# Per span the streams of the groups, in stored order; they decode under the existing header,
+# beside the streams of the other groups.
 Recode = Callable[[RecodeRequest], Iterator[tuple[bytes, ...]]]
 
 
 class LiveEncoder(Protocol):
-    """Codes frames as they come, each into the one stream of a segment of one frame.
+    """Encodes frames as they arrive, each into the single stream of a segment of one frame.
 
-    ``header``, ``models``, ``version`` and ``preset``, as those of ``Encoded``, are known before
-    the first frame. ``n_resolutions`` is 1, and there is one group.
+    ``header``, ``models``, ``version`` and ``preset``, as in ``Encoded``, are known before the
+    first frame. ``n_resolutions`` is 1, and there is one group.
     """
 
     header: bytes
     models: tuple[Model, ...]
     version: int | None
     preset: int = 0
-    is_reference: bool = False  # of the last frame: it needs not the one before
+    is_reference: bool = False  # the last frame does not need the one before
 
     def push(
         self, values: NDArray[np.float64], valid: NDArray[np.bool_] | None = None
     ) -> tuple[bytes, bool]:
-        """The stream of the next frame, (n_channels,), and whether its segment starts fresh."""
+        """Encode the next frame, (n_channels,): its stream, and True if its segment is fresh."""
         ...
 
     def change(self, options: Params) -> None:
@@ -226,43 +226,43 @@ class LiveEncoder(Protocol):
         ...
 
     def charge(self, n_bytes: int) -> None:
-        """Take in how many bytes the last frame took on the wire, framing and masks included.
+        """Report the bytes of the last frame on the wire, framing and masks included.
 
-        It is called after each ``push`` where the option ``bitrate`` is given.
+        Called after each ``push`` if the option ``bitrate`` is given.
         """
         return
 
 
 class LiveDecoder(Protocol):
-    """The inverse: raises FormatError on bad bytes, and takes such a frame for one that was lost.
+    """The inverse; a frame of bad bytes raises FormatError and counts as lost.
 
-    A frame that needs a lost one raises LostFrameError; those that need none go on.
+    A frame that needs a lost one raises LostFrameError; frames that need none still decode.
     """
 
     def push(self, stream: bytes, fresh: bool) -> NDArray[np.float64]:
-        """The values of the next frame, (n_channels,)."""
+        """Decode the next frame, (n_channels,)."""
         ...
 
     def skip(self, n_frames: int) -> None:
-        """So many frames that were due did not come."""
+        """Note the loss of ``n_frames`` frames."""
         ...
 
 
 Live = Callable[[Layout, Params], LiveEncoder]  # a layout of 0 frames, options
 Follow = Callable[[bytes, Layout], LiveDecoder]  # a header
 
-# (header) -> the ids of the models that it names; raises FormatError for bad bytes.
+# (header) -> the ids of the models that it names; raises FormatError on bad bytes
 Uses = Callable[[bytes], tuple[bytes, ...]]
 
-# (skeleton, options) -> the groups of an encoder, and the numbers of those of ordinals; None: as
-# ``grouping`` says, none of ordinals. Raises OptionError.
+# (skeleton, options) -> the groups of an encoder, and the numbers of the exact ones; None: groups
+# by ``grouping``, none exact. Raises OptionError.
 Partition = Callable[[Skeleton, Params], tuple[tuple[tuple[int, ...], ...], tuple[int, ...]] | None]
 
-# (header, layout) -> the groups of ordinals, ascending; raises FormatError for bad bytes.
+# (header, layout) -> the exact groups, ascending; raises FormatError on bad bytes
 Exact = Callable[[bytes, Layout], tuple[int, ...]]
 
-# (header, layout, spans) -> the stored frames, ascending, that the coarsest resolution alone gives
-# exactly as all resolutions do.
+# (header, layout, spans) -> the stored frames, ascending, that the coarsest resolution alone
+# decodes exactly
 Preview = Callable[[bytes, Layout, Sequence[Span]], NDArray[np.int64]]
 
 
@@ -270,38 +270,32 @@ Preview = Callable[[bytes, Layout, Sequence[Span]], NDArray[np.int64]]
 class Codec:
     """One row of the codec table.
 
-    Codecs of one ``id`` have one bitstream; ``preset`` tells which of them made a clip, and 0 that
-    none of those that are registered did.
+    Codecs with the same ``id`` share a bitstream; ``preset`` is the one that made a clip, 0 if none
+    of the registered ones did.
 
-    ``decode`` returns int64 ordinals or binary64 values, as ``domain`` says, of shape
-    (rows, channels of the requested groups in the order requested). It checks the header also where
-    no frame is requested.
+    ``decode`` returns int64 ordinals or binary64 values, by ``domain``, of shape (rows, channels of
+    the requested groups in the order requested). It checks the header even for no frames.
 
-    A codec of values may have groups of ordinals beside them, which are ``exact``: a request is for
-    groups of one sort. ``partition`` says which groups an encoder makes (both None: no such codec).
+    A codec of values may also have groups of ordinals, the ``exact`` ones; a request is for groups
+    of one sort. ``partition`` returns the groups of an encoder (both None: no exact groups).
 
-    A clip may be cut without the codec's help, SPEC.md, "Cutting without re-encoding": whole
-    segments at its ends, groups, and the streams of the finest resolutions are left out, and what
-    is left is renumbered from 0. ``decode`` then is given the numbers of frames, groups and
-    resolutions that are left, MUST give the same values as before, and takes details that are
-    not stored as those that a request leaves out. ``cut`` makes the header fit where it says
-    something of frames or channels (None: it holds as it is). ``subset`` codes what is left of a
-    segment anew, of a codec that codes all groups together: it recodes all of them, too. Both are
-    given the layout before the cut, and raise FormatError for bad bytes.
+    A clip may be cut without the codec (SPEC.md, "Cutting without re-encoding"): whole segments at
+    its ends, groups, and the streams of the finest resolutions are removed, the rest is renumbered
+    from 0. ``decode`` then gets the remaining numbers of frames, groups and resolutions, MUST
+    return the same values as before, and treats details that are not stored like those that a
+    request leaves out. ``cut`` adapts a header that depends on frames or channels (or None).
+    ``subset`` re-encodes the remaining groups of a segment, for codecs that code all groups
+    together. Both get the layout before the cut, and raise FormatError on bad bytes.
 
-    ``positions``: it is made for positions of points; of a clip of channels it is given those of
-    its points, unless its parameter ``domain`` says ``channels``. ``uses``: the models that a
-    header names (None: there never are any). ``live`` and ``follow``: coding and decoding frame by
-    frame (None: the codec cannot). ``live_options``: what a caller asks for who means that, where
-    frame by frame is not all that the codec can do.
+    ``positions``: the codec is made for positions of points; clips of channels are converted to the
+    positions of their points, unless the parameter ``domain`` is ``channels``. ``uses``: the models
+    that a header names (None: never any). ``live`` and ``follow`` encode and decode frame by frame
+    (None: unsupported). ``live_options`` select live encoding in codecs that can do more.
 
-    ``promise`` gives the targets that it meets where a caller asks for none and leaves its dial
-    alone (None: none).
-
-    ``recode`` codes some groups anew in all segments (None: the codec cannot do that). ``preview``
-    says what can be read without decoding the rest (None: nothing exactly). ``earlier`` has the
-    ``decode`` of each earlier version. ``hash_optional``: readers may omit to compare the value
-    hash.
+    ``promise`` returns the targets that the codec meets by default (None: none). ``recode``
+    re-encodes some groups in all segments (None: unsupported). ``preview`` returns the frames that
+    the coarsest resolution decodes exactly (None: none). ``earlier`` has the ``decode`` of each
+    earlier version. ``hash_optional``: readers may skip the comparison of the value hash.
     """
 
     id: int
@@ -335,15 +329,15 @@ class Codec:
         return any(parameter.name == name for parameter in self.parameters)
 
     def settings(self, options: Params) -> Settings:
-        """``options`` as a quality record has them, without inner ones."""
+        """Return ``options`` as quality records store them, without inner ones."""
         known = {parameter.name: parameter for parameter in (*self.parameters, *TARGETS)}
-        shown = {name: known[name].shown(value) for name, value in options.items()}
+        shown = {name: known[name].recorded_value(value) for name, value in options.items()}
         return {name: value for name, value in shown.items() if not known[name].inner}
 
     def options(self, given: Params, *, inner: bool = False) -> Settings:
-        """All parameters, those given checked; raises OptionError for an unknown or bad one.
+        """Return all parameters, given ones parsed; raises OptionError for an unknown or bad one.
 
-        Parameters that only a search finds may be given where ``inner`` is true.
+        ``inner`` permits parameters that only a search sets.
         """
         known = {p.name: p for p in (*self.parameters, *(TARGETS if self.dial else ()))}
         listed = [name for name, parameter in known.items() if inner or not parameter.inner]
@@ -360,7 +354,7 @@ class Codec:
 
 
 def refuse_extras(name: str, header: bytes, layout: Layout) -> None:
-    """Raise FormatError where a codec without header and resolutions is given some."""
+    """Raise FormatError for a header or resolutions of a codec that has none."""
     if header:  # RAW-01, FAST-01
         raise FormatError(f"{name}: a header of {len(header)} bytes, which it does not have")
     if layout.n_resolutions != 1:  # CLIP-15

@@ -1,4 +1,4 @@
-"""A signal frame by frame, as the codecs of channels want it: unwrapped and without gaps."""
+"""Readers of a signal for lossy codecs: rotations unwrapped, gaps interpolated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 class FrameReader:
-    """Reads a signal from its beginning on; ``name`` is the codec's, for messages."""
+    """Reads a signal from its beginning; ``name``: the codec, for messages."""
 
     def __init__(self, name: str, source: SignalSource) -> None:
         self.name, self.source = name, source
@@ -26,7 +26,7 @@ class FrameReader:
         self.at = 0
 
     def next(self, stop: int) -> Floats:
-        """The frames up to ``stop``, (frames, channels); raises MotionError where one is NaN."""
+        """Read the frames up to ``stop``, (frames, channels); raises MotionError for NaN."""
         start, self.at = self.at, stop
         values = np.asarray(self.source.values(start, stop), np.float64)
         valid = self.source.valid(start, stop)
@@ -44,9 +44,9 @@ class FrameReader:
 
 
 class SegmentReader:
-    """Reads the frames of one segment after the other, which may end sooner than was asked before.
+    """Reads one segment after the other; a segment may be read again with an earlier end.
 
-    ``scales`` (n_channels,) divide them.
+    Values are divided by ``scales`` (n_channels,).
     """
 
     def __init__(self, name: str, source: SignalSource, scales: Floats | None = None) -> None:
@@ -55,7 +55,7 @@ class SegmentReader:
         self._first = 0
 
     def __call__(self, first: int, stop: int) -> Floats:
-        """Frames first <= f < stop, (frames, channels); nobody asks for earlier ones again."""
+        """Read frames first <= f < stop, (frames, channels); earlier frames are dropped."""
         self._ahead = self._ahead[first - self._first :]
         self._first = first
         if stop > self._reader.at:
@@ -66,10 +66,9 @@ class SegmentReader:
 
 
 class LiveRows:
-    """Frames that come one by one, as ``FrameReader`` gives them, but that a gap holds the last.
+    """Unwraps frames that arrive one by one; a gap repeats the last value.
 
-    A row counts as the last, for gaps and turns, once it is ``kept``: one that is refused leaves no
-    trace.
+    ``keep`` commits a row as the last one; a row that is refused leaves no trace.
     """
 
     def __init__(self, name: str, layout: Layout) -> None:
@@ -79,7 +78,7 @@ class LiveRows:
         self._next = self._unwrapper, self._last
 
     def row(self, values: Floats, valid: NDArray[np.bool_] | None, at: int) -> Floats:
-        """Frame ``at``, (1, n_channels); raises MotionError where a valid value is not finite."""
+        """Unwrap frame ``at``, (1, n_channels); raises MotionError for a value not finite."""
         row = np.asarray(values, np.float64)[None]
         known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
         if not np.isfinite(row[known]).all():
@@ -90,12 +89,12 @@ class LiveRows:
         return row
 
     def keep(self) -> None:
-        """The row that was given last was coded."""
+        """Commit the last row as encoded."""
         self._unwrapper, self._last = self._next
 
 
 def fill_gaps(values: Floats, valid: NDArray[np.bool_], before: Floats) -> Floats:
-    """``values`` (n_rows, n_channels) with what is not ``valid`` put on straight lines.
+    """Interpolate ``values`` (n_rows, n_channels) linearly where they are not ``valid``.
 
     A gap that reaches the end holds the last value; one at the start begins at ``before``.
     """

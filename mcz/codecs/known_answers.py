@@ -1,7 +1,7 @@
-"""A known answer of each codec, decoded once a process before anything else is.
+"""Self-test: a known answer of each codec, decoded once per process before anything else.
 
-So a kernel that was built wrongly, or a processor that fuses products, is found where it does not
-matter yet. ``known_answer_table.py`` has the answers, ``tools/known_answers.py`` makes it.
+It detects miscompiled kernels, and processors that fuse products, before they decode real data.
+``known_answer_table.py`` has the answers; ``tools/known_answers.py`` writes it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _LOCK = Lock()
 
 
 def answer_skeleton() -> Skeleton:
-    """A body of four joints, 15 channels."""
+    """A skeleton of four joints and 15 channels."""
     turns = tuple(Channel(kind) for kind in ("rz", "rx", "ry"))
     moves = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
     return Skeleton(
@@ -40,7 +40,7 @@ def answer_skeleton() -> Skeleton:
 
 
 def answer_layout(grouping: str) -> Layout:
-    """The layout of the answer, which the encoder and the decoder know."""
+    """Layout of the known answer."""
     sizes = {"all": [15], "joint": [6, 3, 3, 3]}.get(grouping, [1] * 15)
     ends = list(accumulate(sizes, initial=0))
     groups = tuple(tuple(range(*pair)) for pair in pairwise(ends))
@@ -49,7 +49,7 @@ def answer_layout(grouping: str) -> Layout:
 
 
 def digest(codec: Codec, answer: KnownAnswer) -> str:
-    """The SHA-256 of the ordinals or values that the codec decodes."""
+    """Return the SHA-256 of the ordinals or values that the codec decodes."""
     models = [Model(kind, bytes.fromhex(data)) for kind, data in answer.models]
     layout = answer_layout(answer.grouping)
     n_groups = len(layout.groups)

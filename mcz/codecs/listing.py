@@ -27,7 +27,7 @@ def codec_document(codec: Codec) -> Settings:
 
 
 def parameters_of(codec: Codec) -> tuple[Parameter, ...]:
-    """The parameters that a caller is told of, and the targets where it has a dial."""
+    """Public parameters of a codec, plus the targets if it has a dial."""
     return (*(p for p in codec.parameters if not p.inner), *(TARGETS if codec.dial else ()))
 
 

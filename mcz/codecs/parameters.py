@@ -1,4 +1,4 @@
-"""Parameters of codecs: what a caller may set, how its text is read, presets of several at once."""
+"""Parameters of codecs: their parsers, defaults, targets and presets."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ Presets = Mapping[str, Params]
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of a codec, as ``--param name=value`` gives it.
+    """One parameter of a codec, as set by ``--param name=value``.
 
-    ``inner``: it is found by a search for a target; nobody is told of it, and no record names it.
-    ``show`` gives the text from which ``parse`` makes a value (None: numbers or words as they are,
-    with commas between several).
+    ``inner``: set only by a search for a target, not listed and not recorded. ``show`` formats a
+    value as text that ``parse`` reads (None: numbers or words as they are, separated by commas).
     """
 
     name: str
@@ -34,8 +33,8 @@ class Parameter:
     inner: bool = False
     show: Callable[[Any], str] | None = None
 
-    def shown(self, value: object) -> Any:
-        """A value as a record is given it."""
+    def recorded_value(self, value: object) -> Any:
+        """Return a value as quality records store it."""
         return value if self.show is None or value is None else self.show(value)
 
     @property
@@ -48,9 +47,9 @@ class Parameter:
 class Dial:
     """The one parameter that trades quality for size: the greater, the smaller the file.
 
-    ``rises``: the greater, the better the quality instead. ``whole``: it is an integer. A caller
-    who names a size or an error has it searched for between ``low`` and ``high``, from ``guess`` on
-    where that gives a setting for a target and its limit.
+    ``rises``: greater means better quality instead. ``whole``: it is an integer. To meet a target
+    size or error, it is searched between ``low`` and ``high``, starting at ``guess`` (target,
+    limit) if that returns a setting.
     """
 
     parameter: str
@@ -62,11 +61,11 @@ class Dial:
 
 
 def _bounds(text: Any) -> str:
-    """Bounds of channels, which are read where the units of these are known."""
+    """Keep bounds of channels as text; they are parsed where the units are known."""
     return str(text)
 
 
-# What a caller may ask for instead of setting the dial of a codec; None: not asked for.
+# Targets, which a caller may set instead of the dial of a codec; None: unset
 TARGETS = (
     Parameter(
         "target_bytes",
@@ -108,7 +107,7 @@ TARGETS = (
 
 
 def preset_parameter(presets: Presets) -> Parameter:
-    """The parameter that names one of ``presets``: default, or the published method's."""
+    """Return the parameter that names one of ``presets``: default, or the published method."""
     (published,) = set(presets) - {"default"}
     help_ = f"default, or {published} for the published method"
     return Parameter("preset", "default", help_, choice("preset", tuple(presets)))

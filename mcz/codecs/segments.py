@@ -1,4 +1,4 @@
-"""Segments: how long an encoder makes them, their frames, and rows put together from several."""
+"""Segments: their lengths in an encoder, and rows gathered from several in a decoder."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def lossless_segment_frames(size: str, most: int) -> Parameter:
 
 
 def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool = False) -> int:
-    """Frames a segment, 0: the size decides; published methods take the whole clip at once."""
+    """Frames per segment; 0: by size. Published methods take the whole clip at once."""
     if given is None:
         return layout.n_frames if as_published else 0
     return given
@@ -49,7 +49,9 @@ def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool =
 
 Streams = tuple[bytes, ...]
 Frames = tuple[int, int]  # first <= f < stop
-Prepare = Callable[[int, int], Callable[[], Streams]]  # takes frames; the rest may be done anywhere
+Prepare = Callable[
+    [int, int], Callable[[], Streams]
+]  # reads frames; the returned function may run in any thread
 Code = Callable[[int, int], Streams]  # frames first <= f < stop -> the streams of their segment
 
 
@@ -66,8 +68,8 @@ class Lengths:
     unit: int = 1
     least: int = 1
 
-    def halved(self, length: int) -> int:
-        """Half of ``length``; ``length`` itself where that would be too short."""
+    def halve(self, length: int) -> int:
+        """Return half of ``length``, or ``length`` if that would be too short."""
         shorter = max(self.unit, length // 2 // self.unit * self.unit)
         return shorter if self.least <= shorter < length else length
 
@@ -75,15 +77,15 @@ class Lengths:
 def segments_by_halving(
     n_frames: int, lengths: Lengths, code: Code, breaks: Sequence[int] = ()
 ) -> Iterator[tuple[int, int, Streams]]:
-    """Segments first <= f < stop of a signal of ``n_frames``, and their streams.
+    """Yield segments first <= f < stop of a signal of ``n_frames``, and their streams.
 
-    One begins at each of the ``breaks``, too.
+    A segment also begins at each of the ``breaks``.
     """
     length, first = lengths.length, 0
     while first < n_frames:
         stop = min(first + length, *(end for end in (*breaks, n_frames) if end > first))
         streams = code(first, stop)
-        shorter = lengths.halved(length)
+        shorter = lengths.halve(length)
         if not lengths.fixed and shorter < length and _size(streams) > TARGET_BYTES:
             length = shorter
             continue
@@ -118,7 +120,7 @@ class SegmentPrefetch(AbstractContextManager["SegmentPrefetch"]):
         self._pending: dict[Frames, Future[Streams]] = {}
 
     def code(self, span: Frames, following: Iterator[Frames]) -> Streams:
-        """The streams of ``span``. Nothing depends on ``following`` but how long it takes."""
+        """Return the streams of ``span``; ``following`` only affects the speed."""
         if self._threads < 2:
             return self._prepare(*span)()
         due = [span, *islice(following, self._threads)]
@@ -143,10 +145,10 @@ class SegmentPrefetch(AbstractContextManager["SegmentPrefetch"]):
 def segments_by_guess(
     source: SignalSource, fixed: int, sizing: Sizing, prepare: Prepare, threads: int = 1
 ) -> Iterator[Segment]:
-    """Segments of ``fixed`` frames, or, where that is 0, of as many as their size allows.
+    """Yield segments of ``fixed`` frames or, if that is 0, of as many as their size allows.
 
-    One begins wherever the grids change. A length stays while it is about right, so that
-    ``threads`` can work on those that follow: worth it where loops take most of the time.
+    A segment begins wherever the grids change. The length is kept while it is about right, so that
+    ``threads`` can work on the segments that follow.
     """
     layout = source.layout
     per_frame = max(1, layout.n_channels) * layout.samples_per_frame
@@ -176,9 +178,9 @@ def segments_by_guess(
 
 
 def _spans(first: int, length: int, longest: int, ends: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Segments of ``length`` frames from a frame on; before ``ends`` shorter, or a bit longer.
+    """Yield spans of ``length`` frames from ``first`` on; before ``ends`` shorter or a bit longer.
 
-    Where ``longest`` leaves a choice, the last two are as long as each other.
+    If ``longest`` permits, the last two are equally long.
     """
     for end in ends:
         while first < end:
@@ -194,7 +196,7 @@ def _size(streams: Streams) -> int:
 
 
 def skeleton_of(name: str, layout: Layout) -> Skeleton:
-    """The skeleton of a signal that the codec ``name`` can code; raises MotionError."""
+    """Return the skeleton of a signal that codec ``name`` can encode; raises MotionError."""
     if layout.samples_per_frame != 1 or layout.skeleton is None:
         raise MotionError(f"{name}: only signals of one sample a frame")
     return layout.skeleton
@@ -206,9 +208,9 @@ def gather(
     request: Request,
     decode_group: Callable[[int, int], NDArray[np.int64]],
 ) -> NDArray[np.int64]:
-    """The requested rows and groups of a codec whose segments do not overlap.
+    """Gather the requested rows and groups of a codec whose segments do not overlap.
 
-    ``decode_group(segment, group)`` gives all rows of one group in one segment.
+    ``decode_group(segment, group)`` returns all rows of one group in one segment.
     """
     per_frame = layout.samples_per_frame
     n_channels = sum(len(layout.groups[group]) for group in request.groups)
@@ -228,7 +230,7 @@ def gather(
 
 
 def sample(source: SignalSource, most: int) -> NDArray[np.float64]:
-    """At most so many frames of a signal, evenly spread; what is invalid is NaN."""
+    """Sample at most ``most`` frames of a signal, evenly spread; invalid values are NaN."""
     layout = source.layout
     rows = [np.zeros((0, layout.n_channels))]
     for frame in range(0, layout.n_frames, max(1, -(-layout.n_frames // most))):

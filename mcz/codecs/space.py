@@ -53,7 +53,7 @@ class SpaceFields(Record):
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """The matrices of a frame, and what its channels are multiplied by.
+    """Matrices of a frame, and the weights of its channels.
 
     ``vectors`` (n_rows, n_points) has the rows of all matrices, one below the other, ``starts`` the
     first of each and the end; ``columns`` (n_matrices, n_points) the channel of each point;
@@ -95,7 +95,7 @@ def columns_of(n_channels: int, *, apart: bool) -> Ints:
 
 
 def space_of(name: str, fields: SpaceFields, layout: Layout) -> Space:
-    """The Space that the fields of SPACE say; raises FormatError or UnsupportedError."""
+    """Build the Space of the fields of SPACE; raises FormatError or UnsupportedError."""
     apart, n_channels = bool(fields.flags & APART), layout.n_channels
     if apart and n_channels % N_COORDINATES:  # SPACE-02
         raise FormatError(f"{name}: {n_channels} channels are not three coordinates each")

@@ -156,7 +156,7 @@ def default_step(sample: Sample) -> float:
 
 
 def choose_space(name: str, sample: Sample, step: float, which: str, in_time: InTime) -> Choice:
-    """The bases that ``which`` names, or of several the one with which the least is to be written.
+    """Choose the bases that ``which`` names, or those with the smallest estimated size.
 
     ``in_time`` is what the codec does over time before it goes on in space. Raises OptionError
     where the one that is named does not fit.

@@ -19,10 +19,10 @@ Read = Callable[[int, int], NDArray[Item]]  # frames first <= f < stop
 
 
 class SubsetSource:
-    """The SignalSource of some groups of ``source``, numbered from 0, their channels side by side.
+    """A SignalSource of some groups of ``source``, numbered from 0, their channels side by side.
 
-    Of the skeleton only their channels are left. Where ``n_frames`` is more than ``source`` has,
-    as in a clip that was cut, the last frame is held.
+    The skeleton keeps only their channels. If ``n_frames`` exceeds the frames of ``source``, as in
+    a clip that was cut, the last frame is repeated.
     """
 
     def __init__(self, source: SignalSource, groups: Sequence[int], n_frames: int) -> None:
@@ -41,21 +41,21 @@ class SubsetSource:
         self.breaks = source.breaks
 
     def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
-        return self._held(self._source.ordinals, start, stop)
+        return self._read_columns(self._source.ordinals, start, stop)
 
     def grids(self, frame: int) -> tuple[Grid, ...]:
         grids = self._source.grids(frame)
         return tuple(grids[column] for column in self._columns)
 
     def values(self, start: int, stop: int) -> NDArray[np.float64]:
-        return self._held(self._source.values, start, stop)
+        return self._read_columns(self._source.values, start, stop)
 
     def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
         if self._source.valid(0, 0) is None:
             return None
-        return self._held(cast("Read[np.bool_]", self._source.valid), start, stop)
+        return self._read_columns(cast("Read[np.bool_]", self._source.valid), start, stop)
 
-    def _held(self, read: Read[Item], start: int, stop: int) -> NDArray[Item]:
+    def _read_columns(self, read: Read[Item], start: int, stop: int) -> NDArray[Item]:
         """Read these columns; past the end, repeat the last frame."""
         end = self._n_read
         rows = read(min(start, end), min(stop, end))[:, self._columns]
@@ -67,7 +67,7 @@ class SubsetSource:
 
 
 def _cut(skeleton: Skeleton, columns: set[int]) -> Skeleton:
-    """``skeleton`` with these channels alone."""
+    """Return ``skeleton`` with only these channels."""
 
     def kept(index: int, joint: Joint) -> Joint:
         pairs = zip(skeleton.columns(index), joint.channels, strict=True)

@@ -60,7 +60,7 @@ def code_lengths(counts: Sequence[int]) -> list[int]:
 
 
 def codes_of(lengths: Sequence[int], where: str) -> Ints:
-    """The code of each symbol: those of a length ascend with the symbols, shorter ones come first.
+    """Canonical code of each symbol: shorter codes first, equal lengths in symbol order.
 
     Raises FormatError unless the lengths make a whole code: no string of bits begins without one.
     One symbol alone, of length 1, is a code as well.

@@ -39,7 +39,7 @@ class Regressions(NamedTuple):
 
 
 def regressions_of(n_features: Sequence[int]) -> Regressions:
-    """Regressions of so many features each, which know nothing yet."""
+    """Create untrained regressions with these numbers of features."""
     sizes = np.array(n_features, np.int64)
     widths = (sizes + 8) // 8 * 8
     starts = np.cumsum([0, *(sizes * widths)])

@@ -90,7 +90,7 @@ def remember(indices: Ints, tracks: Ints2) -> None:
 def add_frame(
     values: Floats, indices: Ints, transform: Transform, step: float, sums: Floats
 ) -> None:
-    """Add what the coefficients stand for to ``values`` (n_channels,).
+    """Add the synthesis of the coefficients to ``values`` (n_channels,).
 
     ``step`` is that of the frame; ``sums`` (n_points,) is worked in.
     """

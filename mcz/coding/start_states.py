@@ -15,7 +15,7 @@ from mcz.types import Params
 
 @cache
 def start_states(name: str) -> tuple[NDArray[np.int64], ...]:
-    """The states of the annex ``NAME_start.json``, one a set; nobody writes to them."""
+    """States of the annex ``NAME_start.json``, one per set, read-only."""
     document = json.loads(annex_bytes(f"{name}_start.json"))
     return tuple(start_state(table) for table in document.get("sets", [document]))
 

@@ -65,7 +65,7 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def _interpreted(function: Callable[P, T], fault: str) -> Callable[P, T]:
-    """``function`` as plain Python; says once how slow that is."""
+    """Return ``function`` as plain Python; warns once that it is slow."""
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -129,7 +129,7 @@ def _is_cut(path: Path) -> bool:
 
 
 def changed_source(digests: dict[str, str]) -> str:
-    """The first of the sources that differs from what was compiled, or nothing.
+    """Return the first source that differs from the compiled one, or "".
 
     ``digests``: SHA-256 of files in the package. A file that is not there changes nothing.
     """

@@ -1,4 +1,4 @@
-"""The door of kernels: arrays as compiled kernels take them, whatever arrays are given."""
+"""Conversion of arrays to the layout and type that compiled kernels require."""
 
 from __future__ import annotations
 
@@ -60,6 +60,6 @@ def items(given: Iterable[Any], are_integers: tuple[bool, ...]) -> tuple[Any, ..
 
 
 def restore(moved: Moved) -> None:
-    """Write what a kernel has written to copies to the arrays that were given."""
+    """Copy results that a kernel wrote to copies back to the caller's arrays."""
     for given, copy in moved:
         given[...] = copy

@@ -1,4 +1,4 @@
-"""The extension modules that kernels are compiled to, by family; each has what its kernels call."""
+"""Extension modules by family of kernels; each includes all that its kernels call."""
 
 from __future__ import annotations
 

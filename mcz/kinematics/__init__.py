@@ -1,4 +1,4 @@
-"""Kinematics: where the points of a skeleton lie, what moves them, and the way back.
+"""Forward and inverse kinematics: the points of a skeleton and the channels that move them.
 
 SPEC.md, "Kinematics", has the conventions and the point sets. Distances are in the length unit of
 the skeleton. Everything is vectorized over frames and works in blocks of them. What fewer need is

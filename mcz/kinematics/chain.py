@@ -193,33 +193,33 @@ class Chain:
         """The pose of frames whose values are ``columns``, shape (n_channels, F)."""
         pose = Pose([], [], [], [])
         for link in self.links:
-            self.add(pose, link, self.hang(pose, link, columns), columns)
+            self.add(pose, link, self.place_joint(pose, link, columns), columns)
         return pose
 
-    def hang(self, pose: Pose, link: Link, columns: Floats) -> tuple[Floats, Floats, Floats]:
+    def place_joint(self, pose: Pose, link: Link, columns: Floats) -> tuple[Floats, Floats, Floats]:
         """Place the next joint after those in ``pose``: its arm, origin and unturned axes."""
         arm = self._arm(link, columns)
         if link.parent < 0:
             return arm, arm, IDENTITY if link.change is None else link.change
         above = pose.axes[link.parent]
-        scaled = self.scaled(self.links[link.parent], arm, columns)
+        scaled = self.apply_scales(self.links[link.parent], arm, columns)
         origin = pose.origins[link.parent] + to_world(above, scaled)
         return arm, origin, above if link.change is None else multiply_matrices(above, link.change)
 
     def add(
         self, pose: Pose, link: Link, hung: tuple[Floats, Floats, Floats], columns: Floats
     ) -> None:
-        """Add to ``pose`` the joint that ``hang`` has hung there, turned by its channels."""
+        """Add a joint that ``place_joint`` placed to ``pose``, turned by its channels."""
         arm, origin, axes = hung
         spins: list[Floats] = []
-        axes = self.turned_by(link, axes, columns, spins)
+        axes = self.apply_turns(link, axes, columns, spins)
         pose.arms.append(arm)
         pose.origins.append(origin)
         pose.axes.append(axes)
         pose.spins.append(spins)
 
-    def turned_by(self, link: Link, axes: Floats, columns: Floats, spins: list[Floats]) -> Floats:
-        """``axes`` turned by the joint's channels; what each turns about is added to ``spins``."""
+    def apply_turns(self, link: Link, axes: Floats, columns: Floats, spins: list[Floats]) -> Floats:
+        """Rotate ``axes`` by the joint's channels; append their rotation axes to ``spins``."""
         for axis, column in link.turns:
             if axis == QUATERNION:
                 axes = self._quaternion(axes, columns[list(link.quaternion)], spins)
@@ -244,17 +244,17 @@ class Chain:
         if link.parent_back is not None:
             arm = multiply_matrices(link.parent_back[:, :, None], arm[:, None])[:, 0]
         if link.parent >= 0:
-            arm = self.lengthened(self.links[link.parent], arm, columns)
+            arm = self.apply_lengths(self.links[link.parent], arm, columns)
         return arm
 
-    def lengthened(self, link: Link, vector: Floats, columns: Floats) -> Floats:
+    def apply_lengths(self, link: Link, vector: Floats, columns: Floats) -> Floats:
         """``vector`` from the joint's origin, lengthened by the joint's own length channels."""
         if not link.lengths or link.direction is None:
             return vector
         longer: Floats = link.direction[:, None] * columns[list(link.lengths)].sum(axis=0)
         return vector + longer
 
-    def scaled(self, link: Link, vector: Floats, columns: Floats) -> Floats:
+    def apply_scales(self, link: Link, vector: Floats, columns: Floats) -> Floats:
         """``vector`` along the joint's local axes, scaled by the joint's own scale channels."""
         if not link.scales:
             return vector
@@ -267,8 +267,10 @@ class Chain:
     def tail(self, joint: int, k: int, columns: Floats, pose: Pose) -> Floats:
         """The position of a tail of ``joint`` in the world, (3, F) or (3, 1)."""
         link = self.links[joint]
-        vector = self.lengthened(link, link.tails[k][:, None], columns)
-        return pose.origins[joint] + to_world(pose.axes[joint], self.scaled(link, vector, columns))
+        vector = self.apply_lengths(link, link.tails[k][:, None], columns)
+        return pose.origins[joint] + to_world(
+            pose.axes[joint], self.apply_scales(link, vector, columns)
+        )
 
     @staticmethod
     def _quaternion(axes: Floats, parts: Floats, spins: list[Floats]) -> Floats:

@@ -176,7 +176,7 @@ class FootTracks:
 
         ``runs`` are the frames a <= f < b between gaps, None: all.
         """
-        up = up_axis or self.guessed_up()
+        up = up_axis or self.guess_up_axis()
         frame_rate = rate or USUAL_RATE
         parts = runs or [(0, self.feet.shape[1])]
         with np.errstate(over="ignore"):  # what overflows is unknown
@@ -199,7 +199,7 @@ class FootTracks:
             rate_assumed=rate is None,
         )
 
-    def guessed_up(self) -> str:
+    def guess_up_axis(self) -> str:
         """The axis along which the body is farthest from its feet, on average; "y" if none is."""
         with np.errstate(all="ignore"):
             apart = self.body - self.feet

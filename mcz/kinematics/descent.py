@@ -55,14 +55,14 @@ class _Descent:
         self.units = targets.units[self.free, None]
 
     def run(self, columns: Floats, most_steps: int) -> tuple[Floats, Floats]:
-        """The values and sums of squares after at most so many steps."""
+        """Return the values and sums of squares after at most ``most_steps`` steps."""
         columns, active = columns.copy(), np.arange(columns.shape[1])
         damping = np.full(columns.shape[1], START_DAMPING)
-        costs, errors = self._costs(columns, active)
+        costs, errors = self._objectives(columns, active)
         for _ in range(most_steps if len(self.free) else 0):
             trial = columns[:, active]
             trial[self.free] += self._steps(trial, active, damping[active]) * self.units
-            cost, error = self._costs(trial, active)
+            cost, error = self._objectives(trial, active)
             before = costs[active]
             better = cost < before
             at = active[better]
@@ -79,17 +79,17 @@ class _Descent:
         """A sum of squares beyond which numbers are rounded alone."""
         return len(self.targets) * (NOTHING * self.targets.lever) ** 2
 
-    def _costs(self, columns: Floats, frames: Ints) -> tuple[Floats, Floats]:
+    def _objectives(self, columns: Floats, frames: Ints) -> tuple[Floats, Floats]:
         """Objective of each frame, and the targets' share of it, (F,) each."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             positions = self.targets.positions(columns, self.targets.chain.pose(columns))
             missed = (positions - self.seen[:, :, frames]) * self.known[:, None, frames]
             errors = (missed * missed).sum(axis=(0, 1))
-        away = self._away(columns, frames)
+        away = self._steps_from_prior(columns, frames)
         costs = errors + (self.weight[self.free] * away * away).sum(axis=0)
         return np.where(np.isfinite(costs), costs, np.inf), errors
 
-    def _away(self, columns: Floats, frames: Ints) -> Floats:
+    def _steps_from_prior(self, columns: Floats, frames: Ints) -> Floats:
         """The steps from the prior, (n_free, F)."""
         away: Floats = (columns[self.free] - self.prior[self.free][:, frames]) / self.units
         return away
@@ -109,7 +109,7 @@ class _Descent:
         )
         normal = matrix @ matrix.transpose(0, 2, 1)
         slope = (matrix @ missed.reshape(-1, n_frames).T[:, :, None])[:, :, 0]
-        slope -= (self.weight[self.free] * self._away(columns, frames)).T
+        slope -= (self.weight[self.free] * self._steps_from_prior(columns, frames)).T
         diagonal = np.einsum("fcc->fc", normal)
         level = damping * diagonal.mean(axis=1) + LEAST
         diagonal += self.weight[self.free].T + level[:, None]

@@ -49,7 +49,7 @@ def _entry(turns: Floats, order: str, row: int, column: int) -> Floats:
 
 
 def _hold_last(angles: Floats, known: Floats) -> Floats:
-    """``angles``, where not ``known`` those of the last frame that is, 0 before the first."""
+    """Replace ``angles`` that are not ``known`` by the last known ones, 0 before the first."""
     last = np.maximum.accumulate(np.where(known, np.arange(len(angles)), -1))
     return np.where(last >= 0, angles[last], 0.0)
 

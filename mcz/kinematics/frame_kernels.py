@@ -78,7 +78,7 @@ def place_frames(
 
 @kernel
 def turn_frames(values: Floats2, joints: Joints, wanted: Ints, out: Floats4) -> None:
-    """Write how each joint of ``wanted`` is turned from its parent, (n_frames, n_wanted, 3, 3).
+    """Write the local rotations of the joints ``wanted``, (n_frames, n_wanted, 3, 3).
 
     These are C M C^-1, M the product of the joint's own turns: the identity in the rest pose.
     """

@@ -14,7 +14,7 @@ __all__ = ["FramePositions"]
 
 
 class FramePositions:
-    """Positions of the points of ``skeleton``, and of its virtual markers where they are wanted.
+    """Positions of the points of ``skeleton`` and, on request, its virtual markers.
 
     Called with the channels of a frame, (n_channels,), it gives (n_places, 3) in length units, NaN
     where a position is not known: the same as ``positions_of`` and ``virtual_markers_of`` to 1e-9.
@@ -37,7 +37,7 @@ class FramePositions:
 
     def __call__(self, values: Floats) -> Floats:
         if self._tables is None:
-            return self._one_of_many(values)
+            return self._from_batch(values)
         n_points, n_joints = len(self._numbers), self._skeleton.n_joints
         out = np.empty((n_points + (3 * n_joints if self._marked else 0), 3))
         origins, axes = np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
@@ -50,7 +50,7 @@ class FramePositions:
         out[~np.isfinite(out).all(axis=1)] = np.nan
         return out
 
-    def _one_of_many(self, values: Floats) -> Floats:
+    def _from_batch(self, values: Floats) -> Floats:
         if self._marked:
             both = points_and_markers_of(self._skeleton, values[None])
             positions: Floats = np.concatenate(both, axis=1)[0]

@@ -119,7 +119,7 @@ class FramePoses:
             own = self.chain.turned[joint]
             axes = IDENTITY if own is None else own[:, :, None]
             with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                turned = self.chain.turned_by(self.chain.links[joint], axes, columns, [])
+                turned = self.chain.apply_turns(self.chain.links[joint], axes, columns, [])
             turned = np.moveaxis(turned, 2, 0)
             out[:, number] = turned if own is None else turned @ own.T
         return out

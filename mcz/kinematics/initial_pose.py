@@ -45,16 +45,16 @@ class InitialPose:
         pose = self.chain.pose(neutral)
         positions = targets.positions(neutral, pose)[:, :, 0]
         self.fastened = [
-            self._fastened(joint, pose, positions) for joint in range(len(self.chain.links))
+            self._attach_targets(joint, pose, positions) for joint in range(len(self.chain.links))
         ]
 
-    def _fastened(self, joint: int, pose: Pose, positions: Floats) -> AttachedTargets:
+    def _attach_targets(self, joint: int, pose: Pose, positions: Floats) -> AttachedTargets:
         """The targets that turn with the joint, and farther ones where those are on a line."""
         origin = pose.origins[joint][:, 0]
         axes = pose.axes[joint][:, :, 0]
         below = [int(number) for number in self.targets.below[joint]]
         steps = {number: self._steps(joint, number) for number in below}
-        numbers, spread = self._chosen(joint, steps, positions - origin)
+        numbers, spread = self._choose_targets(joint, steps, positions - origin)
         own = [n for n, t in enumerate(self.targets.list) if t.joint == joint and t.axis < 0]
         at_origin = [n for n in own if self.targets.list[n].tail < 0]
         if not at_origin:
@@ -69,7 +69,9 @@ class InitialPose:
             TO_REST if spread else LINE_TO_REST,
         )
 
-    def _chosen(self, joint: int, steps: dict[int, int], arms: Floats) -> tuple[list[int], bool]:
+    def _choose_targets(
+        self, joint: int, steps: dict[int, int], arms: Floats
+    ) -> tuple[list[int], bool]:
         """The targets to turn by, and whether they spread to two sides.
 
         Those that nothing bends, where they do not all lie at the joint's origin. A root whose own
@@ -125,10 +127,10 @@ class InitialPose:
         columns = self.targets.neutral(seen.shape[2])
         pose = Pose([], [], [], [])
         for joint, link in enumerate(self.chain.links):
-            hung = self.chain.hang(pose, link, columns)
+            hung = self.chain.place_joint(pose, link, columns)
             if link.turns or link.moves:
                 self._fit(joint, link, hung, seen, known, columns)
-                hung = self._moved(joint, link, hung, seen, known, columns, pose)
+                hung = self._move_joint(joint, link, hung, seen, known, columns, pose)
             self.chain.add(pose, link, hung, columns)
         return columns
 
@@ -141,7 +143,7 @@ class InitialPose:
         known: Floats,
         columns: Floats,
     ) -> None:
-        """Set the joint's angles so that what it carries lies in the directions seen."""
+        """Set the joint's angles so that its targets lie in the directions seen."""
         body = self.fastened[joint]
         if not link.turns or not len(body.numbers):
             return
@@ -180,7 +182,7 @@ class InitialPose:
         moment: Floats = np.einsum("nif,njf->ijf", weighted, a)
         return moment
 
-    def _moved(
+    def _move_joint(
         self,
         joint: int,
         link: Link,
@@ -190,7 +192,7 @@ class InitialPose:
         columns: Floats,
         pose: Pose,
     ) -> tuple[Floats, Floats, Floats]:
-        """The joint hung where it was seen, its position channels set for that."""
+        """Set the joint's position channels to where it was seen; return its placement."""
         body = self.fastened[joint]
         if not link.moves:
             return hung
@@ -217,7 +219,7 @@ class InitialPose:
                 columns[column] = np.where(there, step[component], 0.0)
                 _interpolate_gaps(columns[column], there)
             done.add(component)
-        return self.chain.hang(pose, link, columns)
+        return self.chain.place_joint(pose, link, columns)
 
 
 def _fill_gaps(link: Link, known: Floats, columns: Floats) -> None:

@@ -67,30 +67,30 @@ class _Solution:
         links = targets.chain.links
         self.angles = np.array([c for link in links for c in link.angles], np.int64)
         self.vectors = np.array([c for link in links for c in link.vector], np.int64)
-        self.columns = self._guess()
+        self.columns = self._initial_columns()
         self.errors = np.zeros(seen.shape[2])
 
     def values(self) -> Floats:
         """All steps; values (n_frames, n_channels)."""
         weight = np.full((len(self.columns), 1), TO_GUESS)
-        self._take(self._refined(self.columns, self.columns, weight, MOST_STEPS), None)
-        self._again(weight)
-        self._continue()
-        self._mend(weight)
-        self._continue()
-        self._steady()
-        self._continue()
+        self._accept(self._refine(self.columns, self.columns, weight, MOST_STEPS), None)
+        self._retry(weight)
+        self._make_continuous()
+        self._repair_outliers(weight)
+        self._make_continuous()
+        self._smooth()
+        self._make_continuous()
         self.columns[self.targets.units == 0] = 0.0
         return np.ascontiguousarray(self.columns.T)
 
-    def _guess(self) -> Floats:
+    def _initial_columns(self) -> Floats:
         guess, n_frames = InitialPose(self.targets), self.seen.shape[2]
         parts = [slice(start, start + GUESSED) for start in range(0, n_frames, GUESSED)]
         return np.concatenate(
             [guess.columns(self.seen[:, :, rows], self.known[:, rows]) for rows in parts], axis=1
         )
 
-    def _refined(
+    def _refine(
         self, start: Floats, prior: Floats, weight: Floats, steps: int, frames: Ints | None = None
     ) -> tuple[Floats, Floats]:
         seen, known = self.seen, self.known
@@ -98,16 +98,16 @@ class _Solution:
             seen, known = seen[:, :, frames], known[:, frames]
         return refine(self.targets, start, seen, known, prior, weight, steps)
 
-    def _take(
+    def _accept(
         self, solution: tuple[Floats, Floats], limit: Floats | None, frames: Any = slice(None)
     ) -> None:
-        """Take what was found for ``frames``, where its errors are within ``limit``."""
+        """Accept a solution for ``frames`` where its errors are within ``limit``."""
         columns, errors = solution
         accepted = np.ones(len(errors), np.bool_) if limit is None else errors <= limit
         self.columns[:, frames] = np.where(accepted, columns, self.columns[:, frames])
         self.errors[frames] = np.where(accepted, errors, self.errors[frames])
 
-    def _again(self, weight: Floats) -> None:
+    def _retry(self, weight: Floats) -> None:
         """Frames that ended far off start again from angles beside those where they ended."""
         random = np.random.default_rng(0)
         for _ in range(TRIES):
@@ -118,11 +118,11 @@ class _Solution:
             turning = np.concatenate([self.angles, self.vectors])
             beside = random.normal(0.0, BESIDE, (len(turning), len(frames)))
             start[turning] += beside / self.targets.chain.radians
-            solution = self._refined(start, start, weight, MOST_STEPS, frames)
-            self._take(solution, self.errors[frames], frames)
+            solution = self._refine(start, start, weight, MOST_STEPS, frames)
+            self._accept(solution, self.errors[frames], frames)
 
-    def _continue(self) -> None:
-        """Make what turns continuous over time, by whole turns and by the other Euler angles."""
+    def _make_continuous(self) -> None:
+        """Make rotations continuous over time, by whole turns and by the other Euler angles."""
         radians = self.targets.chain.radians
         for link in self.targets.chain.links:
             vector, columns = list(link.vector), link.angles
@@ -136,18 +136,18 @@ class _Solution:
                 angles = center_angles(np.unwrap(angles, axis=0))
             self.columns[columns] = angles.T / radians
 
-    def _mend(self, weight: Floats) -> None:
-        """Frames that stand out are sought anew, from a line between those beside them."""
-        odd = self._odd()
+    def _repair_outliers(self, weight: Floats) -> None:
+        """Solve outlier frames again, from a line between their neighbors."""
+        odd = self._find_outliers()
         good = np.flatnonzero(~odd)
         frames = np.flatnonzero(odd)
         if not len(good) or not len(frames):
             return
         line = np.stack([np.interp(frames, good, track[good]) for track in self.columns])
         limit = self.errors[frames] * (1 + SAME) + self._unit_error() * NOTHING
-        self._take(self._refined(line, line, weight, MENDING_STEPS, frames), limit, frames)
+        self._accept(self._refine(line, line, weight, MENDING_STEPS, frames), limit, frames)
 
-    def _odd(self) -> NDArray[np.bool_]:
+    def _find_outliers(self) -> NDArray[np.bool_]:
         """Frames that miss more than usual, lack a target, or lie between two jumps.
 
         What most frames do is not odd.
@@ -171,7 +171,7 @@ class _Solution:
         """The sum of squares where every target is a typical lever away."""
         return max(1, len(self.targets)) * self.targets.lever**2
 
-    def _steady(self) -> None:
+    def _smooth(self) -> None:
         """Smooth the values towards their neighbor frames where distances remain, as with noise.
 
         The remaining distances say how much a position is to be believed, and what people do says
@@ -188,7 +188,7 @@ class _Solution:
         limit = self.errors + LOOSER * n_free * square
         for around in AROUND:
             prior = _means(self.columns, around)
-            self._take(self._refined(self.columns, prior, weight, STEADY_STEPS), limit)
+            self._accept(self._refine(self.columns, prior, weight, STEADY_STEPS), limit)
 
 
 def _between(jumps: Ints, n_frames: int) -> NDArray[np.bool_]:

@@ -85,13 +85,13 @@ def points_and_markers_of(skeleton: Skeleton, values: Floats) -> tuple[Floats, F
 def places_of(
     skeleton: Skeleton, values: Floats, *, markers: bool = False, shell_cm: float | None = None
 ) -> Places:
-    """``positions_of`` and, as wanted, the others, from one pass over the joints."""
+    """Points and, on request, markers and shell, in one pass over the joints."""
     positions = _Positions(skeleton, values, points=True, markers=markers, shell_cm=shell_cm)
     return Places(positions.points, positions.markers, positions.shell)
 
 
 class _Positions:
-    """Points (n_frames, n_points, 3), virtual markers and points of the shell, as wanted."""
+    """Points (n_frames, n_points, 3) and, on request, virtual markers and shell points."""
 
     def __init__(
         self,
@@ -196,7 +196,7 @@ def is_marker(joint: Joint) -> bool:
 
 
 def point_names(skeleton: Skeleton) -> tuple[str, ...]:
-    """The name of every point: that of its joint, with " end" where it is a tail of a BVH joint.
+    """Name of every point: its joint's name, with " end" for a tail of a BVH joint.
 
     From the second tail of a joint on a number follows. A name that repeats has ``#n``.
     """

@@ -1,4 +1,4 @@
-"""Rotation channels of one joint -> values that turn it as near to a wanted turn as they can."""
+"""Fit of a joint's rotation channels to a target rotation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SWEEPS = 12
 
 
 def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> None:
-    """Set what turns a joint so that its R has the greatest trace of R' ``moment``.
+    """Set a joint's rotation channels so that R' ``moment`` has the greatest trace.
 
     ``moment`` has shape (3, 3, F) and is along the joint's own axes; ``columns``, (n_channels, F)
     in source units, are written. Where ``moment`` is a rotation, R is the nearest to it. A

@@ -1,4 +1,4 @@
-"""Angles about given axes -> the angles nearby whose turn is nearest to a wanted one.
+"""Local refinement of a joint's angles towards a target rotation.
 
 Damped Gauss-Newton steps, each frame damped for itself. They end where one angle at a time, as in
 ``rotation_fit.py``, gets on slowly: at two axes that fall together.
@@ -49,7 +49,7 @@ def polish_turns(link: Link, wanted: Floats, columns: Floats, radians: float) ->
 
 
 def _turn(axes: list[int], angles: Floats) -> tuple[Floats, Floats]:
-    """The turn by ``angles`` (n, F), (3, 3, F), and what each of them turns about, (n, 3, F)."""
+    """Rotation by ``angles`` (n, F), (3, 3, F), and the axis of each, (n, 3, F)."""
     rotation = np.broadcast_to(IDENTITY, (3, 3, angles.shape[1]))
     spins = np.empty((len(axes), 3, angles.shape[1]))
     for number, axis in enumerate(axes):
@@ -65,6 +65,6 @@ def _nearness(rotation: Floats, wanted: Floats) -> Floats:
 
 
 def _vector(wanted: Floats, rotation: Floats) -> Floats:
-    """Twice the sine of the angle from ``made`` to ``wanted``, times the axis, (3, F)."""
+    """Twice the sine of the angle from ``rotation`` to ``wanted``, times the axis, (3, F)."""
     left = multiply_matrices(wanted, np.swapaxes(rotation, 0, 1))
     return np.stack([left[2, 1] - left[1, 2], left[0, 2] - left[2, 0], left[1, 0] - left[0, 1]])

@@ -97,14 +97,14 @@ class _Block:
             yield column, trace * (a * a).sum(axis=0) - (a * to_world(moment, a)).sum(axis=0)
 
     def _moves(self, joint: int, link: Link) -> Iterator[tuple[int, Floats]]:
-        """Positions: every point below moves alike, as far as the parent's scale makes it."""
+        """Position channels: all points below move together, scaled by the parent."""
         for component, column in link.moves:
             step = np.zeros((3, 1))
             step[component] = 1.0
             if link.parent_back is not None:
                 step = link.parent_back @ step
             if link.parent >= 0:
-                step = self.chain.scaled(self.chain.links[link.parent], step, self.columns)
+                step = self.chain.apply_scales(self.chain.links[link.parent], step, self.columns)
             yield column, self._alike(step, self.numbers[joint])
 
     def _stretches(
@@ -113,14 +113,14 @@ class _Block:
         """Lengths and scales: they move the joint's tails, and its children with all below."""
         ends = [tail for tail in self.points[joint] if tail >= 0]
         if link.direction is not None:
-            step = self.chain.scaled(link, link.direction[:, None], self.columns)
+            step = self.chain.apply_scales(link, link.direction[:, None], self.columns)
             number = len(ends) + sum(self.numbers[child] for child in children)
             for column in link.lengths:
                 yield column, self._alike(step, number)
         if not link.scales:
             return
         tails = (link.tails[tail][:, None] for tail in ends)
-        vectors = [(1, self.chain.lengthened(link, tail, self.columns)) for tail in tails]
+        vectors = [(1, self.chain.apply_lengths(link, tail, self.columns)) for tail in tails]
         vectors += [(self.numbers[child], self.pose.arms[child]) for child in children]
         for component, column in link.scales:
             total = sum((n * v[component] ** 2 for n, v in vectors), np.zeros(1))

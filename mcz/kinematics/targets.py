@@ -115,7 +115,7 @@ class Targets:
             if link.parent >= 0:
                 if link.parent_back is not None:
                     step = link.parent_back @ step
-                step = self.chain.scaled(self.chain.links[link.parent], step, columns)
+                step = self.chain.apply_scales(self.chain.links[link.parent], step, columns)
                 step = to_world(pose.axes[link.parent], step)
             yield column, step
 
@@ -128,16 +128,16 @@ class Targets:
         axes = pose.axes[joint]
         tails = {
             tail: np.array([n for n in self.below[joint] if self.list[n] in fastened], np.int64)
-            for tail, fastened in self._fastened(joint, link)
+            for tail, fastened in self._targets_by_tail(joint, link)
         }
         if link.direction is not None:
-            step = to_world(axes, self.chain.scaled(link, link.direction[:, None], columns))
+            step = to_world(axes, self.chain.apply_scales(link, link.direction[:, None], columns))
             moved = [*tails.values(), *(self.below[child] for child in self.children[joint])]
             for column in link.lengths:
                 for some in moved:
                     yield column, some, step
         vectors = [
-            (some, self.chain.lengthened(link, link.tails[tail][:, None], columns))
+            (some, self.chain.apply_lengths(link, link.tails[tail][:, None], columns))
             for tail, some in tails.items()
         ]
         vectors += [(self.below[child], pose.arms[child]) for child in self.children[joint]]
@@ -146,7 +146,7 @@ class Targets:
                 yield column, some, axes[:, component] * (vector[component] / self.lever)
 
     @staticmethod
-    def _fastened(joint: int, link: Link) -> Iterator[tuple[int, set[Target]]]:
+    def _targets_by_tail(joint: int, link: Link) -> Iterator[tuple[int, set[Target]]]:
         for tail in range(len(link.tails)):
             yield tail, {Target(joint, tail, axis) for axis in (-1, 0, 1, 2)}
 

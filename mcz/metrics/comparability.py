@@ -18,7 +18,7 @@ def frames_text(signal: Signal) -> str:
 
 
 def common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, float]:
-    """The unit of distances in cm, and what lengths of ``b`` are multiplied by to be in it."""
+    """Unit of distances in cm, and the factor from lengths of ``b`` to it."""
     if a.unit_cm is not None and b.unit_cm is not None:
         return a.unit_cm, b.unit_cm / a.unit_cm
     if a.unit_cm is None and b.unit_cm is None:

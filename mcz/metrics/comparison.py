@@ -59,7 +59,7 @@ def compare(
     placed = same_points(original, decoded, notes)
     places = PositionErrors(original, decoded, scale, placed)
     if placed and unit is not None:
-        places.also(virtual_markers, shell_cm, contacts, notes)
+        places.enable(virtual_markers, shell_cm, contacts, notes)
     with np.errstate(all="ignore"):  # what overflows is no figure
         for start, left, right in _blocks(original, decoded):
             if same:

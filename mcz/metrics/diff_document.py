@@ -50,7 +50,7 @@ def diff_document(
 
 
 def _in_clip(entries: Params, start: int) -> JsonObject:
-    """Figures with their frames counted from the first of the clip, not of what was cut."""
+    """Shift frame numbers of figures by ``start``, to count from the clip's first frame."""
     return {
         key: value + start if key.endswith("_frame") and value is not None else value
         for key, value in entries.items()
@@ -94,7 +94,7 @@ def _equal_joints(a: Motion, b: Motion) -> list[str]:
 
 
 def _by_joints(a: Motion, b: Motion, comparison: Comparison, start: int) -> JsonObject | None:
-    """The distances of joints of the same names, of skeletons whose points are not alike."""
+    """Distances of joints of the same name, if the skeletons have different points."""
     if comparison.points is not None and point_set(a.skeleton) == point_set(b.skeleton):
         return None
     try:

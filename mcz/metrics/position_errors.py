@@ -27,7 +27,7 @@ Feet = Contacts | Sequence[int | str] | bool
 
 
 class PositionErrors:
-    """Distances of points and, as wanted, of markers, shells and feet, in units of the original.
+    """Distances of points and, on request, of markers, shells and feet, in units of the original.
 
     ``scale`` brings lengths of the decoded side into these. Without ``placed`` there are no points
     in common, and no figures.
@@ -44,7 +44,7 @@ class PositionErrors:
         self._contacts: Contacts | None = None
         self._feet: tuple[FootTracks, FootTracks] | None = None
 
-    def also(
+    def enable(
         self, virtual_markers: bool, shell_cm: float | None, contacts: Feet, notes: list[str]
     ) -> None:
         """Measure these, too, where they can be compared; both sides' length units are known."""
@@ -57,9 +57,9 @@ class PositionErrors:
             elif shell_cm is not None:
                 self.shell, self.shell_cm = ShellErrors(a.n_joints), shell_cm
         if contacts is not False:
-            self._watch(contacts, notes)
+            self._track_feet(contacts, notes)
 
-    def _watch(self, contacts: Feet, notes: list[str]) -> None:
+    def _track_feet(self, contacts: Feet, notes: list[str]) -> None:
         joints: Sequence[int | str] | None = None
         if isinstance(contacts, Contacts):
             self._contacts, joints = contacts, contacts.joints
@@ -83,7 +83,7 @@ class PositionErrors:
         """Add the rows of both sides from row ``start`` on."""
         markers, shell_cm = len(self.markers.counts) > 0, self.shell_cm
         ours = places_of(self._a, left, markers=markers, shell_cm=shell_cm)
-        theirs = self._theirs(right, markers)
+        theirs = self._decoded_places(right, markers)
         self.points.add_points(start, ours.points, theirs.points)
         self.changes.add_points(start, ours.points, theirs.points)
         if markers:
@@ -95,7 +95,7 @@ class PositionErrors:
             for tracks, places in zip(self._feet, (ours, theirs), strict=True):
                 tracks.add(start // per_frame, places.points[::per_frame])
 
-    def _theirs(self, values: Values, markers: bool) -> Places:
+    def _decoded_places(self, values: Values, markers: bool) -> Places:
         """The places of the decoded side, in units of the original."""
         if has_markers_of(self._a, self._b):  # points and virtual markers as markers
             both = places_of(self._b, values).points
@@ -126,13 +126,13 @@ class PositionErrors:
 
     def velocities(self, unit: Number) -> tuple[Number, Number]:
         """Mean and greatest error of velocities in cm/s, ``unit`` cm a length unit."""
-        return self._changes(self.changes.velocity, unit, 1)
+        return self._scaled_errors(self.changes.velocity, unit, 1)
 
     def accelerations(self, unit: Number) -> tuple[Number, Number]:
         """Mean and greatest error of accelerations in cm/s2, ``unit`` cm a length unit."""
-        return self._changes(self.changes.acceleration, unit, 2)
+        return self._scaled_errors(self.changes.acceleration, unit, 2)
 
-    def _changes(self, errors: Distances, unit: Number, order: int) -> tuple[Number, Number]:
+    def _scaled_errors(self, errors: Distances, unit: Number, order: int) -> tuple[Number, Number]:
         rate = self._original.frame_rate or self._decoded.frame_rate
         if unit is None or rate is None:
             return None, None

@@ -1,4 +1,4 @@
-"""First and second derivatives over time, that look only at what is known.
+"""First and second derivatives over time, from known positions only.
 
 ``places`` is (n_frames, n, 3), NaN where unknown; ``steps`` are the seconds from each frame to the
 next, (n_frames - 1,), NaN across a gap.
@@ -24,7 +24,7 @@ def velocities_of(places: Floats, steps: Floats) -> Floats:
 
 
 def accelerations_of(places: Floats, steps: Floats) -> Floats:
-    """The second derivative of that parabola; at an end or beside a gap that of the next frame.
+    """Second derivative of that parabola; at an end or beside a gap that of the next frame.
 
     NaN where a frame is unknown or stands in a run of fewer than three.
     """

@@ -155,7 +155,7 @@ def too_many_frames_error(timeline: Timeline, wanted: Fraction) -> OptionError:
 def frames_within(
     timeline: Timeline, wanted: Fraction, run: tuple[int, int]
 ) -> tuple[range, Callable[[range], Times]]:
-    """The new frames in a run of the old, and what tells where they lie."""
+    """New frames within a run of old ones, and a function that locates them."""
     start, stop = run
     places, rate = timeline.places, timeline.rate
     if places is not None and rate and places[stop - 1] - places[start] == stop - start - 1:
@@ -295,7 +295,7 @@ def _vectors(first: Floats, last: Floats, share: Floats) -> Floats:
 def _matrices(chain: Chain, link: Link, old: Floats) -> Floats:
     """The product of a joint's own turns, (n_frames, 3, 3)."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        turns = chain.turned_by(link, IDENTITY, np.ascontiguousarray(old.T), [])
+        turns = chain.apply_turns(link, IDENTITY, np.ascontiguousarray(old.T), [])
     return np.ascontiguousarray(np.moveaxis(turns, 2, 0))
 
 

@@ -1,4 +1,4 @@
-"""Compiled: the sparse vectors of Algorithm 1 of Hou 2016, and what its next basis needs of them.
+"""Compiled: sparse vectors of Algorithm 1 of Hou 2016, and their sums for its next basis.
 
 Frames are worked on in blocks, so that the loops inside run over frames; everything is summed in
 one order, so the same frames give the same bytes. Imported on first use only.

@@ -1,4 +1,4 @@
-"""The motion-adaptive post filter: smoother positions for a reader who can wait for 12 rows.
+"""Motion-adaptive post filter: smoother positions with a delay of 12 rows.
 
 C.-H. Kwak, I. V. Bajić, "Online MoCap data coding with bit allocation, rate control, and
 motion-adaptive post-processing", section IV. Each coordinate of a point goes through one of three

@@ -71,7 +71,7 @@ def test_angles_come_back(
     place = orders.places[0]
     middle = source[:, place.columns[own[1]]] / FULL_TURN[unit]
     clear = np.abs(middle * 2 - np.floor(middle * 2) - 0.5) > 1e-6
-    _, decoded = orders.notes_and_values(source, orders.coded(source))
+    _, decoded = orders.notes_and_values(source, orders.to_coded_order(source))
     off = np.abs(decoded - source)[clear].max(initial=0.0) / FULL_TURN[unit]
     assert off < 1e-8
 

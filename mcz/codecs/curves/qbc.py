@@ -97,7 +97,7 @@ class QbcHeader(Record):
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+    """Encode the values of ``source`` with unwrapped rotations; invalid values are interpolated.
 
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
@@ -142,7 +142,7 @@ class _Coder:
 
 
 def _segment_length(layout: Layout, plan: Plan) -> int:
-    """The frames of a segment: those wanted, up to a multiple of delta that the limit allows."""
+    """Frames per segment: the requested number, rounded to a multiple of delta within the limit."""
     delta, most = plan.delta, layout.most_frames
     if most < min(delta, layout.n_frames):
         raise OptionError(

@@ -76,7 +76,7 @@ def code_references(state: Ints, data: Bytes, references: Ints2) -> int:
 
 
 def set_linear(features: Floats, own: Ints, channel: int, steps: Floats2) -> None:
-    """The features of LINEAR: steps, a channel's own and those of its references."""
+    """Set the features of LINEAR: the steps of a channel and of its references."""
     n = min(own[0], LINEAR_REFERENCES)
     for lag in range(LINEAR_LAGS):
         features[lag] = steps[channel, 1 + lag]
@@ -112,7 +112,7 @@ def expected_step(lanes: Predictors, leads: Words2, row: int, channel: int) -> i
 
 
 def code_miss(state: Ints, data: Bytes, miss: int, memory: Ints, flow: Ints) -> int:
-    """Code a lead less what was predicted; FAULT where it is too long."""
+    """Code a lead minus its prediction; FAULT if it is too long."""
     near = clamp(flow[NEAR] + 3, 0, 7)
     sides = memory[SIDE_1], memory[SIDE_2], flow[OTHER]
     scales = memory[FAST], memory[SLOW]
@@ -127,7 +127,7 @@ def remember(miss: int, memory: Ints) -> None:
 
 
 def code_rest(state: Ints, data: Bytes, rest: int, memory: Ints, flow: Ints) -> int:
-    """Code what a count is off; FAULT where it is too long."""
+    """Code the error of a count; FAULT if it is too long."""
     rest_code = code_miss(state, data, rest, memory, flow)
     if rest_code == FAULT or rest_code >> 31 != rest_code >> 63:  # BEST-14
         return FAULT

@@ -70,7 +70,7 @@ def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> byt
 
 
 def _echoes_of(plan: Plan, leads: Words) -> list[Echo]:
-    """Echoes in lanes whose ordinals are what their leads and tails say."""
+    """Find echoes in the lanes whose ordinals equal their leads and tails."""
     _, tail, survey, *_ = fast_kernels()
     numbers = plan.lanes.numbers
     is_whole = plan.channels.plans[numbers, survey.LIMIT] < 0

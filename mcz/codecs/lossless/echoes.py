@@ -29,7 +29,7 @@ COST = 56  # bits that one takes
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """A block of numbers that repeats what lies ``lag`` rows above it, or that with other signs."""
+    """A block of numbers that repeats the block ``lag`` rows above, or its negative."""
 
     row: int
     n_rows: int
@@ -180,7 +180,7 @@ def _runs_of_true(same: Bools) -> Iterator[tuple[int, int]]:
 
 
 def _merge_echoes(echoes: list[Echo]) -> list[Echo]:
-    """The same with those of neighboring channels in one."""
+    """Merge the echoes of neighboring channels."""
     merged: list[Echo] = []
     for echo in sorted(echoes, key=lambda e: (e.lag, e.row, e.n_rows, e.minus, e.channel)):
         last = merged[-1] if merged else None

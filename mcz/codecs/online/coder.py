@@ -118,7 +118,7 @@ class Coder:
             self._begin(unit.kind)
             data = np.frombuffer(unit.data, np.uint8).copy()
             _coding().start(self._state, data, 0)
-            fault = _kernels().decode_frames(*self._given(data, unit.kind, out))
+            fault = _kernels().decode_frames(*self._kernel_arguments(data, unit.kind, out))
             if fault >= 0:
                 raise FormatError(f"{NAME}: frame {self.at + fault} is out of range")
             if _coding().coded_size(self._state) != len(data):  # ONLINE-23
@@ -130,11 +130,11 @@ class Coder:
             self._reference[:], self._memory[:] = before
             self.skip(unit.n_frames)
             raise
-        self._took(unit.kind, unit.n_frames)
+        self._advance(unit.kind, unit.n_frames)
         return out
 
     def _check(self, unit: Unit) -> None:
-        """Refuse a unit that needs what is not known."""
+        """Raise LostFrameError for a unit that depends on lost frames."""
         if unit.kind == STR and not self._whole:  # ONLINE-26
             raise LostFrameError(f"{NAME}: frame {self.at} needs the one before, which is lost")
         # ONLINE-14, ONLINE-27
@@ -157,7 +157,7 @@ class Coder:
         choice = _kernels().Choice(
             self._analysis, threshold, n_group, plan.numbers, plan.laplace, plan.gauss
         )
-        fault = _kernels().encode_frames(*self._given(data, kind, frames), choice)
+        fault = _kernels().encode_frames(*self._kernel_arguments(data, kind, frames), choice)
         if fault >= 0:
             plan.numbers[:] = before
             raise MotionError(
@@ -167,7 +167,7 @@ class Coder:
         if len(frames) == n_group:
             plan.round_up(len(coded))
         unit = Unit(kind, len(frames), coded, self.distance() if kind == LTR else 0)
-        self._took(kind, len(frames))
+        self._advance(kind, len(frames))
         return unit
 
     def _begin(self, kind: int) -> None:
@@ -176,13 +176,15 @@ class Coder:
             table = start_states("online")[N_KINDS * self.coder + (kind == LTR)]  # ONLINE-15
             self._state = table.copy()
 
-    def _took(self, kind: int, n_frames: int) -> None:
+    def _advance(self, kind: int, n_frames: int) -> None:
         if kind != STR:
             self._ltr = self.at
         self.at += n_frames
         self._whole = True
 
-    def _given(self, data: NDArray[np.uint8], kind: int, frames: Floats) -> tuple[Any, ...]:
+    def _kernel_arguments(
+        self, data: NDArray[np.uint8], kind: int, frames: Floats
+    ) -> tuple[Any, ...]:
         past = _kernels().Past(
             self._values, self._reference, self._memory, self._lengths, self._tracks
         )

@@ -195,7 +195,7 @@ def _code_frame(
 
 
 def _predict(kind: int, values: Floats, reference: Floats) -> None:
-    """Make ``values`` what a frame is predicted to be."""
+    """Overwrite ``values`` with the prediction of a frame."""
     if kind == INTRA:
         values[:] = 0.0
     elif kind == LTR:
@@ -212,7 +212,7 @@ def decode_frames(
     past: Past,
     transform: Transform,
 ) -> int:
-    """Write the frames of a unit, (frames, n_channels), to ``out``; return that of a fault, or -1.
+    """Decode the frames of a unit, (frames, n_channels), to ``out``; return a faulty one, or -1.
 
     ``kind`` is that of the first, all others are STR.
     """
@@ -248,7 +248,7 @@ def _transform(
     analysis: Floats2,
     points: Floats,
 ) -> None:
-    """The coefficients (n_rows,) of what ``frame`` adds to ``values``, in units of its step."""
+    """Coefficients (n_rows,) of the difference of ``frame`` and ``values``, in steps."""
     _, starts, columns, step, weights = transform
     for m in range(len(starts) - 1):
         for j in range(len(points)):
@@ -259,7 +259,7 @@ def _transform(
 
 
 def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: float) -> float:
-    """Fill ``indices`` (n_rows,); return the mean square of what they stand for, -1 at a fault."""
+    """Fill ``indices`` (n_rows,); return the mean square of their values, -1 at a fault."""
     squares = 0.0
     for r in range(len(indices)):
         indices[r] = index_of(coefficients[r] / ratio, threshold)
@@ -272,7 +272,7 @@ def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: floa
 def _choose(
     indices: Ints, coefficients: Floats, wanted: float, threshold: float, is_fixed: bool
 ) -> tuple[int, float]:
-    """The step code next to ``wanted`` and what ``_quantize`` returns; fills ``indices``.
+    """Choose the step code next to ``wanted``, fill ``indices``; also return the mean square.
 
     Where the step is not fixed it grows until no coefficient is too large.
     """

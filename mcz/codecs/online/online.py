@@ -64,7 +64,7 @@ SEGMENT_FRAMES = 1200  # at least, but for the last
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the values of ``source``; what is invalid is filled.
+    """Encode the values of ``source``; invalid values are interpolated.
 
     Raises MotionError for a value that is not finite, or is too large, OptionError for parameters
     that contradict each other, or a rate where no frame rate is known.

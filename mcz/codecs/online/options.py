@@ -1,4 +1,4 @@
-"""The parameters of ``online``, and what becomes of them before the first frame is coded.
+"""The parameters of ``online``, and the settings derived from them before the first frame.
 
 mcz/codecs/online/README.md describes them; a decoder needs none of it.
 """
@@ -71,7 +71,7 @@ CHANGEABLE = {
 
 
 def settle_options(params: Params) -> Settings:
-    """All parameters with what the preset says; raises OptionError for a contradiction."""
+    """Fill in the values of the preset; raises OptionError for a contradiction."""
     values = PRESETS[params["preset"]].items()
     chosen = dict(params) | {n: v if params[n] is None else params[n] for n, v in values}
     if chosen["rate_control"] is None:
@@ -87,7 +87,7 @@ def settle_options(params: Params) -> Settings:
 
 
 def choose_options(sample: Sample, chosen: Params) -> tuple[Choice, int]:
-    """The fields of SPACE and the order of points, from what an encoder looks at."""
+    """Fields of SPACE and the order of points, chosen from a sample."""
     which, order = chosen["basis"], AS_IS
     step = chosen["step"] or default_step(sample)
     if chosen["order"] == "reordered" and sample.apart:

@@ -41,14 +41,14 @@ class Plan:
     gauss: Floats
 
     def round_up(self, n_bytes: int) -> None:
-        """Take in that a whole group has so many bytes."""
+        """Account for a group of this many bytes."""
         kernels = _kernels()
         more = 8 * n_bytes - self.numbers[kernels.SPENT]
         self.numbers[kernels.SPENT] += more
         self.numbers[kernels.AHEAD] += more
 
     def charge(self, n_bytes: int, *, intra: bool) -> None:
-        """Take in that the last frame, one of a live stream, had so many bytes with its framing."""
+        """Account for the last frame of a live stream: its bytes with framing."""
         kernels, numbers = _kernels(), self.numbers
         framing = 8.0 * n_bytes - numbers[kernels.LAST]
         numbers[kernels.SPENT] += framing - numbers[kernels.RESERVED]
@@ -68,7 +68,7 @@ class Plan:
 
 
 def plan_of(chosen: Params, layout: Layout, step: float) -> Plan:
-    """The plan at the start of a signal, ``step`` being that of its header.
+    """Plan at the start of a signal; ``step`` as in its header.
 
     Raises OptionError where a rate is asked for and the frame rate is not known.
     """

@@ -54,7 +54,7 @@ def largest_of(values: Floats) -> float:
 
 
 def log_step(rates: Floats, bits: float, variance: float) -> float:
-    """log2 of the step at which a coefficient of that variance takes so many bits.
+    """Return log2 of the step at which a coefficient of that variance takes that many bits.
 
     ``rates`` (N_RATES,) falls; what is beyond its ends gets them.
     """
@@ -97,7 +97,7 @@ def _alpha(plan: Floats, n_frames: int, n_coefficients: int) -> float:
 
 
 def _steady_step(plan: Floats) -> float:
-    """log2 of the step with which a group, costing what the last ones did, has its bits."""
+    """Return log2 of the step that spends a group's bits if it costs as much as the last ones."""
     if plan[STR_COST] <= 0:
         return float(plan[BASE])
     n_frames = plan[GROUP_FRAMES]

@@ -18,7 +18,7 @@ MODES = ("mod", "rc", "rca", "steady")  # of an encoder's rate control
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """Frames that are coded together; ``kind`` is that of the first, the others are STR.
+    """Frames coded together; ``kind`` of the first, the others are STR.
 
     ``distance``: so many frames before the first lies the LTR that it is predicted from, where it
     is one itself.

@@ -121,7 +121,7 @@ def _fit_components(basis: Floats, left: Floats) -> Floats:
 
 
 def _grid(energies: Floats, q: int, means: Floats, n_frames: int) -> Grid:
-    """Steps that add ``NOISE`` of what is lost without the components that are left out."""
+    """Steps whose noise is ``NOISE`` of the energy of the omitted components."""
     lost = float(energies[q:].sum()) / n_frames
     step = math.sqrt(12 * NOISE * lost / q) if q else 0.0
     greatest = math.sqrt(float(energies[0]) / n_frames) if len(energies) else 0.0

@@ -1,4 +1,4 @@
-"""Compiled: the coefficients of one segment, coded as residuals, and what they sum up to.
+"""Compiled: the coefficients of one segment, coded as residuals, and their synthesis.
 
 SPEC.md, "Codec 18: pca", is normative and has the steps below in the same order. One function
 serves encoder and decoder. Imported on first use only.
@@ -21,7 +21,7 @@ FAST, SLOW, SIDE_1, SIDE_2, MOVED, TRACK_SIZE = range(6)  # remembered of a comp
 
 
 def expected(rows: Ints2, at: int, i: int, predictor: int) -> int:
-    """A coefficient from those of the same component before it, by one of the four predictors."""
+    """Predict a coefficient from earlier ones of its component, by one of the four predictors."""
     step = rows[at - 1, i] - rows[at - 2, i] if at > 1 else 0
     if predictor == 0:
         return int(rows[at - 1, i])

@@ -64,7 +64,7 @@ PRESETS: dict[str, Settings] = {
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+    """Encode the values of ``source`` with unwrapped rotations; invalid values are interpolated.
 
     Raises MotionError for a value that is not finite, or is too large.
     """

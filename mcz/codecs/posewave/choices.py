@@ -125,7 +125,7 @@ def choose(source: SignalSource, params: Params) -> Choice:
 def _contacts(
     source: SignalSource, params: Params, in_cm: float
 ) -> tuple[list[ContactsFields], ContactTracker | None]:
-    """The header's field, and what is to be kept; ``in_cm``: length units a centimeter."""
+    """Choose the contacts and their tracker; ``in_cm``: length units per centimeter."""
     if not params.get("contacts") or not source.layout.n_frames:
         return [], None
     if params.get("lossless"):
@@ -303,7 +303,7 @@ def best_levels(
         return min(tried)
     values = FrameReader(NAME, source).next(n_frames)
     orders = Orders({order.joint: order.code for order in fields["orders"]}, skeleton)
-    coded = orders.coded(values)
+    coded = orders.to_coded_order(values)
     no_notes = np.zeros((-(-n_frames // SAMPLED), len(orders.places), N_NOTES), np.int64)
 
     def score(levels: int) -> float:

@@ -69,7 +69,7 @@ def set_shifts(
 
 
 def _lean(end: int, f: int, share: float, shifts: Floats2, active: Ints) -> None:
-    """Shift a frame in no contact by a share of what one at the end of a contact is shifted by."""
+    """Shift a frame outside contacts by a share of the shift at the nearest contact."""
     active[f] = LEANING
     for i in range(3):
         shifts[f, i] += share * shifts[end, i]
@@ -196,7 +196,7 @@ def _note_pulls(
 
 
 def _solve(pulls: Floats2, wanted: Floats, square: Floats2, pivots: Floats, n: int) -> None:
-    """Make ``wanted`` the solution of (pulls pulls' + damping) x = wanted, by L D L'."""
+    """Solve (pulls pulls' + damping) x = wanted by L D L'; ``wanted`` is overwritten."""
     trace = 0.0
     for i in range(n):
         for k in range(i + 1):

@@ -128,7 +128,7 @@ def path_of(parents: Sequence[int] | Ints, joint: int) -> list[int]:
 
 
 def make_held_points(contacts: Contacts, plan: Plan, columns: Ints, greatest: Floats) -> HeldPoints:
-    """The points on a plan; ``columns`` and ``greatest`` steps are those of the kept channels."""
+    """Build the held points on a plan; ``columns`` and ``greatest`` steps of the kept channels."""
     paths = [path_of(plan.parents, joint) for joint in contacts.joints]
     moving = plan.joints != PLAIN
     chains = [np.flatnonzero(moving & np.isin(plan.joints, path)) for path in paths]

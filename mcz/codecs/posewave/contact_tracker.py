@@ -91,7 +91,7 @@ class ContactTracker:
         self.outcomes = [done for done in self.outcomes if done.piece.first < self.first]
         pieces = self._within(len(values))
         corrections = Corrections(contacts, plan, held, values.copy())
-        targets = corrections.placed(source)
+        targets = corrections.positions_of(source)
         self._choose_shifts(corrections, pieces, targets)
         radii = np.full(targets.shape[:2], (1.0 - 2 * SLACK) * self.tolerance)
         aims = np.zeros(targets.shape)
@@ -194,7 +194,7 @@ class ContactTracker:
         self, corrections: Corrections, pieces: Sequence[Piece], targets: Floats
     ) -> list[Outcome]:
         """Error of each piece against the position in which its contact began."""
-        places = corrections.placed(corrections.values)
+        places = corrections.positions_of(corrections.values)
         outcomes = []
         for piece in pieces:
             rows = slice(piece.first, piece.stop)

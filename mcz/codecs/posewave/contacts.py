@@ -121,14 +121,14 @@ class Corrections:
     def __init__(self, contacts: Contacts, plan: Plan, held: HeldPoints, values: Floats) -> None:
         self.contacts, self.plan, self.held, self.values = contacts, plan, held, values
         self.lanes = _kernels().lanes_of(plan, 1)
-        self.places = self.placed(values)
+        self.places = self.positions_of(values)
         self.stands = np.zeros(self.places.shape[:2], np.int64)
         self.starts = np.zeros(self.places.shape, np.int64)
         self.moves = np.zeros(self.places.shape, np.int64)
         self.shifts = np.zeros(self.places.shape)
         self.active = np.zeros_like(self.stands)
 
-    def placed(self, values: Floats) -> Floats:
+    def positions_of(self, values: Floats) -> Floats:
         """Positions of the points in frames ``values``, (n_points, n_frames, 3)."""
         positions = np.empty((len(self.contacts.joints), len(values), 3))
         _kernels().place_points(self.plan, self.held, self.lanes, values, positions)

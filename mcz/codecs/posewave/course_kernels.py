@@ -55,7 +55,7 @@ def course_of(still: Floats, kept: Ints, greatest: Floats) -> Course:
 
 
 def continue_course(course: Course, difference: Floats) -> None:
-    """The next row is ``difference`` (n_kept,) away from what was expected."""
+    """Advance by a row that is ``difference`` (n_kept,) away from the expected one."""
     n_rows = course.n_rows[0]
     for k in range(len(course.kept)):
         c = course.kept[k]

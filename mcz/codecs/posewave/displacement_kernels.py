@@ -204,7 +204,7 @@ def _note_features(
     first: int,
     t: int,
 ) -> None:
-    """The last three moves, those of the decoded point around, and how far it is to be moved.
+    """Note the last three moves, those of the decoded point around them, and the distance left.
 
     ``places[f + 1]`` is where it is in frame f.
     """
@@ -277,7 +277,7 @@ def _solve(squares: Floats2, products: Floats, solution: Floats, scratch: Floats
 
 
 def _choose(learner: Learner, before: Ints, wanted: Floats, radius: float, chosen: Ints) -> None:
-    """The displacement near ``wanted`` that the expected one makes cheapest."""
+    """Choose the cheapest displacement near ``wanted``, given the expected one."""
     best = -1.0
     for place in range(54):
         odd = place // 27

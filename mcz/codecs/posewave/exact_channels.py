@@ -113,7 +113,7 @@ def build_exact(source: SignalSource, groups: Sequence[int], first: int, stop: i
 def decode_exact(
     layout: Layout, spans: Sequence[Span], request: Request, stream: Stream, where: str
 ) -> Ints:
-    """The ordinals of the groups of ``request``, all exact, whatever its resolution."""
+    """Decode the ordinals of exact groups, at any resolution."""
 
     @cache
     def shape(group: int) -> Shape:

@@ -37,7 +37,7 @@ def kernels() -> ModuleType:
 
 
 def midpoints(approx: Floats, n_rows: int) -> Floats:
-    """The poses halfway from each approximation to the next: those of the details."""
+    """Midpoints of consecutive approximations: the poses of the details."""
     after = np.concatenate([approx[1:], approx[-1:]])
     middle: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5  # PWAVE-22
     return middle
@@ -64,7 +64,7 @@ class LevelCoder:
         self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
 
     def copy(self) -> LevelCoder:
-        """One that goes on by itself."""
+        """Return an independent copy."""
         clone = copy(self)
         clone.course = deepcopy(self.course)
         return clone
@@ -75,16 +75,16 @@ class LevelCoder:
         values[:, self.kept] = self.approx
         return values
 
-    def held(self, contacts: Contacts) -> HeldPoints:
-        """The points of contacts, as they hang from the kept channels."""
+    def held_points(self, contacts: Contacts) -> HeldPoints:
+        """Held points of the contacts, with the kept channels that move them."""
         greatest = self.header.greatest[self.kept]
         return make_held_points(contacts, self.usual.plan, self.kept, greatest)
 
     def _metric_of(self, level: int) -> Metric:
-        """Metric of a level; coarse ones are stiffer, as their poses say less of frames between."""
+        """Metric of a level; coarse ones are stiffer, for their poses say less of the frames."""
         if not self.header.spread:
             return self.usual
-        return self.usual.stiffened(self.pyramid.root(level))  # PWAVE-21, PWAVE-22
+        return self.usual.with_stiffness(self.pyramid.root(level))  # PWAVE-21, PWAVE-22
 
     def steps(self, level: int, exponents: Ints) -> Floats:
         """The step of each row, (n_rows, 1)."""
@@ -92,13 +92,13 @@ class LevelCoder:
         return self.header.step / self.pyramid.root(level) * halved[:, None]
 
     def code_coarsest(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
-        """Level 0, a row at a time: ``code`` gives what a decoder will have of it."""
+        """Encode level 0, a row at a time; ``code`` returns the decoded row."""
         course, steps = self.course, self.steps(level, exponents)
         factor = self.metric.empty()
         self.approx = np.empty((len(rows), len(self.kept)))
         for m, row in enumerate(rows):
             kernels().next_factor(self.metric.plan, self.lanes, course, factor)
-            wanted = self.metric.into(factor, (row - course.expected)[None]) / steps[m]
+            wanted = self.metric.to_metric(factor, (row - course.expected)[None]) / steps[m]
             kernels().take_row(self.metric.plan, course, factor, code(m, wanted) * steps[m])
             self.approx[m] = course.pose[0, self.kept]
 
@@ -109,9 +109,9 @@ class LevelCoder:
         kernels().take_rows(self.metric.plan, self.lanes, self.course, scaled, self.approx)
 
     def code_details(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
-        """A level of details, all rows at once: ``code`` gives what a decoder will have."""
+        """Encode a level of details, all rows at once; ``code`` returns the decoded rows."""
         which = self._poses_of(level)
-        wanted = self._through(self.metric.into, which, rows) / self.steps(level, exponents)
+        wanted = self._map_rows(self.metric.to_metric, which, rows) / self.steps(level, exponents)
         self._add(level, which, code(0, wanted), exponents)
 
     def take_details(self, level: int, rows: Floats, exponents: Ints) -> None:
@@ -137,10 +137,10 @@ class LevelCoder:
         live = np.flatnonzero(rows.any(axis=1)) if rows.size else np.zeros(0, np.int64)
         detail = np.zeros(rows.shape)
         scaled = rows[live] * self.steps(level, exponents)[live]
-        detail[live] = self._through(self.metric.out_of, which[live], scaled)
+        detail[live] = self._map_rows(self.metric.from_metric, which[live], scaled)
         self.approx = lifting.join(self.approx, detail)
 
-    def _through(self, way: Any, which: Ints, rows: Floats) -> Floats:
+    def _map_rows(self, way: Any, which: Ints, rows: Floats) -> Floats:
         """Rows one way through the metric, each at the pose of number ``which``."""
         mapped = np.empty_like(rows)
         n_rows = min(max(BLOCK_ENTRIES // max(1, self.metric.plan.n_entries), 8), 512)

@@ -31,7 +31,7 @@ NEEDS_ALL = ("quality", "lossless", "contacts")
 
 
 class LiveEncoder(contract.LiveEncoder):
-    """One frame a push: from time to time a fresh segment, else one that goes on.
+    """Encode one frame per push, periodically a fresh segment, else a continuation.
 
     With a preset each frame is coded with finer and finer steps until no point of it is farther off
     than the preset promises. A frame that is refused leaves no trace.

@@ -59,8 +59,8 @@ class Metric:
             whole=header.whole,
         )._replace(spread=header.spread)
 
-    def stiffened(self, factor: float) -> Metric:
-        """The metric with ``factor`` times what is added to the diagonal by the greatest steps."""
+    def with_stiffness(self, factor: float) -> Metric:
+        """Copy with ``factor`` times the diagonal terms of the greatest steps."""
         clone = copy(self)
         stiffer = bounded_regularization(self.regularization * factor)
         clone.plan = self.plan._replace(regularization=stiffer)
@@ -77,12 +77,12 @@ class Metric:
         """Room for the factor of a single pose."""
         return np.empty((1, self.plan.n_entries))
 
-    def into(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
+    def to_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """Differences of values, (n_rows, n_kept), in the metric, each at the pose ``which``."""
         coordinates: Floats = apply_kernels().into_metric(self.plan, factors, rows, which)
         return coordinates
 
-    def out_of(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
+    def from_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """The inverse of ``into``."""
         channels: Floats = apply_kernels().out_of_metric(self.plan, factors, rows, which)
         return channels

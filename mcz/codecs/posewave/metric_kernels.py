@@ -79,7 +79,7 @@ def factor_rows(
 def _measure(
     plan: Plan, motions: Floats3, inertia: Floats3, force: Floats2, entries: Floats2, lanes: int
 ) -> None:
-    """The entries of the metric G: what the force that moves one channel does along another."""
+    """Compute the entries of the metric G: the work of one channel's motion along another."""
     for number in range(len(plan.joints)):
         start, stop, joint = plan.starts[number], plan.starts[number + 1], plan.joints[number]
         if joint == PLAIN:
@@ -189,7 +189,7 @@ def _take_pivot(
 def _subtract(
     entries: Floats2, top: int, i: int, own: Floats2, shares: Floats2, lanes: int
 ) -> None:
-    """Take off the row of channel i of a path, which starts at ``top``, what is ``row``'s."""
+    """Subtract the share of ``row`` from the row at ``top``, of channel i of a path."""
     for k in range(i + 1):
         for p in range(lanes):
             entries[top + k, p] -= shares[i, p] * own[k, p]

@@ -44,7 +44,7 @@ N_MIXER_WEIGHTS = mixing.MODELS - mixing.WEIGHTS
 
 
 class Start(NamedTuple):
-    """A start table: what is known before a clip, of channels by their class.
+    """A start table: initial statistics of channels by class.
 
     ``shared`` and ``own`` are slots, the latter (classes, slots); ``small`` the mixers and contexts
     of ``coder``, those of a segment's head too; ``weights`` (sets, slots, inputs) and
@@ -66,14 +66,14 @@ class Start(NamedTuple):
 
 @cache
 def start_tables() -> tuple[Start, ...]:
-    """The start tables of the annex; nobody writes to them."""
+    """The start tables of the annex, read-only."""
     document = json.loads(annex_bytes("posewave_start.json"))
     counts = np.array(document["counts"], np.int64)
     return tuple(start_of(table, counts) for table in document["sets"])
 
 
 def start_of(table: Params, counts: Ints) -> Start:
-    """A start table as arrays; ``counts`` (16,) are what its digits of counts stand for."""
+    """Convert a start table to arrays; ``counts`` (16,) are the values of its digits of counts."""
     slots = _bytes(table["probabilities"]) * 65536 + 32768 + counts[_digits(table["counts"])]
     own = slots[N_SHARED * N_SLOTS :].reshape(-1, N_OWN * N_SLOTS)
     mixers = np.zeros(N_MIXER_WEIGHTS, np.int64)

@@ -1,4 +1,4 @@
-"""Compiled: rows of quantized wavelet coefficients, coded with what rows around them tell.
+"""Compiled: rows of quantized wavelet coefficients, coded in the context of other rows.
 
 SPEC.md, "Rows in the metric", is normative and has the steps below in the same order. One
 function serves encoder and decoder; what only an encoder does is choosing. Imported on first use
@@ -147,7 +147,7 @@ def code_rows(
 
 
 def code_exponent(coder: Ints, data: Bytes, exponent: int, earlier: int) -> int:
-    """Code by how many octaves a row is finer; ``earlier`` is that of the row before."""
+    """Code the refinement of a row in octaves; ``earlier``: that of the row before."""
     at, found = C_EXPONENT + MAX_EXPONENT * earlier, 0
     while found < MAX_EXPONENT:
         if adaptive(coder, data, 1 if exponent > found else 0, at + found) == 0:
@@ -241,7 +241,7 @@ def code_row(
     exponent: int,
     trial: bool,
 ) -> float:
-    """Code a row that is live; return what it costs an encoder that chooses, or FAULTY.
+    """Code a live row; return its cost to an encoder that chooses, or FAULTY.
 
     A ``trial`` chooses and learns nothing. What is remembered is in steps of the level, of which
     one is 2^``exponent`` of the row's own.

@@ -47,7 +47,7 @@ def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int,
         values = np.clip(values, -GREATEST, GREATEST)
         for code in range(1 + N_ORDERS):
             codes = dict.fromkeys(joints, code) if code != KEPT else {}
-            coded = Orders(codes, skeleton).coded(values)[:, columns]
+            coded = Orders(codes, skeleton).to_coded_order(values)[:, columns]
             scores[code] += np.sqrt(np.abs(np.diff(coded, 2, axis=0))).sum(axis=(0, 2))
     full = Orders({}, skeleton).full
     moves = (scores[KEPT] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)

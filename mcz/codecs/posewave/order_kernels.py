@@ -23,7 +23,7 @@ LATE = 0.75  # of a turn: so far from the source an encoder tells a turn
 
 @kernel
 def reorder_axes(angles: Floats2, given: Ints, wanted: Ints, rule: Rule) -> None:
-    """Angles of the sequence ``given`` to those of ``wanted``, in place: the first solution."""
+    """Convert angles from sequence ``given`` to ``wanted``, in place: the first solution."""
     m = np.empty(9)
     i, j, k = wanted[0], wanted[1], wanted[2]
     e = 1.0 if (j - i + 3) % 3 == 1 else -1.0
@@ -63,7 +63,7 @@ def angle_distance(step: float, full: float) -> float:
 
 
 def other_solution(value: float, p: int, half: float) -> float:
-    """The p-th angle of the second solution from that of the first, and the other way round."""
+    """Return the p-th angle of the other solution."""
     return half - value if p == 1 else value + half
 
 
@@ -79,7 +79,7 @@ def is_nearer(row: Floats, before: Floats, sequence: Ints, full: float) -> bool:
 
 @kernel
 def follow_angles(angles: Floats2, sequence: Ints, full: float, notes: IntColumns) -> None:
-    """First solutions to angles that go on from row to row, in place."""
+    """Make first solutions continuous from row to row, in place."""
     before, last, turns = np.zeros(3), np.zeros(3), np.zeros(3)
     second = False
     for f in range(len(angles)):

@@ -91,7 +91,7 @@ class Orders:
         self.full = FULL_TURN.get(skeleton.angle_unit, 0.0)
         self.places = [_reordered_joint(skeleton, joint, code) for joint, code in codes.items()]
 
-    def coded(self, values: Floats) -> Floats:
+    def to_coded_order(self, values: Floats) -> Floats:
         """``values`` of the source, (n_frames, n_channels), as they are coded."""
         if not self.places:
             return values
@@ -99,39 +99,41 @@ class Orders:
         for place in self.places:
             if not (np.abs(values[:, place.columns]) < BEYOND).all():
                 raise MotionError("posewave: an angle of 2^40 or more in another order of axes")
-            angles = self._turned(values, place, place.own, place.coded)
+            angles = self._reorder_axes(values, place, place.own, place.coded)
             kernels().follow_angles(angles, place.coded, self.full, nothing)
             coded[:, place.columns] = angles
         return coded
 
     def notes_and_values(self, source: Floats, coded: Floats) -> tuple[bytes, Floats]:
-        """Notes for a decoder beside ``coded`` values, and the values that it restores."""
+        """Notes for a decoder beside ``to_coded_order`` values, and the values that it restores."""
         if not self.places:
             return b"", coded
         notes = np.zeros((len(coded), len(self.places), N_NOTES), np.int64)
         for index, place in enumerate(self.places):
-            angles = self._turned(coded, place, place.coded, place.own)
+            angles = self._reorder_axes(coded, place, place.coded, place.own)
             given, own = source[:, place.columns], notes[:, index]
             kernels().choose_switches(angles, given, place.own, self.full, PRICE * self.full, own)
             kernels().follow_angles(angles, place.own, self.full, own)
             kernels().choose_turns(angles, given, self.full, own)
         return _build_notes(notes), self.values(coded, notes)
 
-    def take_notes(self, stream: bytes, n_frames: int, where: str) -> tuple[Ints, bytes]:
+    def read_notes(self, stream: bytes, n_frames: int, where: str) -> tuple[Ints, bytes]:
         """The notes, (n_frames, n_places, 4), that a stream begins with, and the rest of it."""
         notes = np.zeros((n_frames, len(self.places), N_NOTES), np.int64)
         return (notes, _read_notes(stream, notes, where)) if self.places else (notes, stream)
 
     def values(self, coded: Floats, notes: Ints) -> Floats:
-        """The source's values, by what ``take_notes`` found."""
+        """Restore the source's values by the notes of ``read_notes``."""
         values = coded.copy() if self.places else coded
         for index, place in enumerate(self.places):
-            angles = self._turned(coded, place, place.coded, place.own)
+            angles = self._reorder_axes(coded, place, place.coded, place.own)
             kernels().follow_angles(angles, place.own, self.full, notes[:, index])
             values[:, place.columns] = angles
         return values
 
-    def _turned(self, values: Floats, place: ReorderedJoint, given: Ints, wanted: Ints) -> Floats:
+    def _reorder_axes(
+        self, values: Floats, place: ReorderedJoint, given: Ints, wanted: Ints
+    ) -> Floats:
         angles = np.ascontiguousarray(values[:, place.columns])
         kernels().reorder_axes(angles, given, wanted, self.rule)
         return angles

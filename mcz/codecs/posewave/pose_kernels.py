@@ -154,7 +154,7 @@ def _turn(plan: Plan, joint: int, batch: Lanes, lanes: int) -> None:
 
 
 def _turn_about(plan: Plan, turn: int, batch: Lanes, origin: Floats2, lanes: int) -> None:
-    """Turn a joint's axes about one of them, and note what the channel does."""
+    """Turn a joint's axes about one of them, and note the channel's effect."""
     sines, cosines = batch.sines, batch.cosines
     own, motions = batch.scratch, batch.motions
     axis, number = plan.turns[turn, 0], plan.turns[turn, 2]

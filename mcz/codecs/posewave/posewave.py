@@ -72,7 +72,7 @@ def promise(options: Params) -> Settings:
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+    """Encode the values of ``source`` with unwrapped rotations; invalid values are interpolated.
 
     Raises MotionError for a value that is not finite or too large.
     """

@@ -1,4 +1,4 @@
-"""Compiled: what the coefficients of a row are likely to be, in binary64 in a fixed order.
+"""Compiled: predictions of the coefficients of a row, in binary64 in a fixed order.
 
 SPEC.md, "Rows in the metric", is normative and has the steps below in the same order. Loops run
 along the channels, item by item, so that they are as quick as the machine's vectors and still have
@@ -27,7 +27,7 @@ TAP_MEMORY, TAP_RATE, MOST_TAP = 0.98, 0.012, 2.0
 
 
 def predict_in_time(model: Model, here: Floats2, parent: Floats2, level: int, row: int) -> None:
-    """Fill ``timely``: what rows before, and those of the coarser level, say of the values."""
+    """Fill ``timely`` with predictions from earlier rows and the coarser level."""
     timely, sources = model.timely, model.sources
     width, last = len(timely), len(parent) - 1
     up = min(row >> 1, last)
@@ -80,7 +80,7 @@ def total_of(values: Floats) -> float:
 
 
 def spread(means: Floats, column: Floats, miss: float) -> None:
-    """Add to the means of later channels of a block what the miss of one says of them.
+    """Propagate the error of one channel to the means of later channels of a block.
 
     As in ``take_in``, what comes out for earlier channels is never used: without ends that move the
     loop is quicker.
@@ -90,7 +90,7 @@ def spread(means: Floats, column: Floats, miss: float) -> None:
 
 
 def take_in(columns: Floats2, variances: Floats, rest: Floats, size: int, share: float) -> None:
-    """Add what was missed in time, ``rest``, to L D L', of which ``columns`` has the columns of L.
+    """Add the temporal error ``rest`` to L D L'; ``columns`` has the columns of L.
 
     One step of Bennett's update for each channel. ``rest`` is used up.
     """

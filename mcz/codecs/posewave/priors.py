@@ -41,7 +41,7 @@ class Prior(NamedTuple):
 
 @cache
 def priors() -> tuple[Prior, ...]:
-    """The priors of the annex; nobody writes to them."""
+    """The priors of the annex, read-only."""
     return tuple(
         _read("".join(table["lower"]), table["variances"]) for table in _document()["priors"]
     )

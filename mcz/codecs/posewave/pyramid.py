@@ -1,4 +1,4 @@
-"""The levels of a segment of ``posewave``: how many rows each has, when they are, what they weigh.
+"""The levels of a ``posewave`` segment: their rows, times and weights.
 
 SPEC.md, "Codec 3: posewave", is normative.
 """
@@ -37,7 +37,7 @@ class Pyramid:
         return lengths[-1] if level == 0 else lengths[depth - 1] // 2
 
     def root(self, level: int) -> float:
-        """The root of how many frames a coefficient bears on: what makes all weigh alike."""
+        """Root of the number of frames a coefficient affects, which weights all levels equally."""
         octaves = self.depth(level) - (level > 0)
         return float(2 ** (octaves // 2)) * (ROOT_2 if octaves % 2 else 1.0)
 

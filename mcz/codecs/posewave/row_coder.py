@@ -1,4 +1,4 @@
-"""Streams of rows: one a level, of which a decoder needs those of all coarser levels.
+"""Streams of rows, one per level; decoding a level needs all coarser ones.
 
 SPEC.md, "Codec 3: posewave", is normative.
 """
@@ -110,13 +110,13 @@ class RowCoder:
         self.before = [nothing, nothing]  # the two levels of details before, the coarser one last
 
     def copy(self) -> RowCoder:
-        """One that learns by itself, before it begins or goes on."""
+        """Return an independent copy, between two streams."""
         clone = copy(self)
         clone.model = deepcopy(self.model)
         return clone
 
     def begin(self, level: int, kind: int, n_rows: int, stream: Stream) -> None:
-        """A level, whose ``kind`` says how large its coefficients are on the whole."""
+        """Begin a level; ``kind`` selects the usual size of its coefficients."""
         if level > 1:
             self.before = [self.here[3:], self.before[0]]
         self.kind, self.stream = kind, stream

@@ -66,14 +66,14 @@ def encode_segment(
     refinement: Ints | None = None,
     contacts: ContactTracker | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
-    """The streams of a segment of unwrapped ``values``, and what a decoder will have of them.
+    """Encode a segment of unwrapped ``values``; return its streams and the decoded values.
 
     Both are (n_frames, n_channels). ``refinement`` (n_frames,) asks for steps of 2^-r of the
     usual ones where rows bear on these frames, ``contacts`` has what is to keep its place. Exact
     channels are of no account in what is found. Raises MotionError for values that are too large.
     """
     orders = Orders(header.orders, skeleton)
-    coded = orders.coded(values)
+    coded = orders.to_coded_order(values)
     streams, decoded = encode_coded(header, skeleton, coded, weights, refinement, contacts)
     notes, decoded = orders.notes_and_values(values, decoded)
     return (notes + streams[0], *streams[1:]), decoded
@@ -116,7 +116,7 @@ def encode_coded(
             streams.append(stream.finish())
     decoded = walk.values()
     if header.contacts and kept.any():
-        held = walk.held(header.contacts)
+        held = walk.held_points(header.contacts)
         (contacts or ContactTracker()).encode(
             header.contacts, walk.usual.plan, held, stream, values, decoded
         )
@@ -142,7 +142,7 @@ def decode_segment(
     if any(streams[1 : 1 + n_empty]):  # PWAVE-17
         raise FormatError(f"a stream of a level that {n_frames} frames have not", where=where)
     orders = Orders(header.orders, skeleton)
-    notes, coarsest = orders.take_notes(streams[0], n_frames, where)
+    notes, coarsest = orders.read_notes(streams[0], n_frames, where)
     streams = [coarsest, *streams[1 + n_empty :]]
     classes = classes_of(skeleton, header.whole)
     coder = fresh_coder(header.start)
@@ -152,7 +152,7 @@ def decode_segment(
     head = Head(moving == 1, numbers)
     kept = head.kept(header)
     walk = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
-    held = walk.held(header.contacts) if header.contacts and kept.any() else None  # HOLD-07
+    held = walk.held_points(header.contacts) if header.contacts and kept.any() else None  # HOLD-07
     rows = RowCoder(header, classes, kept, coder, where)
     for level in range(pyramid.n_details + 1):
         if level >= len(streams):

@@ -1,4 +1,4 @@
-"""Segments without levels, each of which may go on where the one before it ended.
+"""Segments without levels, each of which may continue the state of the one before.
 
 SPEC.md, "Codec 3: posewave", "Segments that go on", is normative.
 """
@@ -32,7 +32,7 @@ class SegmentChain:
         self._rows: RowCoder | None = None
 
     def copy(self) -> SegmentChain:
-        """One that goes on by itself."""
+        """Return an independent copy."""
         clone = copy(self)
         if self._walk is not None and self._rows is not None:
             clone._walk, clone._rows = self._walk.copy(), self._rows.copy()
@@ -57,7 +57,7 @@ class SegmentChain:
     def encode(
         self, values: Floats, weight: float, exponent: int, *, fresh: bool
     ) -> tuple[bytes, Floats]:
-        """The stream of a segment of unwrapped ``values``, and what a decoder will have of them.
+        """Encode a segment of unwrapped ``values``; return its stream and the decoded values.
 
         Both are (n_frames, n_channels). A bit costs ``weight`` squared steps; the step is
         2^-``exponent`` of the usual one. Raises MotionError for values that are too large.

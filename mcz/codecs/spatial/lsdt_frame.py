@@ -1,4 +1,4 @@
-"""Codec 19, ``lsdt-frame``: what each frame adds to the one before, in a learned basis.
+"""Codec 19, ``lsdt-frame``: frame differences in a learned basis.
 
 SPEC.md, "Codec 19: lsdt-frame", is normative; the names below are its field names.
 Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using
@@ -89,7 +89,7 @@ PRESETS: dict[str, Settings] = {
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the values of ``source``; what is invalid is filled.
+    """Encode the values of ``source``; invalid values are interpolated.
 
     Raises MotionError for a value that is not finite, or is too large.
     """
@@ -188,7 +188,7 @@ def _kernels() -> ModuleType:
 
 
 class _Coder:
-    """Encoder or decoder with what it remembers of the frames before.
+    """Encoder and decoder state across frames.
 
     Raises FormatError for a bad header.
     """

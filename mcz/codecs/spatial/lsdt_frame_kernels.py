@@ -1,4 +1,4 @@
-"""Compiled: frames one after the other, each as what it adds to the one before.
+"""Compiled: frames as differences from the frame before.
 
 SPEC.md, "Codec 19: lsdt-frame", is normative. One function serves encoder and decoder. Imported on
 first use only.
@@ -67,7 +67,7 @@ def quantize_frames(
     analysis: Floats2,
     threshold: float,
 ) -> int:
-    """Fill ``indices`` (frames, n_rows) with what makes ``frames`` of the frames before them.
+    """Fill ``indices`` (frames, n_rows) with the quantized differences of ``frames``.
 
     Otherwise as ``add_frames``; ``analysis`` (n_rows, n_points) makes coefficients of points.
     Returns the frame of a coefficient that is too large, or -1.

@@ -28,7 +28,7 @@ PRESETS: dict[str, Settings] = {
 
 
 def encode(source: SignalSource, params: Params) -> Encoded:
-    """Code the values of ``source``; what is invalid is filled.
+    """Encode the values of ``source``; invalid values are interpolated.
 
     Raises MotionError for a value that is not finite, or is too large.
     """

@@ -92,7 +92,7 @@ class WindowOptions:
 
 
 def window_options(params: Params, chosen: Params, step: float) -> WindowOptions:
-    """The parameters, those on which a preset has a say among ``chosen``."""
+    """Convert parameters to options; ``chosen`` has those that a preset sets."""
     return WindowOptions(
         step,
         chosen["window"],
@@ -105,7 +105,7 @@ def window_options(params: Params, chosen: Params, step: float) -> WindowOptions
 
 
 class Windows:
-    """A signal window by window, as often as wanted, in units of the channels' weights."""
+    """A signal window by window, repeatable, in units of the channels' weights."""
 
     def __init__(
         self, name: str, source: SignalSource, sample: Sample, asked: WindowOptions
@@ -119,7 +119,7 @@ class Windows:
             self.weights = np.array([ratio_of(code) for code in sample.codes])
 
     def __iter__(self) -> Iterator[Floats]:
-        """Each (frames, n_channels); raises MotionError for what cannot be coded."""
+        """Yield blocks (frames, n_channels); raises MotionError for values that cannot be coded."""
         reader = FrameReader(self.name, self.source)
         for start in range(0, self.n_frames, self.window):
             with np.errstate(over="ignore"):
@@ -260,7 +260,7 @@ def _bases(
 
 
 def _rounded(vectors: Floats, energies: Floats, step: float) -> Basis:
-    """Entries of so many digits that rounding them costs about what a digit more would."""
+    """Round entries to the digits where a further digit would cost as much as it gains."""
     least = math.ceil(math.log2(vectors.shape[1]) / 2) + 1  # or a vector is rounded away
     sizes = np.sqrt(energies) / step
     digits = np.ceil(np.log2(np.maximum(sizes, 1.0)) - LESS_DIGITS)

@@ -83,7 +83,7 @@ def temporal_of(space: Space, fields: WindowsHeader, n_frames: int) -> Floats:
 
 
 def encode(name: str, source: SignalSource, plan: Plan) -> Encoded:
-    """Code the values of ``source``; raises MotionError for what cannot be coded."""
+    """Encode the values of ``source``; raises MotionError for values that cannot be coded."""
     fields = WindowsHeader(
         window=plan.window, n_frequencies=plan.n_frequencies, space=plan.space, code=NO_CODES
     )
@@ -193,7 +193,7 @@ def uses(header: bytes) -> tuple[bytes, ...]:
 
 
 def space_of_windows(fields: WindowsHeader, layout: Layout) -> Space:
-    """The Space of a header, its courses those of a whole window."""
+    """Space of a header, with courses over a whole window."""
     from mcz.codecs.spatial.window_kernels import synthesize_courses
 
     space = space_of(NAME, fields.space, layout)

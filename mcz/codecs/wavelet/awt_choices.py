@@ -120,7 +120,7 @@ def choose(
 
 
 def quantizer_of(choice: Choice, weights: Floats, decimals: int | None) -> Quantizer:
-    """The quantizer that tells apart what is kept and what is not.
+    """Quantizer that separates kept from dropped coefficients.
 
     Without ``decimals`` thresholds are as nearly proportional to ``weights`` as they can be.
     """

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class _FixedQuantizer(Quantizer):
-    """A quantizer whose least magnitude of a detail is that of the header."""
+    """A quantizer with the header's least magnitude of details."""
 
     held: int = 1
 

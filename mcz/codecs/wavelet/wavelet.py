@@ -116,7 +116,7 @@ def transform_of(
 
 
 def encode(source: SignalSource, plan: Plan) -> Encoded:
-    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+    """Encode the values of ``source`` with unwrapped rotations; invalid values are interpolated.
 
     Raises MotionError for a value that is not finite.
     """

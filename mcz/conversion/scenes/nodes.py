@@ -253,8 +253,8 @@ class _Placed:
             return arm
         link = self.chain.links[holder]
         if tail >= 0:
-            arm = self.chain.lengthened(link, arm, columns)
-        arm = self.chain.scaled(link, arm, columns)
+            arm = self.chain.apply_lengths(link, arm, columns)
+        arm = self.chain.apply_scales(link, arm, columns)
         own = self.chain.turned[holder]
         return arm if own is None else multiply_matrices(own[:, :, None], arm[:, None])[:, 0]
 

@@ -126,7 +126,7 @@ class _Placed:
             own = self.chain.turned[index]
             axes = np.eye(3)[:, :, None] if own is None else own[:, :, None]
             with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                axes = self.chain.turned_by(self.links[index], axes, columns, [])
+                axes = self.chain.apply_turns(self.links[index], axes, columns, [])
             turned = axes if own is None else multiply_matrices(axes, own.T[:, :, None])
             out[rows] = to_quaternions(np.moveaxis(turned, 2, 0))
         for (index, tail), out in self.shifts.items():
@@ -140,8 +140,8 @@ class _Placed:
             return arm
         link = self.links[holder]
         if tail >= 0:
-            arm = self.chain.lengthened(link, arm, columns)
-        arm = self.chain.scaled(link, arm, columns)
+            arm = self.chain.apply_lengths(link, arm, columns)
+        arm = self.chain.apply_scales(link, arm, columns)
         own = self.chain.turned[holder]
         return arm if own is None else multiply_matrices(own[:, :, None], arm[:, None])[:, 0]
 
