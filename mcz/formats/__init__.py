@@ -32,6 +32,7 @@ __all__ = [
 ]
 
 HEAD_BYTES = 2**20
+_ASF_SECTION = re.compile(rb"(?m)^[ \t]*:(bonedata|hierarchy)\b")
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,16 +226,22 @@ def likely_formats(data: bytes) -> tuple[str, ...]:
         return ("c3d",)
     if re.match(rb"PATHFILETYPE[ \t]", start):
         return ("trc",)
-    if re.search(rb"(?im)^[ \t]*endheader[ \t]*\r?$", head):
+    small = head.lower()
+    if _has_any(small, b"endheader") and re.search(rb"(?m)^[ \t]*endheader[ \t]*\r?$", small):
         return ("sto", "mot")
-    if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", head):
+    if _has_any(small, b":bonedata", b":hierarchy") and re.search(_ASF_SECTION, small):
         return ("asf",)
-    kind: str | None = _of("csv_files", "kind_of")(head)
-    if kind in ("motive", "vicon"):
-        return (kind,)
+    vendor: str | None = _of("csv_files", "vendor_of")(head)
+    if vendor is not None:
+        return (vendor,)
     if _of("amc", "is_amc")(head):
         return ("amc",)
-    return () if kind is None else (kind,)
+    return () if _of("csv_files", "kind_of")(head) is None else ("csv",)
+
+
+def _has_any(text: bytes, *words: bytes) -> bool:
+    """Look for words, far quicker than an expression anchored to lines."""
+    return any(word in text for word in words)
 
 
 def recording_of(source: Source | None) -> Any:

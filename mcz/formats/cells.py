@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
+from mcz.kernels import SPARE
 from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind, print_values, scan
 from mcz.types import Values
@@ -45,7 +46,7 @@ class Cells:
             self._append(texts.buffer)
 
     def texts(self) -> Bytes:
-        texts = np.concatenate([*self._pieces, np.zeros(1, np.uint8)])
+        texts = np.concatenate([*self._pieces, np.zeros(SPARE, np.uint8)])
         texts.flags.writeable = False  # nobody writes to it
         return texts
 

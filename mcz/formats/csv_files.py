@@ -36,13 +36,16 @@ _RETURN = re.compile(rb"\r(?=[^\r\n])")
 
 
 def kind_of(data: bytes) -> str | None:
-    """ "motive", "vicon" or "csv"; None for what has no row of numbers near its start."""
+    """Return "motive", "vicon" or "csv"; None for a file with no row of numbers near its start."""
+    return vendor_of(data) or ("csv" if first_row(_lines(data)) else None)
+
+
+def vendor_of(data: bytes) -> str | None:
+    """Return "motive" or "vicon" for a file with the header of that vendor, else None."""
     start = data[:SNIFFED]
     if HEAD.match(start.removeprefix(BOM)):
         return "motive"
-    if AXIS.search(start):
-        return "vicon"
-    return "csv" if first_row(_lines(data)) else None
+    return "vicon" if AXIS.search(start) else None
 
 
 def is_motion(data: bytes) -> bool:

@@ -53,7 +53,7 @@ def whole_cells(lines: Sequence[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
         if n_joined:
             n_joined -= 1
             continue
-        if _OPEN.search(line.rstrip(b"\r\n")):
+        if b'"' in line and _OPEN.search(line.rstrip(b"\r\n")):
             below = [text for _, text in lines[number + 1 : number + MOST_LINES]]
             n_joined = next((k for k, text in enumerate(below, 1) if text.count(b'"') % 2), 0)
             line = b"".join((line, *below[:n_joined]))

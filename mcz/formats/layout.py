@@ -15,6 +15,7 @@ import numpy as np
 
 from mcz.errors import FormatError, LimitError
 from mcz.formats.text_items import Items
+from mcz.kernels import SPARE
 from mcz.schema import (
     SIZED,
     SVARINT,
@@ -110,13 +111,14 @@ class Pattern:
 
     def arrays(self) -> Items:
         """The pattern as compiled loops have it."""
+        gaps = [run.gap for run in self.runs]
         repeats = [run.n_columns for run in self.runs]
-        sizes = np.array([*(len(run.gap) for run in self.runs), len(self.tail)], dtype=np.int64)
+        sizes = np.array([*map(len, gaps), len(self.tail)], dtype=np.int64)
         stops = np.cumsum(sizes)
         per_item = np.repeat(np.arange(len(sizes)), [*repeats, 1])
         ranges = [np.arange(run.column, run.column + run.n_columns) for run in self.runs]
         return Items(
-            np.frombuffer(b"".join(run.gap for run in self.runs) + self.tail, np.uint8),
+            np.frombuffer(b"".join((*gaps, self.tail, bytes(SPARE))), np.uint8),
             (stops - sizes)[per_item],
             stops[per_item],
             np.concatenate([np.empty(0, np.int64), *ranges]),

@@ -16,6 +16,7 @@ from mcz.errors import FormatError, LimitError
 from mcz.formats.cells import Cells
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
 from mcz.formats.notes import RowNotes
+from mcz.kernels import SPARE
 from mcz.motion import Motion, Signal, Source
 
 Ints = NDArray[np.int64]
@@ -124,7 +125,7 @@ def _body(
         )
     if size > limit:  # AMC-07, LIMIT-12
         raise LimitError(f"source template: a text of {size} bytes, limit {limit}")
-    out = np.empty(size + len(ending or b""), np.uint8)
+    out = np.empty(size + len(ending or b"") + SPARE, np.uint8)
     at = 0
     for pattern, a, b in runs:
         at = text_kernels.fill_rows(
@@ -132,7 +133,7 @@ def _body(
         )
     text = out.data
     if ending is None:
-        return text
+        return text[:size]
     at -= len(runs[-1][0].tail) if runs else 0
     text[at : at + len(ending)] = ending  # AMC-06
     return text[: at + len(ending)]

@@ -6,7 +6,7 @@ Blanks are the bytes up to 0x20.
 from __future__ import annotations
 
 from mcz.formats.text_items import BLANKS, FREE, WORDS, Items
-from mcz.kernels import kernel
+from mcz.kernels import eight_bytes, kernel, put_eight_bytes
 from mcz.kernels.types import Bytes, Ints, Ints2
 
 BLANK, QUOTE, COMMA, SEMICOLON = 0x20, 0x22, 0x2C, 0x3B
@@ -177,20 +177,26 @@ def measure_rows(items: Items, gap_size: int, texts: Bytes, start: Ints2, size: 
     return total
 
 
+def _copy(source: Bytes, first: int, count: int, out: Bytes, at: int) -> int:
+    """Copy bytes, up to seven more than are counted, and return where they end."""
+    for k in range(0, count, 8):
+        put_eight_bytes(out, at + k, eight_bytes(source, first + k))
+    return at + count
+
+
 @kernel
 def fill_rows(out: Bytes, at: int, items: Items, texts: Bytes, start: Ints2, size: Ints2) -> int:
     """Write rows of one pattern to ``out`` from ``at`` on; returns the offset after them.
 
     The token of ``row`` and ``column`` is texts[start[row, column]:][:size[row, column]]; column -1
-    stands for the last one, which holds the frame numbers. No token is empty.
+    stands for the last one, which holds the frame numbers. Texts, gaps and ``out`` have
+    ``SPARE`` bytes more than are read or written.
     """
     gaps, gap_start, gap_stop, columns, widths = items
     n_items = len(columns)
     for row in range(start.shape[0]):
         for k in range(n_items + 1):
-            for j in range(gap_start[k], gap_stop[k]):
-                out[at] = gaps[j]
-                at += 1
+            at = _copy(gaps, gap_start[k], gap_stop[k] - gap_start[k], out, at)
             if k == n_items:
                 break
             column = columns[k] if columns[k] >= 0 else start.shape[1] - 1
@@ -199,9 +205,7 @@ def fill_rows(out: Bytes, at: int, items: Items, texts: Bytes, start: Ints2, siz
             if width > 0:  # AMC-06
                 out[at : at + pad] = BLANK
                 at += pad
-            for j in range(first, first + count):
-                out[at] = texts[j]
-                at += 1
+            at = _copy(texts, first, count, out, at)
             if width < 0:  # AMC-06
                 out[at : at + pad] = BLANK
                 at += pad

@@ -44,6 +44,7 @@ if MODE not in MODES:
     raise ValueError(f"MCZ_LOOPS={MODE}: one of {', '.join(MODES)}")
 PACKAGE = Path(__file__).parents[1]
 _LOADING = RLock()
+SPARE = 7  # bytes that ``eight_bytes`` reads, and ``put_eight_bytes`` writes, beyond one
 SLOW = "kernels run as plain Python, 50 to 500 times slower: "
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -57,13 +59,13 @@ def _sampled(tokens: Tokens, n_sample: int) -> Tokens:
 
 def _plain_candidates(survey: Survey) -> Iterator[tuple[float, tuple[GridKind, int, int]]]:
     """All grids but PRINTED."""
-    decimals, significant = survey.decimals, survey.significant
-    if not significant.any():
+    decimals, significant = survey.decimals.tolist(), survey.significant.tolist()
+    if not any(significant):
         yield 0.0, (GridKind.FIXED, 0, 0)
         return
     sign, tail, exponent = _styles(survey.styles.tolist())
-    fixed = int(decimals.argmax())
-    is_plain = bool(decimals.any())
+    fixed = decimals.index(max(decimals))
+    is_plain = any(decimals)
     if is_plain:
         point = GridFlag.POINT if fixed == 0 and tail == GridFlag.POINT else 0
         style = sign & ~GridFlag.NO_ZERO | point if fixed == 0 else sign
@@ -76,9 +78,9 @@ def _plain_candidates(survey: Survey) -> Iterator[tuple[float, tuple[GridKind, i
     for digits in sorted({*_ends(significant), 6}):
         if 1 <= digits <= 15:
             yield _bits(digits) + 2, (GridKind.GENERAL, digits, flags)
-    if significant[7:].any():
+    if any(significant[7:]):
         yield 40.0, (GridKind.TEXT32, 0, flags)
-    if significant[10:].any():
+    if any(significant[10:]):
         for digits in (0, 1, 16, 17):
             yield 64.0, (GridKind.TEXT64, digits, flags)
         if is_plain and 10 <= fixed <= 40:
@@ -89,13 +91,11 @@ def _bits(digits: int) -> float:
     return _SIGN_AND_RANGE_BITS + _DIGIT_BITS * digits
 
 
-def _ends(histogram: Ints) -> list[int]:
-    """The largest count, and the one that 99 % do not exceed: a stray long token costs little."""
-    ranks = np.cumsum(histogram)
-    n = int(ranks[-1])
-    return sorted(
-        {int(np.searchsorted(ranks, rank, "right")) for rank in (n - 1, (n * 99 - 1) // 100)}
-    )
+def _ends(histogram: Sequence[int]) -> list[int]:
+    """The count that 99 % do not exceed, and the largest: a stray long token costs little."""
+    ranks = list(accumulate(histogram))
+    n = ranks[-1]
+    return sorted({bisect_right(ranks, rank) for rank in (n - 1, (n * 99 - 1) // 100)})
 
 
 def _styles(counts: Sequence[int]) -> tuple[int, int, int]:

@@ -11,11 +11,12 @@ Everything is int64, the one kind of integer that compiled loops have.
 
 from __future__ import annotations
 
-from mcz.kernels import kernel
+from mcz.kernels import bit_length, kernel, put_eight_bytes
 from mcz.kernels.types import Bytes, Flags, Floats, Ints, Ints2
 from mcz.numbers.value_kernels import EXACT_POWER, scaled
 
 HUGE = 1_000_000
+POWERS: tuple[int, ...] = tuple(10**power for power in range(19))
 
 # Bits of a shape.
 MINUS, PLUS = 1, 2
@@ -186,12 +187,8 @@ def match(
 
 def length(mantissa: int) -> int:
     """Decimal digits of ``mantissa``, 0 for 0."""
-    length = 0
-    bound = 1
-    while mantissa >= bound and length < 18:
-        bound *= 10
-        length += 1
-    return length
+    digits = bit_length(mantissa) * 1233 >> 12  # log 2 is 1233 / 4096
+    return digits + 1 if mantissa >= POWERS[digits] else digits
 
 
 def _general(mantissa: int, power: int, digits: int) -> int:
@@ -200,13 +197,9 @@ def _general(mantissa: int, power: int, digits: int) -> int:
         return 0
     if abs(power) > 307:
         return -1
-    block = 1
-    for _ in range(digits - 1):
-        block *= 10
-    while mantissa >= block * 10:
-        mantissa //= 10
-    while mantissa < block:
-        mantissa *= 10
+    shift = digits - length(mantissa)
+    mantissa = mantissa * POWERS[shift] if shift >= 0 else mantissa // POWERS[-shift]
+    block = POWERS[digits - 1]
     return (power + 307) * 9 * block + 1 + mantissa - block
 
 
@@ -268,7 +261,7 @@ def write(
     """Print ``mantissa * 10^-fraction`` for every i at ``out[offsets[i]:offsets[i + 1]]``.
 
     ``rule``: trimmed, low, high, flags. Trimming drops trailing zeros of the fraction; an
-    exponent is printed below ``low`` and from ``high`` on.
+    exponent is printed below ``low`` and from ``high`` on. ``out`` has ``SPARE`` bytes more.
     """
     at = 0
     for i in range(len(mantissas)):
@@ -309,9 +302,20 @@ def put(
         integers = 0 if flags & _NO_ZERO and fraction > 0 else 1  # TEXT-01
     end = at + integers
     if fraction > 0:
+        digits = integers + fraction
+        if fraction <= 8 and digits <= 16:
+            high = mantissa // 100_000_000
+            low = _eight_digits(mantissa - 100_000_000 * high)
+            if digits > 8:
+                put_eight_bytes(out, at, _eight_digits(high) >> 8 * (16 - digits))
+                put_eight_bytes(out, at + digits - 8, low)
+            else:
+                put_eight_bytes(out, at, low >> 8 * (8 - digits))
+            put_eight_bytes(out, end + 1, low >> 8 * (8 - fraction))
+        else:
+            mantissa = _digits(mantissa, fraction, out, end + 1)
+            _digits(mantissa, integers, out, at)
         out[end] = 46
-        mantissa = _digits(mantissa, fraction, out, end + 1)
-        _digits(mantissa, integers, out, at)
         end += fraction + 1
     else:
         zeros = min(-fraction, integers)
@@ -328,6 +332,16 @@ def put(
             out[end] = 48
             end += 1
     return end
+
+
+def _eight_digits(number: int) -> int:
+    """The digits of a number below 10^8 as eight bytes, the first digit in the lowest one."""
+    high = number // 10_000
+    fours = high + (number - 10_000 * high << 32)
+    tens = (fours * 10_486 >> 20) & 0x7F0000007F  # a hundredth of each
+    twos = tens + (fours - 100 * tens << 16)
+    ones = (twos * 103 >> 10) & 0xF000F000F000F  # a tenth of each
+    return ones + (twos - 10 * ones << 8) + 0x3030303030303030
 
 
 def _digits(mantissa: int, count: int, out: Bytes, at: int) -> int:

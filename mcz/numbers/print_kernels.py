@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kernels import kernel
+from mcz.kernels import kernel, truncated
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints2
 from mcz.numbers.kernels import length, put
 from mcz.numbers.ordinal_kernels import GREATEST_POWER, LEAST_POWER, decimal
@@ -48,7 +48,7 @@ def fill(
                 count = np.rint(amount * tens[rules[c, POWER]])
                 if not count < float(rules[c, LIMIT]):
                     continue
-                mantissa, fraction = int(count), rules[c, POWER]
+                mantissa, fraction = truncated(count), rules[c, POWER]
                 width = length(mantissa)
             else:
                 mantissa, power = decimal(amount, rules[c, GUESS], digits, tens, powers)

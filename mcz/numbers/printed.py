@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mcz.kernels import SPARE
 from mcz.numbers.magnitudes import (
     binary32_magnitudes,
     binary32_values,
@@ -140,7 +141,7 @@ def _general(values: Floats, digits: int, flags: int, negative: Bools) -> Texts:
     fields = scan_texts([f"{x:.{digits - 1}e}" for x in values.tolist()]).fields
     loops = kernels()
     fractions = (fields[:, 2] >> loops.FRACTION_DIGITS) - fields[:, 1]
-    out = np.empty(len(values) * 48, np.uint8)  # as textgrids: the longest has 17 digits
+    out = np.empty(len(values) * 48 + SPARE, np.uint8)  # as textgrids: the longest has 17 digits
     offsets = np.zeros(len(values) + 1, np.int64)
     rule = 1, -4, digits, flags
     loops.write(negative, np.ascontiguousarray(fields[:, 0]), fractions, rule, out, offsets)

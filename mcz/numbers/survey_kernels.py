@@ -48,8 +48,12 @@ class Survey(NamedTuple):
 def count(fields: Ints2, step: int, n_counted: int, survey: Survey) -> None:
     """Count so many of the tokens, a step apart and again from the first ones on."""
     decimals, significant, styles = survey
-    for k in range(n_counted):
-        token = k * step % len(fields)
+    step %= len(fields)
+    token = -step
+    for _ in range(n_counted):
+        token += step
+        if token >= len(fields):
+            token -= len(fields)
         mantissa, power, shape = fields[token, 0], fields[token, 1], fields[token, 2]
         if shape & (BAD | SPECIAL):
             continue

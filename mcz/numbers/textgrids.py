@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.kernels import SPARE
 from mcz.numbers.magnitudes import binary32_magnitudes, general_split
 from mcz.numbers.rules import FIXED_TEXT, GridKind, limit
 from mcz.numbers.tokens import Bools, Floats, Ints, Texts, Tokens, kernels, scan_texts
@@ -91,7 +92,7 @@ def texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: B
         fractions = -powers
     else:
         mantissas, fractions = float_digits(kind, digits, magnitudes)
-    out = np.empty(len(magnitudes) * WIDEST, np.uint8)
+    out = np.empty(len(magnitudes) * WIDEST + SPARE, np.uint8)
     offsets = np.zeros(len(magnitudes) + 1, np.int64)
     rule = int(kind != GridKind.FIXED), low, high, flags
     kernels().write(negative, np.ascontiguousarray(mantissas), fractions, rule, out, offsets)

@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.kernels import lacks_compiled_kernels
+from mcz.kernels import SPARE, lacks_compiled_kernels
 from mcz.numbers import textgrids
 from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.grid import Grid
@@ -71,7 +71,7 @@ def print_values(
     loops = _kernels("print")
     rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
     of_channels = np.array([rules[grid] for grid in grids], np.int64).reshape(-1, loops.RULE_SIZE)
-    out = np.empty(values.size * textgrids.WIDEST, np.uint8)
+    out = np.empty(values.size * textgrids.WIDEST + SPARE, np.uint8)
     numbers = np.asarray(values, np.float64)
     used = loops.fill(numbers, of_channels, TENS, POWERS, out, base, start, size)
     return out[:used].copy()
