@@ -28,10 +28,10 @@ from mcz.transforms.dct import dct_matrix
 from mcz.transforms.lsdt import (
     PATIENCE,
     haar_basis,
+    has_converged,
     learn_bases,
     learn_basis,
     procrustes,
-    settled,
     start_basis,
 )
 from tests.commands import run
@@ -149,10 +149,10 @@ def test_it_stops_where_nothing_is_gained() -> None:
     frames = np.random.default_rng(4).normal(size=(100, 6))
     found = learn_basis(frames, sparsity=6, iterations=300)  # nothing is ever dropped
     assert found.n_iterations - found.n_growth == PATIENCE
-    assert settled([2.0] * (PATIENCE + 1))
-    assert not settled([2.0] * PATIENCE)
-    assert not settled([3.0] + [2.0] * PATIENCE)
-    assert settled([0.0] * (PATIENCE + 1))
+    assert has_converged([2.0] * (PATIENCE + 1))
+    assert not has_converged([2.0] * PATIENCE)
+    assert not has_converged([3.0] + [2.0] * PATIENCE)
+    assert has_converged([0.0] * (PATIENCE + 1))
 
 
 @pytest.mark.parametrize("n_points", [1, 2, 3, 7, 8, 31, 38])

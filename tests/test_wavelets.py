@@ -40,7 +40,7 @@ def whole(signal: np.ndarray, wavelet: Wavelet, levels: int) -> list[np.ndarray]
 def synthesized(bands: list[np.ndarray], wavelet: Wavelet, start: int, stop: int) -> np.ndarray:
     """Frames of a range from no more than the coefficients that it needs."""
     levels = len(bands) - 1
-    ranges = dwt.needed(start, stop, levels, wavelet.n_taps)
+    ranges = dwt.needed_ranges(start, stop, levels, wavelet.n_taps)
     places = [ranges[levels], *reversed(ranges[1:])] if levels else [ranges[0]]
     cut = [band[a:b] if len(band) else band for band, (a, b) in zip(bands, places, strict=True)]
     return dwt.synthesize(cut, [a for a, _ in ranges[1:]], start, stop, wavelet)

@@ -187,11 +187,11 @@ def find_bases(
     check(heads)
     if sum(len(head.shifts) * head.n_points for head in heads) > MAX_KEPT:
         return parse_bases(model.data, where)
-    return _parsed(model.data)
+    return _parse_cached(model.data)
 
 
 @lru_cache(maxsize=8)
-def _parsed(data: bytes) -> tuple[Basis, ...]:
+def _parse_cached(data: bytes) -> tuple[Basis, ...]:
     bases = parse_bases(data)
     for basis in bases:
         basis.entries.setflags(write=False)

@@ -54,7 +54,7 @@ def width_of(n: int) -> int:
     return (n + 8) // 8 * 8
 
 
-def bounded(value: float) -> float:
+def bound_value(value: float) -> float:
     """``value``, or 0 for one that is too large or no number."""
     return value if abs(value) < LIMIT else 0.0
 
@@ -64,7 +64,7 @@ def estimate(own: Regressions, index: int, features: Floats) -> float:
     total = 0.0
     for i in range(own.n_features[index]):
         total = total + weights[i] * features[i]
-    return bounded(total)
+    return bound_value(total)
 
 
 def learn(

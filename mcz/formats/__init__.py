@@ -162,7 +162,7 @@ FORMATS: dict[str, Format] = {
                 _of("arrays.read", "write_arrays"),
                 states_rate=name == "npz",
                 is_motion=_of("arrays.sniffing", "is_motion"),
-                arrays=_of("arrays.listing", "arrays_listed"),
+                arrays=_of("arrays.listing", "list_arrays"),
             )
             for format_id, name in ((12, "npy"), (13, "npz"))
         ),

@@ -36,7 +36,7 @@ class _Bone:
 
 @dataclass(slots=True)
 class _Reader:
-    """What the lines read so far said; ``section`` and ``bone`` are where the next one belongs."""
+    """Parser state; ``section`` and ``bone`` are the context of the next line."""
 
     section: str = ""
     name: str = ""

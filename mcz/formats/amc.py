@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
-from mcz.formats.bones import fit, flat, match_names, matched
+from mcz.formats.bones import fit, flat, match_bones, match_names
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.line_by_line import Arriving, Frame, Lines
 from mcz.formats.notes import RowNotes
@@ -150,9 +150,9 @@ def bones(data: bytes, *, whole: bool = False) -> dict[str, int]:
     match = _FIRST_FRAME.search(data)
     if match is None:
         return {}
-    found = (_all_bones if whole else _first_bones)(data, match.start())
+    names = (_all_bones if whole else _first_bones)(data, match.start())
     encoding = text_encoding(data)
-    return {bone.decode(encoding): count for bone, count in found.items()}
+    return {bone.decode(encoding): count for bone, count in names.items()}
 
 
 def is_amc(data: bytes) -> bool:
@@ -254,7 +254,7 @@ class _ArrivingFrames:
         """The values of a frame, (n_channels,), NaN where a bone did not come."""
         if self._counts is None:
             self._counts = {name: len(texts) for name, texts in bones.items()}
-            lacking = matched(self.skeleton, self._counts)
+            lacking = match_bones(self.skeleton, self._counts)
             if lacking.is_foreign:
                 raise self.source.error(
                     f"the skeleton has none of the bones: {' '.join(lacking.lacking[:8])[:200]}"

@@ -49,7 +49,7 @@ def write(skeleton: Skeleton) -> bytes:
 
 
 def _plain(skeleton: Skeleton) -> str:
-    root, *bones = _checked(skeleton)
+    root, *bones = _check_joints(skeleton)
     length = INCH_UNITS if skeleton.unit_cm == INCH_UNIT_CM else 1.0
     lines = [
         "# AST/ASF file written by mcz",
@@ -111,7 +111,7 @@ def _polar(vector: Vector) -> tuple[Vector, float]:
     return vector, 1.0
 
 
-def _checked(skeleton: Skeleton) -> tuple[Joint, ...]:
+def _check_joints(skeleton: Skeleton) -> tuple[Joint, ...]:
     """The joints; MotionError where ASF cannot hold them."""
     joints = skeleton.joints
     if not joints or joints[0].name != "root" or joints[0].tails or skeleton.intrinsic:

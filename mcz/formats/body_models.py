@@ -179,8 +179,8 @@ class _Model:
         """The numbers of a member; raises SourceError for one that is not there or is no such."""
         where = f"{self.file}: {name}"
         if not self.has(name):
-            found = ", ".join(sorted(n.removesuffix(".npy") for n in self.names)[:12])
-            raise SourceError(f"{where} is missing among {found}: no model of a body")
+            names = ", ".join(sorted(n.removesuffix(".npy") for n in self.names)[:12])
+            raise SourceError(f"{where} is missing among {names}: no model of a body")
         info = self.archive.getinfo(f"{name}.npy")
         with self.archive.open(info) as member:
             try:
@@ -216,7 +216,7 @@ class _Model:
         return parents
 
     def joints(self, betas: ArrayLike | None) -> Floats:
-        """Where joints are at rest, (n_joints, 3)."""
+        """Positions of the joints at rest, (n_joints, 3)."""
         if betas is None and self.has("J"):
             return np.asarray(self.array("J"), np.float64)
         if self.has("J") and not self.has("J_regressor"):
@@ -232,8 +232,8 @@ class _Model:
         shaped = np.asarray(vertices, np.float64)
         if betas is not None:
             shaped = shaped + self._shape(np.asarray(betas, np.float64), len(vertices))
-        found: Floats = np.asarray(regressor, np.float64) @ shaped
-        return found
+        joints: Floats = np.asarray(regressor, np.float64) @ shaped
+        return joints
 
     def _shape(self, betas: Floats, n_vertices: int) -> Floats:
         directions = self.array("shapedirs")

@@ -50,16 +50,16 @@ def tree(which: str | int) -> BodyTree:
 
     Raises OptionError where there is none.
     """
-    found = _trees()
-    for each in found.values():
+    trees = _trees()
+    for each in trees.values():
         if which in (each.name, each.n_joints):
             return each
-    known = ", ".join(f"{each.name} ({each.n_joints} joints)" for each in found.values())
+    known = ", ".join(f"{each.name} ({each.n_joints} joints)" for each in trees.values())
     raise OptionError(f"no body tree {which!r}: there are {known}")
 
 
 def has_tree(which: str | int) -> bool:
-    """Whether there is a tree of that name, or of so many joints."""
+    """Return True if there is a tree of that name or number of joints."""
     return any(which in (each.name, each.n_joints) for each in _trees().values())
 
 

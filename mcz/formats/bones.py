@@ -1,4 +1,4 @@
-"""Which joints the bones of an AMC file are, and where their values go."""
+"""Matching of the bones of an AMC file to the joints of a skeleton."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROOT = "root"  # every ASF has it, whatever else it describes
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """How the bones of an AMC file match a skeleton.
+    """Match of an AMC file's bones with a skeleton.
 
     ``lacking`` are the bones that it does not have, ``differing`` those that have other numbers of
     values there; ``n_known`` counts the bones beside the root that it has.
@@ -26,12 +26,12 @@ class Match:
 
     @property
     def is_foreign(self) -> bool:
-        """Whether the skeleton has none of the bones, but for the root that all have."""
+        """True if the skeleton has none of the bones but the root, which all have."""
         return bool(self.lacking) and not self.n_known
 
 
-def matched(skeleton: Skeleton, counts: Mapping[str, int]) -> Match:
-    """How bones with these numbers of values match ``skeleton``."""
+def match_bones(skeleton: Skeleton, counts: Mapping[str, int]) -> Match:
+    """Match bones with these numbers of values to ``skeleton``."""
     names = match_names(skeleton, counts)
     channels: dict[str | None, int] = {j.name: len(j.channels) for j in skeleton.joints}
     known = [bone for bone in counts if names[bone] is not None]
@@ -66,12 +66,12 @@ def match_names(skeleton: Skeleton, bones: Mapping[str, int]) -> dict[str, str |
     folded: dict[str, list[str]] = {}
     for name in joints:
         folded.setdefault(name.casefold(), []).append(name)
-    taken: set[str | None] = {*(joints & bones.keys())}
+    matched: set[str | None] = {*(joints & bones.keys())}
     result: dict[str, str | None] = {}
     for bone in bones:
-        alike = [name for name in folded.get(bone.casefold(), []) if name not in taken]
+        alike = [name for name in folded.get(bone.casefold(), []) if name not in matched]
         result[bone] = bone if bone in joints else alike[0] if len(alike) == 1 else None
-        taken.add(result[bone])
+        matched.add(result[bone])
     return result
 
 

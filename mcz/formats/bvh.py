@@ -107,7 +107,7 @@ def _arriving(lines: Iterable[bytes], source: Lines, n_columns: int) -> Iterator
 
 
 def _notes(encoding: str, n_strays: int, count: bytes, n_rows: int) -> dict[str, str]:
-    """What is odd about the file, as metadata."""
+    """Notes on oddities of the file, as metadata."""
     metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
     notes = []
     if (count.lstrip(b"0") or b"0") != b"%d" % n_rows:
@@ -122,7 +122,7 @@ def _notes(encoding: str, n_strays: int, count: bytes, n_rows: int) -> dict[str,
 def _motion_section(
     data: bytes, at: int, n_columns: int
 ) -> tuple[tuple[int, int], tuple[int, int], int]:
-    """Where the frame count and the frame time stand, and the offset of the first frame."""
+    """Find the frame count, the frame time and the first frame."""
     frames = _FRAMES.match(data, at)
     if frames is None:
         raise SourceError("no 'Frames:' after MOTION", line=line_of(data, at))

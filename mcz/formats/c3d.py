@@ -21,7 +21,7 @@ from mcz.formats.c3d_parameters import (
     FLOAT,
     INTEGER,
     Parameters,
-    decoded,
+    decode_texts,
     find_parameters,
     names_of,
     parse_parameters,
@@ -60,12 +60,12 @@ def read(data: bytes, name: str = "motion") -> Motion:
     shape = find_shape(data, parameters)
     split = find_outputs(parameters, shape.n_points)
     layout = _layout(data, parameters, shape, split)
-    said = recording_of(layout)
-    points, encoding = decoded(parameters.texts("POINT", "LABELS"))
+    recording = recording_of(layout)
+    points, encoding = decode_texts(parameters.texts("POINT", "LABELS"))
     names = names_of(points, shape.n_points, "point")
     joints = tuple(Joint(names[number], channels=POSITION) for number in split.points)
     unit_cm = _unit_cm(parameters)
-    skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="", up_axis=said.up_axis)
+    skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="", up_axis=recording.up_axis)
     rate, exact = rate_of(data, parameters)
     numbers = np.arange(shape.first, shape.first + shape.n_frames, dtype=np.int64)
     scale, note = _scale(data, parameters) if shape.word == 2 and shape.n_points else (1.0, "")
@@ -78,7 +78,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
     grid = Grid(GridKind.SCALED, scale=scale)
     signals = [
         *_point_signals(data, parameters, shape, grid, [names[n] for n in split.order], split),
-        *_other_signals(data, parameters, shape, said.scaling),
+        *_other_signals(data, parameters, shape, recording.scaling),
     ]
     return Motion(
         skeleton,
@@ -153,12 +153,12 @@ def _point_signals(
     n_points = len(split.points)
     labels = tuple(Channel("", name) for name in names)
     residuals = _signal("residuals", words[:, 4 * split.order + 3], raw, labels)
-    found = [_masked(points, residuals.values[:, :n_points]), residuals]
+    signals = [_mask_points(points, residuals.values[:, :n_points]), residuals]
     if len(split.outputs):
         channels = output_channels(parameters, names[n_points:])
         outputs = _signal(OUTPUTS, words[:, _columns(split.outputs)], grid, channels)
-        found.append(_masked(outputs, residuals.values[:, n_points:]))
-    return found
+        signals.append(_mask_points(outputs, residuals.values[:, n_points:]))
+    return signals
 
 
 def _columns(points: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -170,7 +170,7 @@ def _other_signals(
     data: bytes, parameters: Parameters, shape: Shape, scaling: Scaling | None
 ) -> list[Signal]:
     """Analog samples, whose words mean what ``scaling`` says, and rotations."""
-    order, raw, found = parameters.order, Grid(GridKind.INTEGER), []
+    order, raw, signals = parameters.order, Grid(GridKind.INTEGER), []
     if shape.n_channels:
         words = _words(data, parameters, shape)
         samples = words[:, 4 * shape.n_points :].reshape(-1, shape.n_channels)
@@ -179,14 +179,14 @@ def _other_signals(
         channels = _channels(parameters, shape)
         grid = order.grid if shape.word == 4 else raw
         analog = _signal("analog", samples, grid, channels, shape.subframes)
-        found.append(analog.in_units(scaling))
+        signals.append(analog.in_units(scaling))
     if shape.n_rotations:
         n_words = shape.n_frames * shape.rotations_size // 4
         words = np.frombuffer(data, f"{order.prefix}u4", n_words, shape.rotations_at)
         channels = _rotation_channels(parameters, shape)
         samples = words.reshape(-1, len(channels))
-        found.append(_signal("rotations", samples, order.grid, channels, shape.ratio))
-    return found
+        signals.append(_signal("rotations", samples, order.grid, channels, shape.ratio))
+    return signals
 
 
 def _signal(
@@ -210,7 +210,7 @@ def _signal(
     )
 
 
-def _masked(points: Signal, residuals: Values) -> Signal:
+def _mask_points(points: Signal, residuals: Values) -> Signal:
     """The points with their mask: valid where the residual is not negative and nothing is NaN."""
     valid = residuals >= 0
     if points.values.dtype == np.float64:
@@ -222,16 +222,16 @@ def _masked(points: Signal, residuals: Values) -> Signal:
 
 def _channels(parameters: Parameters, shape: Shape) -> tuple[Channel, ...]:
     """The analog channels. Names and units that are no UTF-8 are read as Latin-1."""
-    labels, _ = decoded(parameters.texts("ANALOG", "LABELS"))
-    units, _ = decoded(parameters.texts("ANALOG", "UNITS"))
+    labels, _ = decode_texts(parameters.texts("ANALOG", "LABELS"))
+    units, _ = decode_texts(parameters.texts("ANALOG", "UNITS"))
     units += [""] * (shape.n_channels - len(units))
     names = names_of(labels, shape.n_channels, "channel")
     return tuple(Channel("", name, unit) for name, unit in zip(names, units, strict=False))
 
 
 def _rotation_channels(parameters: Parameters, shape: Shape) -> tuple[Channel, ...]:
-    """Of every rotation the elements of its matrix, column after column, and its reliability."""
-    labels, _ = decoded(parameters.texts("ROTATION", "LABELS"))
+    """Channels of every rotation: its matrix column by column, and its reliability."""
+    labels, _ = decode_texts(parameters.texts("ROTATION", "LABELS"))
     elements = [f"m{row}{column}" for column in range(1, 5) for row in range(1, 5)]
     parts = (*elements, "reliability")
     assert len(parts) == ROTATION_WORDS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mcz.formats.c3d_parameters import FLOAT, Parameters, decoded
+from mcz.formats.c3d_parameters import FLOAT, Parameters, decode_texts
 
 KEY = 12_345  # says that labels in the header have four characters
 WORD_OF_KEY, WORD_OF_COUNT = 298, 300  # offsets in the header
@@ -37,9 +37,9 @@ def find_events(header: bytes, parameters: Parameters) -> tuple[Event, ...]:
 
 def event_times(header: bytes, parameters: Parameters) -> Iterator[int]:
     """Offsets in ``header`` of the binary32 times of events: minutes and seconds, or seconds."""
-    found = parameters.get("EVENT", "TIMES")
-    if found is not None and found.type == FLOAT:
-        yield from range(found.at, found.at + len(found.data), 4)
+    times = parameters.get("EVENT", "TIMES")
+    if times is not None and times.type == FLOAT:
+        yield from range(times.at, times.at + len(times.data), 4)
     if parameters.order.integer(header, WORD_OF_KEY) == KEY:
         n_events = min(parameters.order.integer(header, WORD_OF_COUNT), MOST)
         yield from range(TIMES, TIMES + 4 * n_events, 4)
@@ -54,7 +54,7 @@ def _of_parameters(parameters: Parameters) -> tuple[Event, ...]:
     used = parameters.count("EVENT", "USED")
     times = times if used is None else times[:used]
     columns = [
-        decoded(parameters.texts("EVENT", name))[0]
+        decode_texts(parameters.texts("EVENT", name))[0]
         for name in ("LABELS", "CONTEXTS", "SUBJECTS", "DESCRIPTIONS")
     ]
     filled = ([*texts, *[""] * len(times)] for texts in columns)
@@ -70,4 +70,4 @@ def _of_header(header: bytes, parameters: Parameters) -> tuple[Event, ...]:
     n_events = min(order.integer(header, WORD_OF_COUNT), MOST)
     labels = [header[LABELS + LABEL * k :][:LABEL].strip(b" \0") for k in range(n_events)]
     times = [order.real(header, TIMES + 4 * k) for k in range(n_events)]
-    return tuple(map(Event, decoded(labels)[0], times))
+    return tuple(map(Event, decode_texts(labels)[0], times))

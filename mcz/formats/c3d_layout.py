@@ -1,4 +1,4 @@
-"""What a C3D file holds beside its data, as a template and a detail.
+"""Content of a C3D file beside its data: a template and a detail.
 
 SPEC.md, "Source reconstruction", is normative and has the tables of C3dTemplate, C3dDetail,
 C3dField and C3dOutputsTemplate.
@@ -34,7 +34,7 @@ MAX_SHARED_TAIL = 512  # bytes behind the data that are the clip's own; more go 
 
 
 class Kind(IntEnum):
-    """What a field counts."""
+    """Quantity that a field counts."""
 
     COUNT = 0  # frames, in a word
     COUNT_FLOAT = 1  # frames, in a float
@@ -129,12 +129,12 @@ class Layout:
 
     @property
     def split(self) -> Split:
-        """Which points are outputs."""
+        """Split of the points into points and outputs."""
         return split_of(self.outputs, self.n_points)
 
     @property
     def behind(self) -> int:
-        """Where the tail begins in the file."""
+        """Offset of the tail in the file."""
         rotations = self.n_rotations * self.ratio * ROTATION_WORDS * 4 * self.n_frames
         words = 4 * self.n_points + self.n_channels * self.subframes
         return len(self.head) + self.n_frames * words * self.word + len(self.gap) + rotations

@@ -1,4 +1,4 @@
-"""Which points of a C3D file are no points: angles, forces, moments, powers and scalars of a model.
+"""Model outputs among the points of a C3D file: angles, forces, moments, powers, scalars.
 
 Programs that compute them store them beside the markers, in the same words, and list their labels
 in parameters of POINT. Here they are apart, as the signal ``outputs``.
@@ -48,7 +48,7 @@ class Split:
 
     @property
     def runs(self) -> tuple[int, ...]:
-        """How many points and outputs come in turn, points first; () where nothing is one."""
+        """Lengths of alternating runs of points and outputs, points first; () without outputs."""
         if not len(self.outputs):
             return ()
         is_output = np.zeros(len(self.order), np.bool_)
@@ -79,12 +79,12 @@ def find_outputs(parameters: Parameters, n_points: int) -> Split:
 
 def groups_of(parameters: Parameters) -> dict[bytes, tuple[str, ...]]:
     """The lists that have each label, empty ones left out: ANGLES, FORCES, MOMENTS, ..."""
-    found: dict[bytes, tuple[str, ...]] = {}
+    groups: dict[bytes, tuple[str, ...]] = {}
     for group in UNITS_OF:
         for label in dict.fromkeys(parameters.texts("POINT", group)):
             if label:
-                found[label] = (*found.get(label, ()), group)
-    return found
+                groups[label] = (*groups.get(label, ()), group)
+    return groups
 
 
 def unit_of(parameters: Parameters, groups: Sequence[str]) -> str:
@@ -102,7 +102,7 @@ class Listed:
     groups: dict[str, tuple[list[str], str]]
 
 
-def described(outputs: Signal | None) -> Listed:
+def describe_outputs(outputs: Signal | None) -> Listed:
     """Labels and lists that say what ``outputs``, channels ``NAME x``, ``NAME y``, ``NAME z``, are.
 
     The unit of an output tells its list. Where there are more units than lists, the last list says
@@ -117,8 +117,8 @@ def described(outputs: Signal | None) -> Listed:
         if [channel.name for channel in three] != [f"{label} {part}" for part in PARTS]:
             raise MotionError(f"C3D has outputs of x, y and z, and {three[0].name!r} is none")
         group = _list_of(unit, groups)
-        listed, held = groups.get(group, ([], unit))
-        groups[group] = ([*listed, *({label} - {*listed})], unit if held == unit else "")
+        listed, group_unit = groups.get(group, ([], unit))
+        groups[group] = ([*listed, *({label} - {*listed})], unit if group_unit == unit else "")
         labels.append(label)
     return Listed(tuple(labels), groups)
 

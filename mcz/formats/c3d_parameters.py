@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """How the processor that wrote a file stores 16-bit integers and 32-bit floats."""
+    """Byte order and float format of the processor that wrote a file."""
 
     processor: int
 
@@ -39,7 +39,7 @@ class Order:
 
     @property
     def grid(self) -> Grid:
-        """Of a float."""
+        """Grid of a float."""
         return Grid(GridKind.VAX_F if self.processor == DEC else GridKind.BINARY32)
 
     def integer(self, data: bytes, at: int) -> int:
@@ -154,7 +154,7 @@ class Parameters:
         return low + (high << 16)
 
 
-def decoded(texts: list[bytes]) -> tuple[list[str], str]:
+def decode_texts(texts: list[bytes]) -> tuple[list[str], str]:
     """Texts and their encoding: "utf-8" where all of them are, otherwise "latin-1"."""
     encoding = "utf-8"
     try:
@@ -214,11 +214,11 @@ def parse_parameters(data: bytes, order: Order, start: int) -> Parameters:
             at = after
             break
         at = after + step
-    found: dict[tuple[str, str], Parameter] = {}
+    parameters: dict[tuple[str, str], Parameter] = {}
     for number, name, parameter in entries:
         if number in groups:
-            found.setdefault((groups[number], name), parameter)
-    return Parameters(order, start, found, min(at, stop))
+            parameters.setdefault((groups[number], name), parameter)
+    return Parameters(order, start, parameters, min(at, stop))
 
 
 def _parameter(data: bytes, at: int, stop: int) -> Parameter | None:

@@ -16,10 +16,10 @@ import numpy as np
 from mcz.errors import MotionError
 from mcz.formats.c3d_layout import Kind, Layout
 from mcz.formats.c3d_outputs import NAME as OUTPUTS
-from mcz.formats.c3d_outputs import described
+from mcz.formats.c3d_outputs import describe_outputs
 from mcz.formats.c3d_parameters import BLOCK, INTEL, Order
 from mcz.formats.c3d_restore import field_bytes, valid_points
-from mcz.formats.c3d_section import Said, section_of
+from mcz.formats.c3d_section import SectionData, section_of
 from mcz.formats.c3d_shape import COUNTED, WORD_OF_FIRST, WORD_OF_LAST
 from mcz.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.numbers import Grid, GridKind
@@ -61,7 +61,7 @@ def plain(motion: Motion) -> Motion:
             raise MotionError(
                 f"C3D cannot hold the name {name!r}: its labels are filled with blanks"
             )
-    listed = described(outputs)
+    listed = describe_outputs(outputs)
     both = {*names} & {*listed.labels}
     if both or not all(listed.labels):
         raise MotionError(f"C3D cannot tell outputs by their names from points: {sorted(both)}")
@@ -72,7 +72,7 @@ def plain(motion: Motion) -> Motion:
         residuals = _residuals(placed, motion.n_frames)
     signals = [_on(signal, grids[0]) for signal in placed]
     signals += [_on(signal, grids[1]) for signal in (residuals, analog) if signal is not None]
-    said = Said(
+    section_data = SectionData(
         [*names, *listed.labels],
         listed,
         UNITS.get(motion.skeleton.unit_cm or 0.0, ""),
@@ -81,7 +81,7 @@ def plain(motion: Motion) -> Motion:
         scaling,
         unsigned,
     )
-    layout = _layout(motion, scale, said, (n_channels, subframes))
+    layout = _layout(motion, scale, section_data, (n_channels, subframes))
     template, detail = layout.build()
     source = Source(layout.format, template, detail)
     return replace(motion, signals=tuple(signals), source=source)
@@ -171,15 +171,17 @@ def _on(signal: Signal, grid: Grid) -> Signal:
     )
 
 
-def _layout(motion: Motion, scale: float | None, said: Said, shape: tuple[int, int]) -> Layout:
+def _layout(
+    motion: Motion, scale: float | None, section_data: SectionData, shape: tuple[int, int]
+) -> Layout:
     """The layout of the file: header, parameter section, fields."""
-    order, n_points = Order(INTEL), len(said.names)
+    order, n_points = Order(INTEL), len(section_data.names)
     n_channels, subframes = shape
     first = 1 if motion.frame_numbers is None or not motion.n_frames else motion.frame_numbers[0]
     rate = Fraction(motion.frame_rate or 0)
     if rate > MOST_RATE:
         raise MotionError(f"C3D holds frame rates up to {MOST_RATE:.2g}, and this one is larger")
-    section = section_of(said, -1.0 if scale is None else scale, rate, shape)
+    section = section_of(section_data, -1.0 if scale is None else scale, rate, shape)
     start = BLOCK + len(section.data)
     header = bytearray(BLOCK)
     struct.pack_into("<BBHHHHHf", header, 0, 2, 0x50, n_points, n_channels * subframes, 0, 0, 0,
@@ -198,10 +200,12 @@ def _layout(motion: Motion, scale: float | None, said: Said, shape: tuple[int, i
         n_points,
         n_channels,
         subframes,
-        said.unsigned,
+        section_data.unsigned,
         motion.n_frames,
         max(0, int(first)),
         bytes(head),
         tuple(fields),
-        outputs=(motion.skeleton.n_joints, len(said.listed.labels)) if said.listed.labels else (),
+        outputs=(motion.skeleton.n_joints, len(section_data.listed.labels))
+        if section_data.listed.labels
+        else (),
     )

@@ -1,4 +1,4 @@
-"""What a C3D file says beside its data: names, units, events, force platforms, axes of the screen.
+"""Recording metadata of C3D files: names, units, events, force platforms, screen axes.
 
 All of it is in the header and the parameter section, which the template of a clip holds.
 """
@@ -19,7 +19,7 @@ from mcz.formats.c3d_parameters import (
     FLOAT,
     MAX_BLOCKS,
     Parameters,
-    decoded,
+    decode_texts,
     names_of,
     parse_parameters,
 )
@@ -80,7 +80,7 @@ class ForcePlatform:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What a C3D file says of a recording, as it says it.
+    """Recording metadata of a C3D file, unconverted.
 
     ``first_frame`` is the number of its first frame. ``unit`` is that of the points' coordinates
     and ``analog_rate`` in samples a second, "" and None while unknown. ``general_scale`` is part of
@@ -113,7 +113,7 @@ class Recording:
 
     @property
     def scaling(self) -> Scaling | None:
-        """What the words of the analog signal mean; None where they are the values themselves."""
+        """Scaling of the analog signal; None if its words are the values."""
         offsets = np.array([channel.offset for channel in self.analog], np.float64)
         scales = np.array([channel.scale for channel in self.analog], np.float64)
         if not offsets.any() and (scales == 1).all() and self.general_scale == 1:
@@ -185,18 +185,18 @@ def _parameters(layout: Layout) -> Parameters:
 
 
 def _text(parameters: Parameters, group: str, name: str) -> str:
-    return next(iter(decoded(parameters.texts(group, name))[0]), "")
+    return next(iter(decode_texts(parameters.texts(group, name))[0]), "")
 
 
-def _filled(texts: Sequence[str], n: int) -> list[str]:
+def _pad_texts(texts: Sequence[str], n: int) -> list[str]:
     return [*texts[:n], *[""] * (n - len(texts))]
 
 
 def _points(parameters: Parameters, n: int) -> Iterator[Point]:
     labels = [*parameters.texts("POINT", "LABELS")[:n]]
-    names = names_of(decoded(labels)[0], n, "point")
+    names = names_of(decode_texts(labels)[0], n, "point")
     labels += [b""] * (n - len(labels))
-    descriptions = _filled(decoded(parameters.texts("POINT", "DESCRIPTIONS"))[0], n)
+    descriptions = _pad_texts(decode_texts(parameters.texts("POINT", "DESCRIPTIONS"))[0], n)
     unit, groups = _text(parameters, "POINT", "UNITS"), groups_of(parameters)
     for name, label, description in zip(names, labels, descriptions, strict=True):
         own = groups.get(label, ())
@@ -204,9 +204,9 @@ def _points(parameters: Parameters, n: int) -> Iterator[Point]:
 
 
 def _channels(parameters: Parameters, n: int) -> Iterator[AnalogChannel]:
-    names = names_of(decoded(parameters.texts("ANALOG", "LABELS"))[0], n, "channel")
-    descriptions = _filled(decoded(parameters.texts("ANALOG", "DESCRIPTIONS"))[0], n)
-    units = _filled(decoded(parameters.texts("ANALOG", "UNITS"))[0], n)
+    names = names_of(decode_texts(parameters.texts("ANALOG", "LABELS"))[0], n, "channel")
+    descriptions = _pad_texts(decode_texts(parameters.texts("ANALOG", "DESCRIPTIONS"))[0], n)
+    units = _pad_texts(decode_texts(parameters.texts("ANALOG", "UNITS"))[0], n)
     offsets = [_offset(parameters, number) for number in parameters.numbers("ANALOG", "OFFSET")]
     offsets = [*offsets[:n], *[0.0] * (n - len(offsets))]
     scales = parameters.numbers("ANALOG", "SCALE")[:n]
@@ -225,7 +225,7 @@ def _offset(parameters: Parameters, number: float) -> float:
 
 
 def is_unsigned(parameters: Parameters) -> bool:
-    """Whether the file says that analog integers have no sign."""
+    """Return True if the file declares analog integers unsigned."""
     texts = parameters.texts("ANALOG", "FORMAT")
     return bool(texts) and texts[0].upper() == UNSIGNED
 

@@ -123,7 +123,7 @@ def _fill_points(words: Items, motion: Motion, layout: Layout) -> None:
 def _parts(motion: Motion, layout: Layout) -> list[tuple[Signal, NDArray[np.int64]]]:
     """The signals of the points, checked, and the numbers of their points in the file."""
     split = layout.split
-    parts = [(_checked(motion.signals[0], 3 * len(split.points), 1), split.points)]
+    parts = [(_check_signal(motion.signals[0], 3 * len(split.points), 1), split.points)]
     if len(split.outputs):
         parts.append((_signal(motion, OUTPUTS, 3 * len(split.outputs), 1), split.outputs))
     return parts
@@ -133,11 +133,11 @@ def _signal(motion: Motion, role: str, n_channels: int, per_frame: int) -> Signa
     """The first signal of a role, checked; raises FormatError."""
     for signal in motion.signals_of(role):
         if not signal.of:
-            return _checked(signal.as_stored(), n_channels, per_frame)
+            return _check_signal(signal.as_stored(), n_channels, per_frame)
     raise FormatError(f"source template: it needs a signal of {role}, which the clip has not")
 
 
-def _checked(signal: Signal, n_channels: int, per_frame: int) -> Signal:
+def _check_signal(signal: Signal, n_channels: int, per_frame: int) -> Signal:
     if (signal.n_channels, signal.samples_per_frame) != (n_channels, per_frame):  # C3D-14
         raise FormatError(
             f"source template: {n_channels} channels of {per_frame} samples a frame, but signal "
@@ -183,7 +183,7 @@ def _with_gaps(points: Signal, residuals: Values) -> Signal:
 
 
 def valid_points(signal: Signal) -> NDArray[np.bool_] | None:
-    """Which points are valid, (n_frames, n_points); None where all are."""
+    """Mask of the valid points, (n_frames, n_points); None if all are valid."""
     if signal.mask is None:
         return None
     shape = len(signal.mask), signal.n_channels // 3, 3

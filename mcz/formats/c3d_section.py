@@ -30,8 +30,8 @@ SCREENS = {  # to the right, up
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
-    """What the section is to say: of all points, outputs behind the others, and of analog data."""
+class SectionData:
+    """Data to write to the section: all points, outputs after the others, and analog data."""
 
     names: Sequence[str]
     listed: Listed
@@ -101,17 +101,19 @@ class Section:
         self.data[2] = len(self.data) // BLOCK
 
 
-def section_of(said: Said, scale: float, rate: Fraction, shape: tuple[int, int]) -> Section:
+def section_of(
+    content: SectionData, scale: float, rate: Fraction, shape: tuple[int, int]
+) -> Section:
     """The section; ``shape`` are the analog channels and their samples a frame."""
     section = Section()
-    _add_points(section, said, scale, rate)
+    _add_points(section, content, scale, rate)
     section.group("TRIAL")
     for name, kind in (
         ("ACTUAL_START_FIELD", Kind.FIRST_LONG),
         ("ACTUAL_END_FIELD", Kind.LAST_LONG),
     ):
         section.fields.append((section.add(name, INTEGER, (2,), bytes(4)), kind))
-    _add_analog(section, said, rate, *shape)
+    _add_analog(section, content, rate, *shape)
     section.group("FORCE_PLATFORM")
     section.number("USED", 0)
     section.add("TYPE", INTEGER, (0,), b"")
@@ -119,31 +121,31 @@ def section_of(said: Said, scale: float, rate: Fraction, shape: tuple[int, int])
     return section
 
 
-def _add_points(section: Section, said: Said, scale: float, rate: Fraction) -> None:
+def _add_points(section: Section, content: SectionData, scale: float, rate: Fraction) -> None:
     section.group("POINT")
-    section.number("USED", len(said.names))
+    section.number("USED", len(content.names))
     section.fields.append((section.number("FRAMES", 0), Kind.COUNT))
     section.data_start = section.number("DATA_START", 0)
     section.number("SCALE", scale)
     section.number("RATE", rate)
-    section.texts("LABELS", said.names)
-    section.texts("DESCRIPTIONS", [""] * len(said.names))
-    section.text("UNITS", said.unit)
-    if said.up_axis:
-        for name, axis in zip(("X_SCREEN", "Y_SCREEN"), SCREENS[said.up_axis], strict=True):
+    section.texts("LABELS", content.names)
+    section.texts("DESCRIPTIONS", [""] * len(content.names))
+    section.text("UNITS", content.unit)
+    if content.up_axis:
+        for name, axis in zip(("X_SCREEN", "Y_SCREEN"), SCREENS[content.up_axis], strict=True):
             section.text(name, axis)
-    for group, (labels, unit) in said.listed.groups.items():
+    for group, (labels, unit) in content.listed.groups.items():
         section.texts(group, labels)
         section.text(UNITS_OF[group], unit)
 
 
 def _add_analog(
-    section: Section, said: Said, rate: Fraction, n_channels: int, subframes: int
+    section: Section, content: SectionData, rate: Fraction, n_channels: int, subframes: int
 ) -> None:
     section.group("ANALOG")
-    channels = said.analog.channels if said.analog and said.analog.channels else ()
+    channels = content.analog.channels if content.analog and content.analog.channels else ()
     ones = Scaling(np.zeros(n_channels), np.ones(n_channels))
-    scaling = ones if said.scaling is None else said.scaling
+    scaling = ones if content.scaling is None else content.scaling
     section.number("USED", n_channels)
     section.texts("LABELS", [channel.label for channel in channels])
     section.texts("DESCRIPTIONS", [""] * n_channels)
@@ -152,5 +154,5 @@ def _add_analog(
     section.numbers("SCALE", FLOAT, "f", scaling.scales.tolist())
     section.numbers("OFFSET", INTEGER, "h", [int(offset) for offset in scaling.offsets])
     section.number("RATE", rate * subframes)
-    section.text("FORMAT", "UNSIGNED" if said.unsigned else "SIGNED")
+    section.text("FORMAT", "UNSIGNED" if content.unsigned else "SIGNED")
     section.number("BITS", 16)

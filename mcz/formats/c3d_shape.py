@@ -1,4 +1,4 @@
-"""What the data section of a C3D file consists of: header and parameters weighed against its size.
+"""Shape of a C3D data section: header and parameters checked against its size.
 
 Header and parameters often disagree, and either may be wrong. The first of their statements counts
 under which a declared number of frames fills the section; else the header's, and the data say how
@@ -127,7 +127,7 @@ def _analogs(data: bytes, parameters: Parameters) -> Iterator[tuple[int, int]]:
 
 
 def _fit(data: bytes, shape: Shape, counts: list[int], parameters: Parameters) -> tuple[int, bool]:
-    """How many frames there are, and whether that is declared and fills the section."""
+    """Number of frames, and True if it is declared and fills the section."""
     if not shape.frame_size:
         return (counts[0] if counts else 0), True
     stops = [len(data), parameters.start]
@@ -176,7 +176,7 @@ def _with_rotations(data: bytes, shape: Shape, parameters: Parameters) -> Shape:
 def _notes(
     data: bytes, shape: Shape, counts: list[int], parameters: Parameters, order: Order
 ) -> Iterator[str]:
-    """What is odd about the file, in words."""
+    """Notes on oddities of the file."""
     if shape.n_frames > COUNTED:  # a word that stays at its end says what it can
         counts = [count for count in counts if count > COUNTED]
     if any(count != shape.n_frames for count in counts):
@@ -187,10 +187,10 @@ def _notes(
         ("analog samples a frame", [order.integer(data, 4)], shape.n_channels * shape.subframes),
         ("analog channels", [parameters.count("ANALOG", "USED")], shape.n_channels),
     )
-    for what, said, found in words:
-        wrong = [number for number in said if number is not None and number != found]
+    for what, stated, actual in words:
+        wrong = [number for number in stated if number is not None and number != actual]
         if wrong:
-            yield f"{wrong[0]} {what} are declared, {found} are taken"
+            yield f"{wrong[0]} {what} are declared, {actual} are taken"
     scale, own = order.real(data, 12), parameters.number("POINT", "SCALE")
     if own is not None and not np.isclose(scale, own, rtol=1e-6, atol=0):
         yield f"the scale is {scale:.9g} in the header, {own:.9g} in POINT:SCALE"

@@ -56,7 +56,7 @@ _SECONDS = {"m": Fraction(1, 1000), "u": Fraction(1, 10**6), "n": Fraction(1, 10
 
 @dataclass(frozen=True, slots=True)
 class _Head:
-    """Where rows begin and what the lines above say; ``labels`` is where the line of names lies."""
+    """Parsed lines above the rows; ``labels`` is the offset of the line of names."""
 
     rows: int
     separator: bytes | None
@@ -98,7 +98,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     marked = data[:start] + names_in(data[start:stop], names) + data[stop : head.rows]
     said = table.missing, times.clock
     section = section_of((marked, data[: head.rows]), said, rows, names, range(1 + len(more)))
-    found = Motion(
+    motion = Motion(
         skeleton,
         (read_columns(data, rows, range(len(values))), *more),
         times.rate,
@@ -108,7 +108,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         table_source("csv", data, [(section, rows, 1)]),
         rows.numbers,
     )
-    return found if times.printed is None else found.at_times(times.printed)
+    return motion if times.printed is None else motion.at_times(times.printed)
 
 
 def counts_rows(name: str) -> bool:
@@ -141,17 +141,17 @@ def _markers(head: _Head, values: Sequence[int]) -> Skeleton | None:
     """
     joints, units = [], set()
     for k in range(0, len(values), 3):
-        found = [_COORDINATE.fullmatch(head.names[column]) for column in values[k : k + 3]]
-        axes = [match[2].lower() if match else "" for match in found]
-        name = found[0][1] if found[0] else ""
-        if sorted(axes) != ["x", "y", "z"] or any(match and match[1] != name for match in found):
+        matches = [_COORDINATE.fullmatch(head.names[column]) for column in values[k : k + 3]]
+        axes = [match[2].lower() if match else "" for match in matches]
+        name = matches[0][1] if matches[0] else ""
+        if sorted(axes) != ["x", "y", "z"] or any(match and match[1] != name for match in matches):
             return None
         if any(_NO_POSITION.fullmatch(word.lower()) for word in _WORDS.findall(name)):
             return None
         joints.append(Joint(name, channels=tuple(Channel(f"t{axis}") for axis in axes)))
         units |= {
             (head.units[column] or (match and match[3]) or "").lower()
-            for column, match in zip(values[k : k + 3], found, strict=True)
+            for column, match in zip(values[k : k + 3], matches, strict=True)
         }
     if units - {"", *UNIT_CM} or len({joint.name for joint in joints}) < len(joints):
         return None
@@ -192,8 +192,8 @@ def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[i
 
 def _head(data: bytes, encoding: str) -> _Head:
     lines = whole_cells(lines_from(data, 0))
-    found = first_row(lines)
-    if found is None:
+    row = first_row(lines)
+    if row is None:
         if has_decimal_commas(lines):
             raise SourceError(
                 "the first numbers have decimal commas, which no grid prints; "
@@ -202,7 +202,7 @@ def _head(data: bytes, encoding: str) -> _Head:
             )
         hint = "no row of numbers in the first lines; no table" if lines else "an empty file"
         raise SourceError(hint, line=1)
-    number, separator, n_cells = found
+    number, separator, n_cells = row
     above = [(at, line) for at, line in lines[:number] if not is_blank(line)]
     texts = [texts_of(line, separator, encoding) for _, line in above]
     rows = lines[number][0] or text_start(data)
@@ -230,7 +230,7 @@ def _head(data: bytes, encoding: str) -> _Head:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a line has units, at least one."""
+    """Return True if a line has at least one unit and only units."""
     return any(cells) and all(_UNIT.fullmatch(cell) for cell in cells)
 
 
@@ -239,7 +239,7 @@ def _printable(text: str) -> str:
 
 
 def _seconds(label: str, unit: str) -> Fraction:
-    """What a unit of the times is in seconds."""
+    """Unit of the times in seconds."""
     match = TIME.fullmatch(label)
     stated = (match[1] if match else None) or unit or "s"
     return _SECONDS.get(stated[0].lower().replace("µ", "u"), Fraction(1))

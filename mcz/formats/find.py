@@ -1,4 +1,4 @@
-"""Which ASF files may belong to an AMC file, by their names and where they lie."""
+"""Candidate ASF files for an AMC file, by name and folder."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ def skeletons_around(amc_path: str | Path) -> list[Candidate]:
     siblings: list[Path] = []
     for folder in _folders(path.absolute().parent.parent):
         siblings += _skeletons(folder)
-    found: dict[Path, Candidate] = {}
+    candidates: dict[Path, Candidate] = {}
     exact, short = list(_stems(path.stem)), [(_NUMBER.sub("", path.stem), NUMBER)]
     places = [(n, f) for names in (exact, short) for f in (beside, siblings) for n in names]
     for rank, ((stem, name_of), files) in enumerate(places):
         for file in files:
             if stem and file.stem == stem:
-                found.setdefault(file, Candidate(file, name_of, rank))
-    others = (file for file in (*beside, *siblings) if file not in found)
-    return [*found.values(), *(Candidate(file, "", len(places)) for file in others)]
+                candidates.setdefault(file, Candidate(file, name_of, rank))
+    others = (file for file in (*beside, *siblings) if file not in candidates)
+    return [*candidates.values(), *(Candidate(file, "", len(places)) for file in others)]
 
 
 def _stems(stem: str) -> Iterator[tuple[str, str]]:

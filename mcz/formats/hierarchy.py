@@ -94,7 +94,7 @@ class _Reader:
                 raise self.error(f"{word[:40]!r} in the HIERARCHY section")
 
     def _is_alone(self, word: bytes) -> bool:
-        """Whether the word just read is a line of its own, which cannot mean anything then."""
+        """Return True if the word just read is alone on its line, and so has no meaning."""
         line = self.data.rfind(b"\n", 0, self.at) + 1
         end = self.data.find(b"\n", self.at)
         return end >= 0 and self.data[line:end].strip(BLANKS).upper() == word != b""
@@ -191,12 +191,12 @@ def _refuse_early(reader: _Reader) -> None:
 
 
 def has_more_joints(data: bytes, most: int) -> bool:
-    """Whether a BVH surely has more joints than ``most``, by a quick look."""
+    """Return True if a quick scan finds more joints than ``most`` in a BVH."""
     return _joint_line(data, most) is not None
 
 
 def _joint_line(data: bytes, number: int) -> int | None:
-    """Where the line of a joint begins that so many others precede; None where there is none."""
+    """Offset of the line of joint ``number``, or None."""
     motion = _MOTION_LINE.search(data)
     stop = len(data) if motion is None else motion.start()
     line = next(islice(_JOINT_LINE.finditer(data, 0, stop), number, None), None)

@@ -1,4 +1,4 @@
-"""How much a text may ask for while it is parsed, before anything else has seen it.
+"""Limits on what a text may request while it is parsed.
 
 The numbers of joints and channels are those of the profile of large limits, so that no file is
 refused here that could be stored. The depth is that of a chain of all joints of the base profile.

@@ -79,7 +79,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     encoding = text_encoding(data)
     head = _head(data, encoding)
     objects = _objects(head)
-    order = [column for found in objects for column in found.columns]
+    order = [column for motion in objects for column in motion.columns]
     place = {column: k for k, column in enumerate(order)}
     n = len(order)
     cells = [[FRAME_NUMBER], *([place[column]] for column in range(n))]
@@ -87,7 +87,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     table = read_table(data, head.rows, n + 1, cells, head.separator, numbers_at=n)
     texts = [order[text.column] if text.column < n else None for text in table.texts]
     objects = _without(objects, texts)
-    n_values = sum(len(found.columns) for found in objects)
+    n_values = sum(len(motion.columns) for motion in objects)
     time = n_values + sum(text.n_numbers for text in table.texts)
     rows = without_zeros(
         data, counted_up(table.rows), (range(time, table.rows.start.shape[1]), range(n_values))
@@ -105,11 +105,11 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     labels = [head.label(column) for column in texts]
     text_signal = read_text(data, rows, table.texts, labels, (n_values, 1))
     more = (*text_signal, *times.signals)
-    names = [found.name for found in objects]
-    text = _marked(data, head, names, rows.n_rows), data[: head.rows]
+    names = [motion.name for motion in objects]
+    text = _mark_header(data, head, names, rows.n_rows), data[: head.rows]
     signals = range(1 + len(more))
     section = section_of(text, (table.missing, times.clock), rows, names, signals)
-    found = Motion(
+    motion = Motion(
         _skeleton(head, objects),
         (read_columns(data, rows, range(n_values)), *more),
         times.rate,
@@ -122,11 +122,11 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
         table_source("motive", data, [(section, rows, 1)]),
         rows.numbers,
     )
-    return found if times.printed is None else found.at_times(times.printed)
+    return motion if times.printed is None else motion.at_times(times.printed)
 
 
-def _marked(data: bytes, head: _Head, names: Sequence[str], n_rows: int) -> bytes:
-    """What stands above the rows, with marks for the first of each name and the number of rows."""
+def _mark_header(data: bytes, head: _Head, names: Sequence[str], n_rows: int) -> bytes:
+    """Lines above the rows, with marks for the first of each name and the number of rows."""
     start, stop = head.labels
     match = _COUNT.search(data, 0, start)
     count = match.span(1) if match else (0, 0)
@@ -148,7 +148,7 @@ def _head(data: bytes, encoding: str) -> _Head:
         at = lines[axis][0]
         raise SourceError("no row of numbers after Frame,Time", line=line_of(data, at) + 1)
     first = texts_of(lines[0][1], separator, encoding)
-    said = {key.lower(): value for key, value in zip(first[::2], first[1::2], strict=False)}
+    settings = {key.lower(): value for key, value in zip(first[::2], first[1::2], strict=False)}
     rows = [texts_of(line, separator, encoding) for _, line in lines[1 : axis + 1]]
     width = max(2, count_columns(rows, data[lines[axis + 1][0] :], separator))
     numbers = _numbers(rows)
@@ -159,11 +159,11 @@ def _head(data: bytes, encoding: str) -> _Head:
         if k != time
     ]
     at, line = lines[1 + (numbers[1] or 0)]
-    return _Head(said, columns, (at, at + len(line)), lines[axis + 1][0], separator, time)
+    return _Head(settings, columns, (at, at + len(line)), lines[axis + 1][0], separator, time)
 
 
 def _numbers(rows: Sequence[Sequence[str]]) -> tuple[int | None, ...]:
-    """Which row has the type, name, id, parent, kind and axis; None: no row."""
+    """Row numbers of type, name, id, parent, kind and axis; None if missing."""
     last = len(rows) - 1
     called = {row[1].lower(): k for k, row in enumerate(rows[:-1]) if len(row) > 1 and row[1]}
     if "name" in called:
@@ -175,22 +175,22 @@ def _numbers(rows: Sequence[Sequence[str]]) -> tuple[int | None, ...]:
 def _objects(head: _Head) -> list[_Object]:
     """The joints, each of neighboring columns of one type, name and id."""
     order = head.said.get("rotation type", "").upper()
-    found: list[_Object] = []
+    objects: list[_Object] = []
     before: tuple[str, ...] | None = None
     for column, (kind, name, id_, parent, what, axis) in enumerate(head.columns):
         channel = _channel(what, axis, euler=_ORDER.fullmatch(order) is not None)
         mine = kind, name, id_
-        if mine != before or channel in found[-1].channels:
-            found.append(_Object(name or f"column {column + 3}", id_, parent, [], []))
+        if mine != before or channel in objects[-1].channels:
+            objects.append(_Object(name or f"column {column + 3}", id_, parent, [], []))
         before = mine
-        found[-1].columns.append(column)
-        found[-1].channels.append(channel)
-    for one in found:
+        objects[-1].columns.append(column)
+        objects[-1].channels.append(channel)
+    for one in objects:
         if _ORDER.fullmatch(order):
             _sort_rotations(one, order.lower())
         elif not {channel.kind for channel in one.channels} >= QUATERNION:
             one.channels = [_without_kind(channel) for channel in one.channels]
-    return found
+    return objects
 
 
 def _without_kind(channel: Channel) -> Channel:
@@ -241,9 +241,9 @@ def _skeleton(head: _Head, objects: Sequence[_Object]) -> Skeleton:
     return Skeleton(tuple(joints), unit_cm=UNITS.get(head.said.get("length units", "").lower()))
 
 
-def _notes(said: dict[str, str], n_rows: int, times: Times, is_stated: bool) -> list[str]:
+def _notes(settings: dict[str, str], n_rows: int, times: Times, is_stated: bool) -> list[str]:
     notes = []
-    declared = said.get("total exported frames", "")
+    declared = settings.get("total exported frames", "")
     if declared and declared != str(n_rows):
         notes.append(f"{declared[:40]} frames are declared, {n_rows} are there")
     if is_stated and times.rate is None:

@@ -1,4 +1,4 @@
-"""What departs frame by frame in the layout of a text file: the notes of AMC and BVH sources.
+"""Frame-by-frame deviations from a text layout: the notes of AMC and BVH sources.
 
 SPEC.md, "Source reconstruction", is normative and has the table of Notes.
 """
@@ -51,7 +51,7 @@ class Notes(Record):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowNotes:
-    """What departs row by row: pattern numbers (n_rows,), and odd texts of the frame number.
+    """Deviations row by row: pattern numbers (n_rows,), and odd texts of the frame number.
 
     ``texts`` are (row, text), sorted.
     """
@@ -70,7 +70,7 @@ class RowNotes:
         if runs[-1][1] == 0:
             runs.pop()
         patterns_of_rows = [PatternRun(n_rows=n, pattern=pattern) for n, pattern in runs]
-        return build(Notes(patterns=patterns_of_rows, texts=_spaced(texts)), "source notes")
+        return build(Notes(patterns=patterns_of_rows, texts=_space_texts(texts)), "source notes")
 
     def part(self, start: int, stop: int) -> RowNotes:
         """The notes of rows start <= r < stop alone, numbered from 0."""
@@ -83,7 +83,7 @@ def _runs(values: Ints) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _spaced(texts: Sequence[tuple[int, bytes]]) -> list[NumberText]:
+def _space_texts(texts: Sequence[tuple[int, bytes]]) -> list[NumberText]:
     """Texts with the distance of each row to the one before."""
     fields = []
     before = 0
@@ -108,8 +108,8 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
         fields = parse(Notes, data, where)
         for first, last, pattern in checked_runs(fields.patterns, stop - start, where):
             patterns[start + first : start + last] = pattern
-        found = checked_texts(fields.texts, stop - start, where)
-        texts += [(start + row, text) for row, text in found]
+        odd_texts = checked_texts(fields.texts, stop - start, where)
+        texts += [(start + row, text) for row, text in odd_texts]
     return RowNotes(patterns, tuple(texts))
 
 

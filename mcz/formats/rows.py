@@ -39,7 +39,7 @@ def line_of(data: bytes, offset: int) -> int:
 
 
 def tail_end(data: bytes, at: int) -> int:
-    """Where the tail of a frame ends whose last token ends at ``at``: after the next line end,
+    """End of the tail of a frame whose last token ends at ``at``: after the next line end,
     or before the next token of the same line."""
     return _TAIL.match(data, at).end()  # type: ignore[union-attr]  # it matches nothing, too
 
@@ -166,7 +166,7 @@ class _Reader:
         self.numbers = np.zeros(n_rows, np.int64)
 
     def _most_rows(self) -> int:
-        """How many rows there may be: more would take memory that no bytes stand for."""
+        """Limit of the number of rows: more would take memory without bytes for it."""
         return (self.room * len(self.data) + FEW_CELLS) // max(1, self.n_columns) + 2
 
     def _grow(self, done: int, size: int) -> None:

@@ -35,7 +35,7 @@ def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
     chosen = slice(None) if dense else np.flatnonzero(mask)
     tokens = scan(data, rows.start.ravel()[chosen], rows.stop.ravel()[chosen])
     try:
-        found = tokens.values()
+        numbers = tokens.values()
     except SourceError:
         first = int(np.flatnonzero(tokens.bad())[0])
         text = tokens.token(first)[:40]
@@ -44,9 +44,9 @@ def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
             line=line_of(data, int(tokens.start[first])),
             value=text.decode("latin-1"),
         ) from None
-    values = found.reshape(shape) if dense else np.zeros(shape)
+    values = numbers.reshape(shape) if dense else np.zeros(shape)
     if not dense:
-        values[mask] = found
+        values[mask] = numbers
         _hold(values, mask)
     grids, changes, printed = _grids(tokens, mask, n_each)
     odd = np.flatnonzero(~printed)

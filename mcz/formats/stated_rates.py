@@ -63,30 +63,30 @@ def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
     """A template of BVH at another rate; None where it states none."""
     fields = parse(Template, template, WHERE, {"runs": MAX_RUNS})
     parts = [bytes(part) for part in fields.header]
-    found = _FRAME_TIME.search(parts[-1]) if parts else None
-    if found is None:
+    match = _FRAME_TIME.search(parts[-1]) if parts else None
+    if match is None:
         return None
-    stated, _ = frame_rate(found[1].decode("latin-1"))
-    text = _like(found[1], 1 / rate, lambda text: _is_time_of(text, rate))
-    parts[-1] = _replaced(parts[-1], found.span(1), text or frame_time(rate).encode())
+    stated, _ = frame_rate(match[1].decode("latin-1"))
+    text = _like(match[1], 1 / rate, lambda text: _is_time_of(text, rate))
+    parts[-1] = _replace_text(parts[-1], match.span(1), text or frame_time(rate).encode())
     return Restated(stated or NONE, build(replace(fields, header=parts), WHERE))
 
 
 def restate_c3d(template: bytes, rate: Fraction) -> Restated | None:
     """A template of C3D at another rate; None where it states none."""
     fields = parse(C3dTemplate, template, WHERE)
-    found = _restated_head(fields, rate)
-    return found and Restated(found.rate, build(replace(fields, head=found.template), WHERE))
+    head = _restated_head(fields, rate)
+    return head and Restated(head.rate, build(replace(fields, head=head.template), WHERE))
 
 
 def restate_outputs(template: bytes, rate: Fraction) -> Restated | None:
     """A template of C3D with outputs of models at another rate; None where it states none."""
     fields = parse(C3dOutputsTemplate, template, WHERE)
-    found = _restated_head(fields.file, rate)
-    if found is None:
+    head = _restated_head(fields.file, rate)
+    if head is None:
         return None
-    file = replace(fields.file, head=found.template)
-    return Restated(found.rate, build(replace(fields, file=file), WHERE))
+    file = replace(fields.file, head=head.template)
+    return Restated(head.rate, build(replace(fields, file=file), WHERE))
 
 
 def _restated_head(shared: C3dTemplate, rate: Fraction) -> Restated | None:
@@ -101,14 +101,14 @@ def _restated_head(shared: C3dTemplate, rate: Fraction) -> Restated | None:
     head[HEADER_RATE : HEADER_RATE + 4] = order.build_real(float(rate))
     rates = (("POINT", rate), ("ANALOG", rate * shared.subframes))
     for group, value in rates:
-        found = parameters.get(group, "RATE")
-        if found is None or found.type not in (FLOAT, INTEGER):
+        parameter = parameters.get(group, "RATE")
+        if parameter is None or parameter.type not in (FLOAT, INTEGER):
             continue
-        if found.type == INTEGER and (value.denominator > 1 or value > 0xFFFF):
+        if parameter.type == INTEGER and (value.denominator > 1 or value > 0xFFFF):
             return Restated(stated, shared.head)
-        text = order.build_real(float(value)) if found.type == FLOAT else b""
+        text = order.build_real(float(value)) if parameter.type == FLOAT else b""
         text = text or order.build_integer(int(value))
-        head[found.at : found.at + len(text)] = text
+        head[parameter.at : parameter.at + len(text)] = text
     for at in event_times(bytes(head), parameters) if stated else ():
         time = order.real(bytes(head[at : at + 4]), 0) * float(stated / rate)
         head[at : at + 4] = order.build_real(time)
@@ -131,7 +131,7 @@ def restate_table(template: bytes, rate: Fraction) -> Restated | None:
         header = _in_header(_text(section), factor)
         header = with_phrases(header) if section.marks else header
         own = parsed_clock(section)
-        scaled = None if own is None else _scaled(own, factor)
+        scaled = None if own is None else _scale_clock(own, factor)
         if own is not None and scaled is None:
             return Restated(stated, template)
         sections.append(replace(section, header=header, clock=scaled))
@@ -147,8 +147,8 @@ def _text(section: SectionFields) -> bytes:
 
 
 def _vicon_rate(section: SectionFields) -> Fraction | None:
-    found = _VICON.search(_text(section))
-    return stated_rate(found[1].decode("latin-1")) if found else None
+    match = _VICON.search(_text(section))
+    return stated_rate(match[1].decode("latin-1")) if match else None
 
 
 def _in_header(header: bytes, factor: Fraction) -> bytes:
@@ -164,11 +164,11 @@ def _in_header(header: bytes, factor: Fraction) -> bytes:
         if old is not None:
             rate = old * factor
             text = _like(header[start:stop], rate, _is_near(rate))
-            header = _replaced(header, (start, stop), text)
+            header = _replace_text(header, (start, stop), text)
     return header
 
 
-def _scaled(clock: Clock, factor: Fraction) -> ClockFields | None:
+def _scale_clock(clock: Clock, factor: Fraction) -> ClockFields | None:
     """A clock whose times are divided by ``factor``; None where its terms are too large.
 
     It prints more decimals, up to ``DECIMALS``, where the times need them.
@@ -203,5 +203,5 @@ def _is_near(rate: Fraction) -> Callable[[str], bool]:
     return lambda text: abs(Fraction(text) / rate - 1) <= SAME_RATE
 
 
-def _replaced(data: bytes, place: tuple[int, int], text: bytes) -> bytes:
+def _replace_text(data: bytes, place: tuple[int, int], text: bytes) -> bytes:
     return data[: place[0]] + text + data[place[1] :]

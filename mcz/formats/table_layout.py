@@ -1,4 +1,4 @@
-"""How tables of numbers are laid out: sections, each with a header, patterns, and what is missing.
+"""Layout of tables of numbers: sections with header, patterns, and missing cells.
 
 TRC, MOT, STO and CSV files share this; SPEC.md, "The text of tables", is normative.
 """
@@ -140,10 +140,10 @@ class Clock:
 
     def ordinals(self, numbers: Sequence[int]) -> list[int]:
         """The ordinal of every time; FormatError for one far beyond every grid."""
-        found = [(n * self.numerator + self.offset) // self.denominator for n in numbers]
-        if any(abs(ordinal) > MOST for ordinal in found):
+        ordinals = [(n * self.numerator + self.offset) // self.denominator for n in numbers]
+        if any(abs(ordinal) > MOST for ordinal in ordinals):
             raise FormatError("source template: a time is no number of its grid")
-        return found
+        return ordinals
 
     def frames_a_second(self, rate: Fraction | None) -> Fraction | None:
         """The frame numbers in a second of this clock; None of times that stand still."""
@@ -263,5 +263,5 @@ def with_phrases(header: bytes) -> bytes:
 
 
 def any_mark(header: bytes) -> bool:
-    """Whether ``header`` has a byte that would be taken for a mark."""
+    """Return True if ``header`` has a byte that would be read as a mark."""
     return _MARKS.search(header) is not None

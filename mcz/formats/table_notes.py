@@ -1,4 +1,4 @@
-"""What departs row by row in the sections of a table: the frame notes of tables.
+"""Row-by-row deviations in the sections of a table: the frame notes of tables.
 
 SPEC.md, "Template of tables", is normative and has the table of SectionNotesFields.
 """
@@ -104,8 +104,12 @@ class TableNotes:
 
 def table_notes(sections: Sequence[tuple[int, RowNotes | None]]) -> TableNotes | None:
     """The notes of sections that have so many rows a frame; None where all is usual."""
-    found = [_sparse(n_each, notes) for n_each, notes in sections]
-    return TableNotes(tuple(found)) if any(s.runs or s.texts for s in found) else None
+    notes_by_section = [_sparse(n_each, notes) for n_each, notes in sections]
+    return (
+        TableNotes(tuple(notes_by_section))
+        if any(s.runs or s.texts for s in notes_by_section)
+        else None
+    )
 
 
 def _sparse(n_each: int, notes: RowNotes | None) -> SectionNotes:
@@ -122,15 +126,15 @@ def join_table_notes(parts: Sequence[tuple[int, int, bytes]]) -> TableNotes:
 
     Raises FormatError where a part is not a TableNotesFields of ``stop - start`` frames.
     """
-    found: list[SectionNotes] = []
+    joined: list[SectionNotes] = []
     for start, stop, data in sorted(parts):
         if not data:
             continue
         where = f"source notes of frames {start} to {stop}"
         for number, fields in enumerate(parse(TableNotesFields, data, where).sections):
-            if number == len(found):
-                found.append(SectionNotes(fields.rows_per_frame))
-            mine = found[number]
+            if number == len(joined):
+                joined.append(SectionNotes(fields.rows_per_frame))
+            mine = joined[number]
             if mine.n_each != fields.rows_per_frame:  # TABLE-09
                 raise FormatError(
                     f"{fields.rows_per_frame} rows a frame, once {mine.n_each}", where=where
@@ -139,4 +143,4 @@ def join_table_notes(parts: Sequence[tuple[int, int, bytes]]) -> TableNotes:
             runs = checked_runs(fields.patterns, n_rows, where)
             mine.runs += [(first + a, first + b, p) for a, b, p in runs if p]
             mine.texts += [(first + r, t) for r, t in checked_texts(fields.texts, n_rows, where)]
-    return TableNotes(tuple(found))
+    return TableNotes(tuple(joined))

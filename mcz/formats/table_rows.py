@@ -34,12 +34,12 @@ _FIRST = re.compile(rb'[ \t]*"?[-+]?\.?[0-9]')
 
 def lines_from(data: bytes, at: int) -> list[tuple[int, bytes]]:
     """(offset, line with its end) of the lines from ``at`` on, at most 4096 of them."""
-    found: list[tuple[int, bytes]] = []
-    while at < len(data) and len(found) < 4096:
+    lines: list[tuple[int, bytes]] = []
+    while at < len(data) and len(lines) < 4096:
         end = data.find(b"\n", at) + 1 or len(data)
-        found.append((at, data[at:end]))
+        lines.append((at, data[at:end]))
         at = end
-    return found
+    return lines
 
 
 def begins_with_number(line: bytes) -> bool:
@@ -164,7 +164,7 @@ def read_table(
         cells = RowCells(data, columns, separator, blanks, free)
         empty = FREE if free and len(columns) > 1 else BLANKS  # an empty line is no row
         mode = empty if blanks else FULL
-        return read_rows(data, at, n_columns, cells, mode, _padded(data, at, cells), DENSE)
+        return read_rows(data, at, n_columns, cells, mode, _padded_cells(data, at, cells), DENSE)
 
     rows = attempt(True)
     if not rows.n_rows:
@@ -198,19 +198,19 @@ def followed_by(rows: Rows, rest: bytes) -> Rows:
     return replace(rows, ending=ending + rest) if rest else rows
 
 
-def _padded(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
+def _padded_cells(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
     """The width of each column that its first rows show to be right justified."""
     totals: dict[int, list[tuple[int, int]]] = {}
     for _ in range(LOOKED_AT):
-        found = cells(at)
-        if found is None:
+        spans = cells(at)
+        if spans is None:
             break
         before = at
-        for start, stop, column in found[0]:
+        for start, stop, column in spans[0]:
             gap = data[before:start]
             totals.setdefault(column, []).append((len(gap) - len(gap.rstrip(b" ")), stop - start))
             before = stop
-        at = found[1]
+        at = spans[1]
     widths = {}
     for column, seen in totals.items():
         width = max(n + size for n, size in seen)
@@ -220,7 +220,7 @@ def _padded(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
 
 
 def _are(data: bytes, rows: Rows, word: bytes) -> Bools:
-    """Which tokens are ``word``."""
+    """Mask of the tokens equal to ``word``."""
     text = np.frombuffer(data, np.uint8)
     same: Bools = rows.stop - rows.start == len(word)
     for k, byte in enumerate(word):
@@ -253,7 +253,7 @@ def without_zeros(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> R
     less = np.zeros(rows.stop.shape[1], np.int64)
     less[list(zeros)] = [len(zero) for zero in zeros.values()]
     ending = rows.ending
-    moved = [_moved(pattern, zeros) for pattern in rows.patterns]
+    moved = [_move_pattern(pattern, zeros) for pattern in rows.patterns]
     if ending is not None:
         last = rows.patterns[last_pattern(rows)].runs
         column = last[-1].column + last[-1].n_columns - 1 if last else FRAME_NUMBER
@@ -283,7 +283,7 @@ class _Item:
     width: int
 
 
-def _moved(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
+def _move_pattern(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
     """``pattern`` with the zeros behind each token at the front of the gap that follows."""
     items, before = [], b""
     for item in _split(pattern):

@@ -37,12 +37,12 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 
     rows = of_columns(rows, columns)
     signal = read_signal(data, rows, n_each)
     tried = range(min(len(columns), MOST_TRIED))
-    found = {c: better for c in tried if (better := _better(data, rows, signal, c))}
-    if not found:
+    better_columns = {c: better for c in tried if (better := _better(data, rows, signal, c))}
+    if not better_columns:
         return signal
     grids = list(signal.grids)
     exceptions = signal.exceptions
-    kept = ~np.isin(exceptions.channels, list(found))
+    kept = ~np.isin(exceptions.channels, list(better_columns))
     entries = [
         *zip(
             exceptions.rows[kept].tolist(),
@@ -51,14 +51,16 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 
             strict=True,
         )
     ]
-    for column, (grid, odd) in found.items():
+    for column, (grid, odd) in better_columns.items():
         grids[column] = grid
         entries += [(row, column, text) for row, text in odd]
     entries.sort()
     return replace(
         signal,
         grids=tuple(grids),
-        grid_changes=tuple(change for change in signal.grid_changes if change[1] not in found),
+        grid_changes=tuple(
+            change for change in signal.grid_changes if change[1] not in better_columns
+        ),
         exceptions=Exceptions(
             np.array([row for row, _, _ in entries], np.int64),
             np.array([column for _, column, _ in entries], np.int64),
@@ -105,11 +107,11 @@ def text_columns(metadata: Mapping[str, str]) -> str:
 
 def table_metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:
     """The metadata of a clip about its source: the encoding of its names, oddities."""
-    found = {
+    metadata = {
         "name-encoding": encoding if encoding != "utf-8" else "",
         "source-note": "; ".join(filter(None, notes)),
     }
-    return {key: value for key, value in found.items() if value}
+    return {key: value for key, value in metadata.items() if value}
 
 
 def _better(

@@ -39,7 +39,7 @@ def names_in(line: bytes, names: Sequence[str]) -> bytes:
 
 
 def _label_at(line: bytes, label: bytes, at: int) -> int:
-    """Where ``label`` stands between separators in ``line``, from ``at`` on; else -1."""
+    """Offset of ``label`` between separators in ``line`` from ``at`` on, or -1."""
     while (at := line.find(label, at)) >= 0:
         stop = at + len(label)
         if line[max(at - 1, 0) : at] in BEFORE and line[stop : stop + 1] in AFTER:

@@ -1,4 +1,4 @@
-"""What the column of times of a table says: a clock, or a signal of their own, and a frame rate."""
+"""Times column of a table: a clock or a signal of its own, and a frame rate."""
 
 from __future__ import annotations
 

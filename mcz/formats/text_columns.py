@@ -74,8 +74,8 @@ class OddCells:
         n_words = np.bincount(self.columns[self.is_missing], minlength=n_columns)
         n_commas = np.bincount(self.columns[is_comma], minlength=n_columns)
         chosen = (2 * n_texts > self.n_cells - n_words) & (2 * n_commas <= n_texts)
-        found: list[int] = np.flatnonzero(chosen).tolist()
-        return found
+        chosen_columns: list[int] = np.flatnonzero(chosen).tolist()
+        return chosen_columns
 
 
 def odd_cells(data: bytes, rows: Rows) -> OddCells:
@@ -85,11 +85,11 @@ def odd_cells(data: bytes, rows: Rows) -> OddCells:
     chosen = slice(None) if present.all() else np.flatnonzero(present)
     tokens = scan(data, rows.start.ravel()[chosen], rows.stop.ravel()[chosen])
     odd = np.flatnonzero(tokens.fields[:, 2] & (loops.BAD | loops.SPECIAL))
-    found = tokens[odd]
-    texts = found.texts().tolist() if len(odd) else []
-    is_bad = found.bad()
+    cells = tokens[odd]
+    texts = cells.texts().tolist() if len(odd) else []
+    is_bad = cells.bad()
     is_missing = np.array([text in NO_NUMBER for text in texts], np.bool_)
-    is_missing[~is_bad] = np.isnan(found[~is_bad].values())
+    is_missing[~is_bad] = np.isnan(cells[~is_bad].values())
     odd = odd if isinstance(chosen, slice) else chosen[odd]
     places = np.divmod(odd, rows.start.shape[1])
     return OddCells(*places, texts, is_missing, np.count_nonzero(present, axis=0))
@@ -164,7 +164,7 @@ def split_text(
     patterns, last_carry = [], b""
     for layout in layouts[order].tolist():
         mine = {c: of[k] for c, (_, of), k in zip(columns, shapes, layout[1:], strict=True)}
-        pattern, carry = _merged(rows.patterns[layout[0]], mine, place, before)
+        pattern, carry = _merge_columns(rows.patterns[layout[0]], mine, place, before)
         patterns.append(pattern)
         if layout == layouts[of_row[-1]].tolist():
             last_carry = carry
@@ -180,7 +180,7 @@ def split_text(
     ), found
 
 
-def _merged(
+def _merge_columns(
     pattern: Pattern, shapes: dict[int, _Shape], place: dict[int, int], first: int
 ) -> tuple[Pattern, bytes]:
     """``pattern`` with texts in its gaps, and what it has put in front of its tail."""
@@ -234,7 +234,7 @@ def _split(
 
 
 def _widths(texts: Counter[bytes]) -> list[int]:
-    """Of each number of the texts its digits, each a column; 0: one column, none is padded."""
+    """Digits of each padded number of the texts, a column each; 0: one unpadded column."""
     widths: list[int] = []
     plain: list[bool] = []
     for text in texts:

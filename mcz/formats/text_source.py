@@ -40,7 +40,7 @@ def _wide_encoding(data: bytes) -> str | None:
 
 
 def text_start(data: bytes) -> int:
-    """Where the text begins: after the byte order mark of UTF-8, if there is one."""
+    """Offset of the text, after a UTF-8 byte order mark if there is one."""
     return len(BOM) if data.startswith(BOM) else 0
 
 

@@ -36,7 +36,7 @@ def stated_rate(text: str) -> Fraction | None:
 def find_clock(
     tokens: Tokens, numbers: Ints, stated: Sequence[Fraction], seconds: Fraction = Fraction(1)
 ) -> Clock | None:
-    """How the times follow from the frame numbers, None where they do not.
+    """Find the clock that gives the times from the frame numbers, or None.
 
     ``stated``: rates that the file states. Tried are these and round ones near the mean.
     ``seconds``: what a unit of the times is.
@@ -72,8 +72,8 @@ def _decimals(tokens: Tokens) -> int:
 
 def _round(rate: Fraction) -> list[Fraction]:
     """Round rates near ``rate``, and itself; none near 0."""
-    found = [round(rate / unit) * unit for unit in UNITS]
-    return [r for r in (*found, rate.limit_denominator(LARGEST_DENOMINATOR)) if r > 0]
+    rounded = [round(rate / unit) * unit for unit in UNITS]
+    return [r for r in (*rounded, rate.limit_denominator(LARGEST_DENOMINATOR)) if r > 0]
 
 
 def _offset(ordinals: Ints, numbers: Ints, numerator: int, denominator: int) -> int | None:
@@ -113,14 +113,16 @@ def rate_of_times(
     of_run = _round(_mean_rate(run, np.arange(len(run)))) if len(run) > 1 else []
     for k, half_digit in enumerate(half_digits):
         digits = _Digits(2 * half_digit, noise)
-        found = chain(
-            _counted(times, given, digits, 1.0),
-            _stepped(times, stated, digits, 0.99),  # all of a digit: halfway between two frames
-            _counted(times, near, digits),
-            _stepped(times, of_run, digits),
-            _counted(times, near, digits, 1.0) if k == 0 else (),
+        rates = chain(
+            _counted_rates(times, given, digits, 1.0),
+            _stepped_rates(
+                times, stated, digits, 0.99
+            ),  # all of a digit: halfway between two frames
+            _counted_rates(times, near, digits),
+            _stepped_rates(times, of_run, digits),
+            _counted_rates(times, near, digits, 1.0) if k == 0 else (),
         )
-        rate = next(found, None)
+        rate = next(rates, None)
         if rate is not None:
             is_round = any((rate / unit).denominator == 1 for unit in UNITS)
             return rate, rate in stated or is_round
@@ -145,7 +147,7 @@ class _Digits:
         return bool(spread <= allowed + self.noise)
 
 
-def _counted(
+def _counted_rates(
     times: Floats,
     candidates: Sequence[tuple[Ints, list[Fraction]]],
     digits: _Digits,
@@ -163,7 +165,7 @@ def _mean_rate(times: Floats, count: Ints) -> Fraction:
     return Fraction(mean) if 1e-9 < mean < 1e9 else Fraction(0)
 
 
-def _stepped(
+def _stepped_rates(
     times: Floats, rates: Sequence[Fraction], digits: _Digits, share: float = 0
 ) -> Iterator[Fraction]:
     """The rates by which most of rising times follow each other by one frame, others by more."""

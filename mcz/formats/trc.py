@@ -33,7 +33,7 @@ _KEYS = re.compile(rb"(?i)[ \t]*datarate\b")
 
 @dataclass(frozen=True, slots=True)
 class _Header:
-    """What a header says: ``values`` by key in lower case, and where the labels and rows begin."""
+    """Parsed header: ``values`` by key in lower case, and the offsets of labels and rows."""
 
     values: dict[str, str]
     count: tuple[int, int]  # where NumFrames is printed; (0, 0): nowhere
@@ -62,7 +62,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     unit_cm = UNIT_CM.get(header.values.get("units", "").lower())
     skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="")
     times, note = _times(data, rows, time, header.values)
-    text = _marked(data, header, rows.n_rows, names[: len(labels)])
+    text = _mark_header(data, header, rows.n_rows, names[: len(labels)])
     signals = range(1 + len(times.signals))
     section = section_of(text, (table.missing, times.clock), rows, names, signals)
     found = Motion(
@@ -111,7 +111,7 @@ def _labels(line: bytes, encoding: str) -> list[str]:
 
 
 def _widest(data: bytes, at: int) -> int:
-    """How many markers the cells of the longest row are of."""
+    """Number of markers of the longest row."""
     cells = max((line.rstrip().count(b"\t") for line in data[at:].split(b"\n")), default=1)
     return max(0, -(-(cells - 1) // 3))
 
@@ -130,7 +130,9 @@ def _times(data: bytes, rows: Rows, column: int, values: dict[str, str]) -> tupl
     return times, [*odd, times.note]
 
 
-def _marked(data: bytes, header: _Header, n_rows: int, names: Sequence[str]) -> tuple[bytes, bytes]:
+def _mark_header(
+    data: bytes, header: _Header, n_rows: int, names: Sequence[str]
+) -> tuple[bytes, bytes]:
     """The header with marks for names, their numbers and the number of rows; and as it is."""
     start, stop = header.labels
     parts = (

@@ -88,17 +88,17 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     """
     encoding = text_encoding(data)
     parts = _parts(data, encoding)
-    found = [_read(data, part) for part in parts]
-    found[-1].rows = followed_by(found[-1].rows, data[parts[-1].stop :])
-    first = _motion_of(found)
-    rated = found[first or 0]
+    parts_read = [_read(data, part) for part in parts]
+    parts_read[-1].rows = followed_by(parts_read[-1].rows, data[parts[-1].stop :])
+    first = _motion_of(parts_read)
+    rated = parts_read[first or 0]
     numbers = rated.numbers[:: rated.n_each]
-    for one in found:
+    for one in parts_read:
         _check_frames(data, one, numbers)
-    signals, of_section = _signals(data, found, first, len(numbers))
-    joints = _joints(found[first].part) if first is not None else ()
+    signals, of_section = _signals(data, parts_read, first, len(numbers))
+    joints = _joints(parts_read[first].part) if first is not None else ()
     sections = []
-    for k, one in enumerate(found):
+    for k, one in enumerate(parts_read):
         names = [joint.name for joint in joints] if k == first else []
         sections.append((_section(data, one, names, of_section[k]), one.rows, one.n_each))
     usual = np.array_equal(numbers, np.arange(1, len(numbers) + 1))
@@ -106,14 +106,14 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     return Motion(
         Skeleton(
             joints,
-            unit_cm=None if first is None else _unit_cm(found[first].part),
-            angle_unit="" if first is None else _angle_unit(found[first].part),
+            unit_cm=None if first is None else _unit_cm(parts_read[first].part),
+            angle_unit="" if first is None else _angle_unit(parts_read[first].part),
         ),
         signals,
         rate and rate / rated.n_each,
         True,
         name,
-        table_metadata(encoding, [text_note([t for one in found for t in one.part.texts])]),
+        table_metadata(encoding, [text_note([t for one in parts_read for t in one.part.texts])]),
         table_source("vicon", data, sections),
         None if usual else numbers,
     )
@@ -224,12 +224,12 @@ def _without(part: _Part, texts: Sequence[int]) -> _Part:
     return replace(part, groups=groups, texts=tuple(labels))
 
 
-def _motion_of(found: Sequence[_Read]) -> int | None:
+def _motion_of(parts: Sequence[_Read]) -> int | None:
     """The section of the motion: trajectories, objects, segments, else one of a row a frame."""
-    able = [k for k, one in enumerate(found) if one.n_each == 1]
+    able = [k for k, one in enumerate(parts) if one.n_each == 1]
     for title in MOTIONS:
         for k in able:
-            if found[k].part.title.lower() == title:
+            if parts[k].part.title.lower() == title:
                 return k
     return next(iter(able), None)
 
@@ -245,14 +245,14 @@ def _check_frames(data: bytes, one: _Read, numbers: Ints) -> None:
 
 
 def _signals(
-    data: bytes, found: Sequence[_Read], first: int | None, n_frames: int
+    data: bytes, parts: Sequence[_Read], first: int | None, n_frames: int
 ) -> tuple[tuple[Signal, ...], list[list[int]]]:
     """The motion and the signals of all other sections; which signals are those of each section."""
     motion = Signal(np.zeros((n_frames, 0)), ())
     if first is not None:
-        motion = read_columns(data, found[first].rows, range(found[first].part.n_columns))
+        motion = read_columns(data, parts[first].rows, range(parts[first].part.n_columns))
     signals, numbers = [motion], []
-    for k, one in enumerate(found):
+    for k, one in enumerate(parts):
         part, mine = one.part, []
         n = part.n_columns
         more = []

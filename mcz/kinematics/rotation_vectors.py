@@ -23,7 +23,7 @@ def matrices_of_vectors(vectors: Floats) -> Floats:
     angle = _length(vectors)
     # np.sinc is sin(pi x) / (pi x), and 1 at 0: there is no division to go wrong near zero.
     first, half = np.sinc(angle / np.pi), np.sinc(angle / FULL_TURN)
-    return _combined(vectors, first, half * half / 2, angle)
+    return _combine_vectors(vectors, first, half * half / 2, angle)
 
 
 def spins_of_vectors(vectors: Floats) -> Floats:
@@ -37,7 +37,7 @@ def spins_of_vectors(vectors: Floats) -> Floats:
         third = (angle - np.sin(angle)) / (square * angle)
     near = angle < NEAR
     series = np.polynomial.polynomial.polyval(np.where(near, square, 0.0), SERIES)
-    return _combined(vectors, half * half / 2, np.where(near, series, third), angle)
+    return _combine_vectors(vectors, half * half / 2, np.where(near, series, third), angle)
 
 
 def _length(vectors: Floats) -> Floats:
@@ -46,7 +46,7 @@ def _length(vectors: Floats) -> Floats:
     return length
 
 
-def _combined(vectors: Floats, first: Floats, second: Floats, angle: Floats) -> Floats:
+def _combine_vectors(vectors: Floats, first: Floats, second: Floats, angle: Floats) -> Floats:
     """I + ``first`` K + ``second`` K K, K the matrix of the cross product by v."""
     out = np.empty((3, 3, vectors.shape[1]))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):

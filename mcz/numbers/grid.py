@@ -66,7 +66,7 @@ class Grid:
 
     @property
     def signed_magnitude(self) -> bool:
-        """Whether ordinal -1 - m stands for minus the number of ordinal m."""
+        """True if ordinal -1 - m is minus the number of ordinal m."""
         return self.kind not in (GridKind.INTEGER, GridKind.SCALED)
 
     @property
@@ -222,7 +222,7 @@ class Grid:
         return ordinals, known
 
     def exceptions(self, tokens: Tokens) -> int:
-        """How many of the tokens this grid does not print."""
+        """Count the tokens that this grid does not print."""
         return len(tokens) - int(np.count_nonzero(self.ordinals_of_tokens(tokens)[1]))
 
     def texts(self, ordinals: Ints) -> Texts:
@@ -284,7 +284,7 @@ GRID = Adapted(GridFields, _grid_of, _fields_of)
 
 
 def _beyond(chosen: Bools, values: Floats) -> Bools:
-    """Which of all tokens are too large for a binary64, ``values`` being those of ``chosen``.
+    """Mask of all tokens beyond binary64; ``values`` are those of ``chosen``.
 
     The greatest number, printed with fewer digits, reads as infinity: its text is an exception.
     """

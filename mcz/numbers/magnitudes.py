@@ -29,7 +29,7 @@ def general_split(magnitudes: Ints, digits: int) -> tuple[Ints, Ints]:
 
 
 def general_magnitudes(values: Floats, digits: int) -> Ints:
-    """Of values in one dimension: by a product that is exact enough, else by printing."""
+    """Magnitudes of values (n,): by an exact enough product, else by printing."""
     zero = values == 0
     values = np.where(zero, 1.0, values)
     power = np.floor(np.log10(values)).astype(np.int64)

@@ -52,7 +52,7 @@ def decimal(value: float, power: int, digits: int, tens: Floats, powers: Floats)
 
 
 def magnitude_of(mantissa: int, power: int, digits: int, tens: Floats) -> int:
-    """That of a number of so many significant digits, the first of them at a power of ten."""
+    """Magnitude of a number with ``digits`` significant digits, the first at ``power`` of ten."""
     low = int(tens[digits - 1])
     return (power - MIN_POWER) * 9 * low + 1 + mantissa - low
 

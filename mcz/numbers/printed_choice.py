@@ -1,4 +1,4 @@
-"""Which PRINTED grids a run of tokens may be on. The choice is an encoder's."""
+"""Encoder choice of the PRINTED grid of a run of tokens."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def printed_candidates(tokens: Tokens) -> Iterator[Candidate]:
 
 
 def printed_bits(base: int, style: int) -> float:
-    """About how many bits an ordinal has that nothing is known of."""
+    """Estimate the bits of an ordinal without context."""
     if base == BASE_32:
         return 7.0 + 3.33 * style if style < SHORT_FIXED else 40.5  # the first is below FIXED
     if base == BASE_64:
@@ -75,7 +75,7 @@ def _with_bits(base: int, flags: int, style: int) -> Candidate:
 
 
 def _exponents(tokens: Tokens, decimals: Ints) -> Iterator[Candidate]:
-    """Of numbers that mostly have exponents and as many digits: %.ne."""
+    """Candidates for numbers that mostly have exponents and equal digits: %.ne."""
     loops = kernels()
     n = int(np.bincount(decimals).argmax())
     if n > MOST_DECIMALS:
@@ -116,7 +116,7 @@ def _decimals(values: Floats) -> Iterator[int]:
 
 
 def _are_binary32(values: Floats, tolerance: Floats) -> bool:
-    """Whether nearly all values lie that near to a binary32."""
+    """Return True if nearly all values lie within ``tolerance`` of a binary32."""
     with np.errstate(over="ignore"):
         near = values.astype(np.float32).astype(np.float64)
     misses = np.abs(np.where(np.isfinite(near), near, 0.0) - values)

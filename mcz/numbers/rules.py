@@ -35,7 +35,7 @@ class GridKind(IntEnum):
 
 
 class GridFlag(IntFlag):
-    """How a text grid prints, where printf leaves a choice; the bits of ``Grid.flags``."""
+    """Print options of a text grid beyond printf; the bits of ``Grid.flags``."""
 
     POINT_ZERO = 1  # an integral number without exponent ends in ".0"
     POINT = 2  # an integral number without exponent ends in "."
@@ -78,7 +78,7 @@ _LIMITS = {
 
 
 def fault(kind: GridKind, digits: int, flags: int, scale: float, style: int = 0) -> str | None:
-    """What is wrong with a grid, or None."""
+    """Return the fault of a grid, or None."""
     allowed, known = _ALLOWED.get(kind, ((0,), 0))
     if digits not in allowed:  # GRID-02
         return f"{digits} digits"
@@ -98,7 +98,7 @@ def fault(kind: GridKind, digits: int, flags: int, scale: float, style: int = 0)
 
 
 def _style_fault(digits: int, flags: int, style: int) -> str | None:
-    """What is wrong with the style of a PRINTED grid, or None."""
+    """Return the fault in the style of a PRINTED grid, or None."""
     significant = SIGNIFICANT < style <= SIGNIFICANT + 17
     exponent = EXPONENT <= style <= EXPONENT + MOST_DECIMALS
     if not (significant or exponent or (style < SIGNIFICANT and style % 64 <= MOST_DECIMALS)):

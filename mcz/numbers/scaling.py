@@ -1,4 +1,4 @@
-"""What the stored numbers of a signal mean in its unit: an offset and a factor for each channel."""
+"""Scaling of a signal's stored numbers to its unit: an offset and a factor per channel."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Scaling:
             raise MotionError(f"scaling: offsets and scales do not match {n_channels} channels")
 
     def says(self, other: Scaling | None) -> bool:
-        """Whether both say the same."""
+        """Return True if both scale alike."""
         if other is None:
             return False
         pairs = (

@@ -52,7 +52,7 @@ class Texts:
         return iter(self.tolist())
 
     def equal(self, other: Texts) -> Bools:
-        """Which texts are the same in both, as many here as there."""
+        """Mask of the equal texts; both have the same number of texts."""
         same_length = np.array_equal(self.offsets, other.offsets)
         if same_length and np.array_equal(self.buffer, other.buffer):
             return np.ones(len(self), np.bool_)
@@ -109,7 +109,7 @@ class Tokens:
         return Texts(self.text[indices], offsets)
 
     def bad(self) -> Bools:
-        """Which tokens are no numbers at all; nan and inf are numbers here."""
+        """Mask of the tokens that are no numbers; nan and inf are numbers here."""
         bad: Bools = (self.fields[:, 2] & kernels().BAD) != 0
         return bad
 

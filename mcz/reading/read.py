@@ -17,7 +17,7 @@ from pathlib import Path
 from mcz.brief import first_of
 from mcz.errors import OptionError, SkeletonWarning, SourceError
 from mcz.formats import Format, format_of
-from mcz.formats.bones import Match, matched
+from mcz.formats.bones import Match, match_bones
 from mcz.formats.find import Candidate, skeletons_around
 from mcz.hints import Hint
 from mcz.motion import Motion, Skeleton
@@ -176,7 +176,7 @@ def _file_of(skeleton: Skeleton) -> str:
 
 def check_own(path: str, skeleton: Skeleton, label: str, counts: Counts) -> None:
     """Raise SourceError where ``skeleton`` has none of the bones but the root."""
-    match = matched(skeleton, counts)
+    match = match_bones(skeleton, counts)
     if match.is_foreign:
         raise SourceError(f"{label} has none of its bones: {_listed(match.lacking)}", path=path)
 
@@ -234,7 +234,7 @@ def _try(candidate: Candidate, counts: Counts) -> _Tried:
         if candidate.name_of:
             raise
         return _Tried(candidate, None, Match((), (), 0), str(error))
-    return _Tried(candidate, skeleton, matched(skeleton, counts))
+    return _Tried(candidate, skeleton, match_bones(skeleton, counts))
 
 
 def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> Chosen:
@@ -260,7 +260,7 @@ def _with_misfits(
 ) -> Chosen:
     """``chosen`` with a remark on the bones of the whole file that it does not fit."""
     assert source_format.bones is not None
-    match = matched(chosen.skeleton, source_format.bones(data, whole=True))
+    match = match_bones(chosen.skeleton, source_format.bones(data, whole=True))
     label = _text(str(chosen.path or chosen.skeleton.name or "the skeleton"))
     if match.lacking and not asked:
         found = label if chosen.path is None else _text(_seen_from(path.parent, chosen.path))

@@ -32,7 +32,7 @@ def own_range(first: int, stop: int, level: int, lengths: Sequence[int]) -> tupl
     return first >> level, lengths[level] if last else stop >> level
 
 
-def needed(start: int, stop: int, levels: int, n_taps: int) -> Ranges:
+def needed_ranges(start: int, stop: int, levels: int, n_taps: int) -> Ranges:
     """For each level from 0: the samples that frames start <= f < stop, stop > start, need."""
     ranges = [(start, stop)]
     for _ in range(levels):
@@ -74,11 +74,11 @@ def synthesize(
 
     ``bands`` is the approximation, then the details from the coarsest to the finest, a band
     without rows standing for zeros; ``firsts`` has the number of each level's first coefficient,
-    the finest first (as ``needed`` gives it, the frames themselves left out).
+    the finest first (as ``needed_ranges`` gives it, the frames themselves left out).
     """
     lo, hi = np.array(wavelet.lo), np.array(wavelet.hi)
     levels = len(bands) - 1
-    ranges = needed(start, stop, levels, wavelet.n_taps)
+    ranges = needed_ranges(start, stop, levels, wavelet.n_taps)
     signal = bands[0]
     for level in range(levels, 0, -1):
         detail = bands[levels + 1 - level]

@@ -89,10 +89,10 @@ def learn_basis(
         objective.append(truncate(columns, rows, basis, n_kept, sparsity, products))
         if progress is not None:
             progress(done, at_most)
-        if done == at_most or settled(objective[n_growth:]):
+        if done == at_most or has_converged(objective[n_growth:]):
             break
         basis = procrustes(products)
-    return Learned(ordered(basis, rows), np.array(objective), n_growth)
+    return Learned(order_basis(basis, rows), np.array(objective), n_growth)
 
 
 def learn_bases(
@@ -141,7 +141,7 @@ def procrustes(products: Floats) -> Floats:
     return np.ascontiguousarray(left @ right)
 
 
-def settled(objective: Sequence[float]) -> bool:
+def has_converged(objective: Sequence[float]) -> bool:
     """Return True if the last ``PATIENCE`` iterations gained next to nothing."""
     if len(objective) <= PATIENCE:
         return False
@@ -149,7 +149,7 @@ def settled(objective: Sequence[float]) -> bool:
     return before - objective[-1] <= SETTLED * before
 
 
-def ordered(basis: Floats, frames: Floats) -> Floats:
+def order_basis(basis: Floats, frames: Floats) -> Floats:
     """``basis`` with its rows by falling energy over ``frames`` (N, J), and with fixed signs.
 
     The entry of greatest magnitude of a row, the first of equal ones, becomes positive.

@@ -116,7 +116,7 @@ def filter_taps(rate: float) -> NDArray[np.int64]:
         raise OptionError(f"post filter: {rate!r} rows a second")
     taps = np.empty((len(CUTOFFS), DELAY + 1), np.int64)
     for row, cutoff in zip(taps, CUTOFFS, strict=True):
-        side = _windowed(min(cutoff / rate, 0.5))
+        side = _windowed_sinc(min(cutoff / rate, 0.5))
         total = side[0]
         for value in side[1:]:
             total = total + 2.0 * value  # FILT-07
@@ -126,7 +126,7 @@ def filter_taps(rate: float) -> NDArray[np.int64]:
     return taps
 
 
-def _windowed(cutoff: float) -> list[float]:
+def _windowed_sinc(cutoff: float) -> list[float]:
     """The middle and one side of the windowed ideal low-pass; ``cutoff`` in turns a row."""
     side = [2.0 * cutoff]
     for k in range(1, DELAY + 1):

@@ -28,7 +28,7 @@ class Rule(NamedTuple):
     closed: int
 
 
-def rounded(value: float, per: float, step: float) -> float:
+def round_to_grid(value: float, per: float, step: float) -> float:
     """``value`` on the grid, halves away from zero; ``per`` 10^decimals, or 0 for ``step``."""
     scaled = abs(value) * per if per > 0 else abs(value) / step
     index = np.floor(scaled + 0.5)
@@ -109,7 +109,7 @@ def fit(
     middle(points, a, b, work[:2], rule.method, work[2])
     if rule.closed:
         for c in range(points.shape[1]):
-            work[2, c] = rounded(work[2, c], rule.per, rule.step)
+            work[2, c] = round_to_grid(work[2, c], rule.per, rule.step)
     return worst(points, a, b, work[:2], work[2], enough)
 
 

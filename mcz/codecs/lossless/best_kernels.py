@@ -15,7 +15,7 @@ from mcz.coding.fast.survey_kernels import CodedLanes
 from mcz.coding.fast.tail_kernels import REST, Tails, read_ordinal, settle
 from mcz.coding.fast.write_kernels import put_tail
 from mcz.coding.mixing import number
-from mcz.coding.regression import LIMIT, Regressions, bounded, estimate, learn, solve
+from mcz.coding.regression import LIMIT, Regressions, bound_value, estimate, learn, solve
 from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.kernels import kernel, wrapped
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2, Words2
@@ -204,7 +204,7 @@ def code_leads(
                 opinions[LINEAR] = estimate(own, index + LINEAR, linear)
                 opinions[QUADRATIC] = estimate(own, index + QUADRATIC, quadratic)
                 taps = expected_step(lanes, leads, BEHIND + row, channel)
-                opinions[BLEND] = bounded(float(taps) / unit)
+                opinions[BLEND] = bound_value(float(taps) / unit)
                 guess = opinions[BLEND]
                 if row >= FIRST_ROWS:
                     guess = estimate(own, index + BLEND, opinions)

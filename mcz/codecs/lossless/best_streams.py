@@ -173,7 +173,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     uncode(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
     tails = own.Tails(lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns)
     leads = lanes.leads[residual.BEHIND :]
-    given = _ordinals_given(table, decoder)
+    given = _exact_echoes(table, decoder)
     fault = own.read_ordinals(tails, lanes.lattices, leads, given, decoder.rows)
     if fault != -1:
         raise fault_of("tails", "lane", fault)
@@ -182,7 +182,7 @@ def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
     decoder.finish()
 
 
-def _ordinals_given(table: Ints, decoder: SegmentDecoder) -> Ints:
+def _exact_echoes(table: Ints, decoder: SegmentDecoder) -> Ints:
     """The places of ``table`` whose ordinals echoes give: in units an ordinal is its lead."""
     head = fast_kernels()[0]
     forms = decoder.heads.plans[decoder.lanes.columns, head.FORM]

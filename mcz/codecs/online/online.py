@@ -172,7 +172,7 @@ def decode(
     coder = Coder(header, layout)
     if not n_channels:
         return out
-    for first, unit in _needed(spans, request, fetch):
+    for first, unit in _needed_units(spans, request, fetch):
         coder.skip(first - coder.at)
         block = coder.decode(unit)  # ONLINE-28
         begin, stop = max(first, request.start), min(coder.at, request.stop)
@@ -181,7 +181,7 @@ def decode(
     return out
 
 
-def _needed(spans: Sequence[Span], request: Request, fetch: Fetch) -> list[tuple[int, Unit]]:
+def _needed_units(spans: Sequence[Span], request: Request, fetch: Fetch) -> list[tuple[int, Unit]]:
     """The units with which the requested frames can be decoded, each with its first frame."""
     fresh = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
     needed: list[tuple[int, Unit]] = []

@@ -20,7 +20,7 @@ N_SETS = 3
 FAST, SLOW, SIDE_1, SIDE_2, MOVED, TRACK_SIZE = range(6)  # remembered of a component
 
 
-def expected(rows: Ints2, at: int, i: int, predictor: int) -> int:
+def predict(rows: Ints2, at: int, i: int, predictor: int) -> int:
     """Predict a coefficient from earlier ones of its component, by one of the four predictors."""
     step = rows[at - 1, i] - rows[at - 2, i] if at > 1 else 0
     if predictor == 0:
@@ -48,7 +48,7 @@ def code_coefficients(state: Ints, data: Bytes, rows: Ints2, predictors: Ints, s
         near = 0
         for i in range(count):
             track = tracks[i]
-            predicted = expected(rows, at, i, predictors[i])
+            predicted = predict(rows, at, i, predictors[i])
             error = code_residual(
                 state,
                 data,

@@ -166,7 +166,7 @@ def decode(
         return out
     assert layout.skeleton is not None  # the header was checked against it
     lossy, decode_one = _lossy(fields, layout), _decoder(fields, layout.skeleton)
-    for index in _needed(spans, request):
+    for index in _needed_segments(spans, request):
         span = spans[index]
         stored = range(layout.n_resolutions - request.resolution)
         for group in set(lossy[1:]) & set(request.groups):
@@ -180,7 +180,7 @@ def decode(
     return out
 
 
-def _needed(spans: Sequence[Span], request: Request) -> range:
+def _needed_segments(spans: Sequence[Span], request: Request) -> range:
     """The segments with which the requested frames can be decoded."""
     before = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
     stop = sum(span.first < request.stop for span in spans)

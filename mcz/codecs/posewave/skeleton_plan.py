@@ -170,11 +170,11 @@ def orientation(joint: Joint, rule: Rule) -> Matrix:
     for letter in reversed(joint.axis_order):  # about fixed axes: the last is outermost
         axis = "XYZ".index(letter)
         sine, cosine = sine_cosine(joint.axis[axis], rule)
-        matrix = _turned(matrix, axis, sine, cosine)
+        matrix = _rotate_matrix(matrix, axis, sine, cosine)
     return matrix
 
 
-def _turned(matrix: Matrix, axis: int, sine: float, cosine: float) -> Matrix:
+def _rotate_matrix(matrix: Matrix, axis: int, sine: float, cosine: float) -> Matrix:
     j, k = (axis + 1) % 3, (axis + 2) % 3
     rows = [list(row) for row in matrix]
     for row in rows:

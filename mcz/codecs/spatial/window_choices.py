@@ -240,12 +240,12 @@ def _bases(
     room = ROOM if clip_fit.courses is None else ROOM // 2
     most = min(clip_fit.columns.shape[1], room // clip_fit.columns.size)
     spatial = [
-        _rounded(vectors[:most], energies[:most], asked.step)
+        _round_vectors(vectors[:most], energies[:most], asked.step)
         for vectors, energies in zip(clip_fit.vectors, clip_fit.energies, strict=True)
     ]
     in_time: Basis | None = None
     if clip_fit.courses is not None and clip_fit.course_energies is not None:
-        in_time = _rounded(clip_fit.courses, clip_fit.course_energies, asked.step)
+        in_time = _round_vectors(clip_fit.courses, clip_fit.course_energies, asked.step)
     gains = _gains(windows, clip_fit, [len(b.shifts) for b in spatial], in_time, asked)
     ranks, n_frequencies = _counts(gains, spatial, in_time, asked)
     bases: list[Basis | Floats] = [_first(b, r) for b, r in zip(spatial, ranks, strict=True)]
@@ -259,7 +259,7 @@ def _bases(
     return bases, n_frequencies
 
 
-def _rounded(vectors: Floats, energies: Floats, step: float) -> Basis:
+def _round_vectors(vectors: Floats, energies: Floats, step: float) -> Basis:
     """Round entries to the digits where a further digit would cost as much as it gains."""
     least = math.ceil(math.log2(vectors.shape[1]) / 2) + 1  # or a vector is rounded away
     sizes = np.sqrt(energies) / step

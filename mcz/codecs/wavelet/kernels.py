@@ -14,7 +14,7 @@ MAX_INDEX = 1 << 40  # of a coefficient: sums of neighbors then stay far below 2
 OWN = 0, 0  # a stream has contexts and mixers of its own
 
 
-def expected(values: Ints, at: int, predictor: int) -> int:
+def predict(values: Ints, at: int, predictor: int) -> int:
     """An approximation from those before it, by one of the four predictors."""
     step = values[at - 1] - values[at - 2] if at > 1 else 0
     if predictor == 0:
@@ -35,7 +35,7 @@ def code_approximations(
     fast = slow = scale << 4
     near = side_1 = side_2 = 0
     for at in range(1, count):
-        predicted = expected(values, at, predictor)
+        predicted = predict(values, at, predictor)
         momentum = side_of(values[at - 1] - values[at - 2]) if at > 1 else 3  # MRDWT-25
         sides = side_1, side_2, momentum
         near_class = clamp(near + 3, 0, 7)

@@ -229,7 +229,7 @@ class _Decoder:
     def read(self, request: Request, fetch: Fetch) -> Floats:
         levels = self.fields.levels
         n_bands = self.layout.n_resolutions - request.resolution  # MRDWT-04
-        ranges = dwt.needed(request.start, request.stop, levels, self.wavelet.n_taps)
+        ranges = dwt.needed_ranges(request.start, request.stop, levels, self.wavelet.n_taps)
         # Band 0 is the approximation, band b > 0 the details of level levels + 1 - b.
         wanted = [ranges[levels], *(ranges[levels + 1 - band] for band in range(1, n_bands))]
         bands = [np.zeros((stop - start, len(request.groups))) for start, stop in wanted]

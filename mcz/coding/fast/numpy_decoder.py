@@ -64,14 +64,14 @@ class Streams:
             raise FormatError(f"fast: bits are left in the {part}")
 
     def longer(self, n_rows: int) -> Streams:
-        """Those of segments of more rows."""
+        """Streams of segments with more rows."""
         kept = self.rows > n_rows
         lanes = [own[kept[: len(own)]] for own in self.lanes]
         lanes = [own for own in lanes if len(own)]
         return Streams(self.data, self.bits[kept], self.ends[kept], self.rows[kept], lanes)
 
     def ended(self, n_rows: int) -> Streams:
-        """Those of segments of so many rows."""
+        """Streams of segments with this many rows."""
         own = self.rows == n_rows
         return Streams(self.data, self.bits[own], self.ends[own], self.rows[own], [])
 

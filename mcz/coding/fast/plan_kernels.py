@@ -61,7 +61,7 @@ def first_tried(n_rows: int) -> int:
 
 
 def cost_of(residuals: Words, scale: int, most: int) -> int:
-    """About the bits of a lane, of rows from the middle; any number above ``most`` for more."""
+    """Estimate the bits of a lane from its middle rows; more than ``most`` is any larger number."""
     row = first_tried(len(residuals))
     stop = min(len(residuals), row + TRIED_ROWS)
     left = most - (stop - row)  # each row has a bit at least

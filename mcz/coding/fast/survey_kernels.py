@@ -193,7 +193,7 @@ def choose_form(column: Ints, form: int, used: int, plan: Ints) -> None:
 
 
 def repeat_before(column: Ints, limit: int) -> None:
-    """Let exceptions repeat the row before; the first ones the first row that is none."""
+    """Replace exceptions by the row before, leading ones by the first row that is none."""
     before = 0
     for row in range(len(column)):
         if column[row] ^ (column[row] >> 63) < limit:

@@ -1,4 +1,4 @@
-"""How an encoder finds the law of a channel of counts. Nothing here is normative.
+"""Encoder search for the law of a channel of counts; not normative.
 
 mcz/codecs/lossless/README.md describes it.
 """
@@ -49,7 +49,7 @@ class Counted:
     rests: Ints
 
     def cost(self) -> float:
-        """About the bits of the rests and the law's fields."""
+        """Estimate the bits of the rests and of the law's fields."""
         sizes = np.log2(1 + 2.0 * np.abs(self.rests[self.rests != 0]))
         return 8 * len(self.law.fields(rests=True)) + _BIT_OF_A_REST * float(sizes.sum())
 
@@ -90,7 +90,7 @@ def _lie_apart(multiples: Ints) -> bool:
 
 
 def _saves(found: Counted, values: Floats, fine: Floats | float) -> bool:
-    """Whether steps of a unit in place of ``fine`` ones make up for law and rests."""
+    """Return True if steps of a unit in place of ``fine`` ones save more than they cost."""
     changed = np.diff(values, prepend=0) != 0
     saved = np.log2(np.maximum(found.law.unit / fine, 1)) * changed
     return bool(saved.sum() > found.cost() + _MARGIN)
@@ -122,7 +122,11 @@ def find_line(distinct: Floats, grid: Grid) -> Line | None:
     lines = (_grown(distinct, unit) for unit in _guesses(gaps))
     found = [line for line in lines if line is not None]
     sharp = [line for line in found if np.median(_distances(distinct, line)) < _SHARP]
-    return max(sharp) if sharp else min(found, key=lambda line: _off(distinct, line), default=None)
+    return (
+        max(sharp)
+        if sharp
+        else min(found, key=lambda line: _mean_distance(distinct, line), default=None)
+    )
 
 
 def _line_of_few(distinct: Floats, gaps: Floats) -> Line | None:
@@ -147,13 +151,13 @@ def _guesses(gaps: Floats) -> list[float]:
     return [float(guess) for guess in guesses[fits]]
 
 
-def _off(values: Floats, line: Line) -> float:
-    """How far values are from whole numbers, on average."""
+def _mean_distance(values: Floats, line: Line) -> float:
+    """Mean distance of values from whole numbers."""
     return float(np.mean(_distances(values, line)))
 
 
 def _distances(values: Floats, line: Line) -> Floats:
-    """How far values are from whole numbers of a line's unit."""
+    """Distances of values from whole multiples of a line's unit."""
     counts = (values - line[1]) / line[0]
     return np.abs(counts - np.rint(counts))
 
@@ -171,10 +175,10 @@ def _grown(distinct: Floats, unit: float) -> Line | None:
         part = distinct[first:stop]
         fitted = _fit(np.rint((part - line[1]) / line[0]), part)
         line = fitted or line
-        if line[0] < LEAST_UNIT or (len(part) >= 2 * FEWEST and _off(part, line) > _OFF):
+        if line[0] < LEAST_UNIT or (len(part) >= 2 * FEWEST and _mean_distance(part, line) > _OFF):
             return None
         if len(part) == len(distinct):
-            return line if _off(distinct, line) < _OFF else None
+            return line if _mean_distance(distinct, line) < _OFF else None
     return None
 
 
@@ -242,7 +246,7 @@ def _laws(values: Floats, distinct: Floats, grid: Grid, line: Line) -> Iterator[
     """Laws to try, with the counts of all values."""
     zeros = values == 0
     zero_offset = VANISHING if 2 * np.signbit(values[zeros]).sum() > zeros.sum() else None
-    distinct, few, line = _trimmed(distinct, grid, line)
+    distinct, few, line = _trim_law(distinct, grid, line)
     unit, offset = line
     counts = np.rint((values - offset) / unit).astype(np.int64)
     moved = _zero_of(line)
@@ -267,7 +271,7 @@ def _laws(values: Floats, distinct: Floats, grid: Grid, line: Line) -> Iterator[
             yield law, counts
 
 
-def _trimmed(distinct: Floats, grid: Grid, line: Line) -> tuple[Floats, Floats, Line]:
+def _trim_law(distinct: Floats, grid: Grid, line: Line) -> tuple[Floats, Floats, Line]:
     """The values that are not far off, their counts, and the line through them."""
     few = np.rint((distinct - line[1]) / line[0])
     kept, kept_few = distinct, few

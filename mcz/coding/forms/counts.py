@@ -24,7 +24,7 @@ MOST = 2.0**80  # an offset or a shift: sums are then finite in binary32
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """What a count means: ``binary32(binary32(count * unit + offset) + shift)``.
+    """Value of a count: ``binary32(binary32(count * unit + offset) + shift)``.
 
     ``offset`` None: nothing is added; ``shift`` None: nor is the second sum made.
     """

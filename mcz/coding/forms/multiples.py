@@ -49,7 +49,7 @@ def find_multiples(ordinals: Ints) -> tuple[float, Ints] | None:
 
 
 def _common_measure(sizes: Floats, slack: float) -> float:
-    """About the greatest number of which all sizes are multiples, each but for ``slack``."""
+    """Approximate the greatest common divisor of sizes, each to within ``slack``."""
     measure = float(sizes[0])
     for _ in range(_STEPS):
         rest = np.abs(sizes - np.rint(sizes / measure) * measure)

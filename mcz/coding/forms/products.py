@@ -50,7 +50,7 @@ def multiples_of(codes: Ints, shifts: int) -> Floats:
 
 
 def is_tiny(ordinals: Ints, grid: Grid) -> bool:
-    """Whether a column may be rounding noise: the cheap test."""
+    """Return True if a column may be rounding noise (a cheap test)."""
     limit = tiny_limit(grid)
     if not len(ordinals) or not -1 - limit < ordinals[0] < limit:  # nearly all columns
         return False

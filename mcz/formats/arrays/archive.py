@@ -81,8 +81,8 @@ def read_archive(data: bytes) -> Archive:
             raise SourceError(f"members {one.name!r} and {other.name!r} overlap", offset=other.at)
     if members and members[-1].stop > start:
         raise SourceError(f"member {members[-1].name!r} overlaps the directory", offset=start)
-    found = (*_of_members(data, members), *_of_directory(data, start, end, tail))
-    wanted = sorted(found, key=lambda field: field.at)
+    parts = (*_of_members(data, members), *_of_directory(data, start, end, tail))
+    wanted = sorted(parts, key=lambda field: field.at)
     sums = {
         (f.start, f.stop): zlib.crc32(memoryview(data)[f.start : f.stop])
         for f in wanted
@@ -102,7 +102,7 @@ def read_archive(data: bytes) -> Archive:
 
 
 def _ends(data: bytes) -> tuple[int, int, int, int]:
-    """Where the record of the end is, where the directory ends and begins, its entries."""
+    """Find the end record: its offset, the end and the start of the directory, its entries."""
     low = max(0, len(data) - 22 - 0xFFFF)
     end = data.rfind(END, low)
     while end >= 0 and end + 22 + _number(data, end + 20, 2) != len(data):
@@ -181,31 +181,31 @@ def _check_local(data: bytes, member: Member, raw: bytes) -> None:
 def _wide_fields(data: bytes, at: int, sizes: list[int]) -> list[tuple[int, int, int]]:
     """Value, offset and bytes of the two sizes and the place of an entry, size first."""
     plain = [(at + 24, 4), (at + 20, 4), (at + 42, 4)]
-    return _resolved(data, plain, at + 46 + sizes[0], sizes[1])
+    return _zip64_numbers(data, plain, at + 46 + sizes[0], sizes[1])
 
 
 def _local_sizes(data: bytes, member: Member) -> list[tuple[int, int, int]]:
     """Value, offset and bytes of the two sizes of a local header, size first."""
     at = member.at
     extra = at + 30 + _number(data, at + 26, 2)
-    return _resolved(data, [(at + 22, 4), (at + 18, 4)], extra, member.start - extra)
+    return _zip64_numbers(data, [(at + 22, 4), (at + 18, 4)], extra, member.start - extra)
 
 
-def _resolved(
+def _zip64_numbers(
     data: bytes, plain: list[tuple[int, int]], extra: int, size: int
 ) -> list[tuple[int, int, int]]:
     """Numbers of 4 bytes, or of the 8 bytes of the extra field that stand for them."""
     at, stop = _zip64(data, extra, extra + size)
-    found = []
+    numbers = []
     for where, width in plain:
         if _number(data, where, 4) == FULL32 and at + 8 <= stop:
             where, width, at = at, 8, at + 8
-        found.append((_number(data, where, width), where, width))
-    return found
+        numbers.append((_number(data, where, width), where, width))
+    return numbers
 
 
 def _zip64(data: bytes, at: int, stop: int) -> tuple[int, int]:
-    """Where the numbers of the ZIP64 field begin and end; (0, 0): there is none."""
+    """Find the start and end of the ZIP64 field; (0, 0) if there is none."""
     while at + 4 <= stop:
         end = at + 4 + _number(data, at + 2, 2)
         if _number(data, at, 2) == ZIP64:

@@ -48,7 +48,7 @@ def body_of(arrays: Sequence[Array]) -> Body | None:
         if not array.kept and array.head.code.startswith("f")
     }
     whole = next((named[name] for name in WHOLE if name in named), None)
-    turns = [whole] if whole is not None else _joined(arrays, named)
+    turns = [whole] if whole is not None else _pose_parts(arrays, named)
     model = _model(sum(arrays[k].numbers.shape[1] for k in turns)) if turns else None
     if model is None:
         return None
@@ -57,33 +57,33 @@ def body_of(arrays: Sequence[Array]) -> Body | None:
         return None
     places = [named[name] for name in PLACES if name in named]
     root = [k for k in places if arrays[k].numbers.shape == (n_frames, POSITION)][:1]
-    found: dict[int, Sequence[int]] = {}
+    repeats: dict[int, Sequence[int]] = {}
     at = 0
     for index in (*root, *turns):
-        found[index] = range(at, at + arrays[index].numbers.shape[1])
-        at += len(found[index])
+        repeats[index] = range(at, at + arrays[index].numbers.shape[1])
+        at += len(repeats[index])
     if whole is not None:
-        found |= dict(_repeated(arrays, named, whole, POSITION * len(root)))
+        repeats |= dict(_repeated_parts(arrays, named, whole, POSITION * len(root)))
     skeleton = skeleton_of(model, moves=bool(root))
-    return Body(skeleton, n_frames, [arrays[k].numbers for k in (*root, *turns)], found)
+    return Body(skeleton, n_frames, [arrays[k].numbers for k in (*root, *turns)], repeats)
 
 
-def _joined(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
+def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
     """The arrays of parts that are the joints of a model in its order, [] where there are none."""
     root, body = (next((named[n] for n in names if n in named), None) for names in (ROOT, BODY))
     if root is None or body is None or arrays[root].numbers.shape[1] != 3:
         return []
     if arrays[body].numbers.shape[1] not in BODY_SIZES:
         return []
-    found = [root, body]
+    joined = [root, body]
     if BODY_SIZES[arrays[body].numbers.shape[1]] == "smpl":
-        return found
+        return joined
     for group, size in ((FACE, FACE_SIZE), (HANDS, HANDS_SIZE)):
         parts = [k for names in group for k in (next((named[n] for n in names if n in named), -1),)]
         parts = [k for k in parts if k >= 0]
         if sum(arrays[k].numbers.shape[1] for k in parts) == size:
-            found += parts
-    return found
+            joined += parts
+    return joined
 
 
 def _model(n_numbers: int) -> BodyTree | None:
@@ -100,7 +100,7 @@ def _model(n_numbers: int) -> BodyTree | None:
     return replace(full, names=full.names[:n_joints], parents=full.parents[:n_joints])
 
 
-def _repeated(
+def _repeated_parts(
     arrays: Sequence[Array], named: Mapping[str, int], whole: int, first: int
 ) -> Iterator[tuple[int, Sequence[int]]]:
     """Arrays that repeat columns of ``whole``, whose channels begin with ``first``."""
@@ -121,7 +121,7 @@ def _repeated(
 
 
 def _same(one: Items, other: Items) -> bool:
-    """Whether two arrays have the same type and the same bits."""
+    """Return True if two arrays have the same type and bits."""
     if one.dtype != other.dtype or one.shape != other.shape:
         return False
     kind = f"u{one.dtype.itemsize}"

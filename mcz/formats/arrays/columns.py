@@ -54,7 +54,7 @@ def file_columns(head: Head) -> NDArray[np.int64]:
 
 
 def unfit(words: Items) -> str:
-    """Why no grid holds such numbers bit for bit, "" where one does."""
+    """Reason why no grid stores such numbers bit for bit, or ""."""
     kind, size = words.dtype.kind, words.dtype.itemsize
     if kind == "b":
         return "a bool that is neither 0 nor 1" if (words.view("u1") > 1).any() else ""

@@ -1,4 +1,4 @@
-"""What small arrays of a file say of its motion: the frame rate, and single words and numbers."""
+"""Facts in small arrays of a file: the frame rate, and single words and numbers."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def rate_of(arrays: Sequence[Array], n_frames: int) -> tuple[Fraction | None, bo
 
     Of times that are there and are not uniform there is none.
     """
-    found = (_number(array) for array in arrays if array.name.lower() in RATES)
-    stated = next((number for number in found if number is not None), None)
+    numbers = (_number(array) for array in arrays if array.name.lower() in RATES)
+    stated = next((number for number in numbers if number is not None), None)
     rate, exact = _round(*stated) if stated is not None else (None, True)
     for array in arrays:
         if array.kept or array.name not in TIMES or array.numbers.shape != (n_frames, 1):

@@ -50,7 +50,7 @@ class Head:
 
     @property
     def is_number(self) -> bool:
-        """Whether a grid may hold such numbers."""
+        """True if a grid may store such numbers."""
         return self.code in TYPES
 
     @property
@@ -71,17 +71,17 @@ def read_head(data: bytes, at: int, stop: int) -> Head:
     size = int.from_bytes(data[at + 8 : text_at], "little")
     if size > MAX_HEAD or text_at + size > stop:
         return Head(odd=f"offset {at + 8}: a head of {size} bytes is too long")
-    return _parsed(data[text_at : text_at + size], text_at, stop)
+    return _parse_header(data[text_at : text_at + size], text_at, stop)
 
 
-def _parsed(text: bytes, at: int, stop: int) -> Head:
-    """What the text of a head, which lies at offset ``at``, says."""
-    found = _items(text)
-    if found is None:
+def _parse_header(text: bytes, at: int, stop: int) -> Head:
+    """Parse the text of a header at offset ``at``."""
+    items = _items(text)
+    if items is None:
         return Head(
             odd=f"offset {at}: the head is no plain dictionary of descr, fortran_order and shape"
         )
-    descr, order, shape = found[b"descr"], found[b"fortran_order"], found[b"shape"]
+    descr, order, shape = items[b"descr"], items[b"fortran_order"], items[b"shape"]
     numbers = _NUMBER.findall(shape[1])
     if len(numbers) > MAX_AXES or not all(map(_PLAIN.fullmatch, numbers)):
         return Head(
@@ -117,7 +117,7 @@ def _items(text: bytes) -> dict[bytes, re.Match[bytes]] | None:
     A key that is there twice, another key, a comment or an escape might mean something else to
     NumPy, which evaluates the text.
     """
-    at, found = 0, dict[bytes, re.Match[bytes]]()
+    at, items = 0, dict[bytes, re.Match[bytes]]()
     last = _OPEN.match(text)
     while last is not None:
         at = last.end()
@@ -125,12 +125,12 @@ def _items(text: bytes) -> dict[bytes, re.Match[bytes]] | None:
         if item is None:
             break
         key = next(key for key, pattern in _ITEMS.items() if pattern is item.re)
-        if key in found:
+        if key in items:
             return None
-        found[key], at = item, item.end()
+        items[key], at = item, item.end()
         last = _COMMA.match(text, at)
     end = _CLOSE.fullmatch(text, at)
-    return found if end is not None and len(found) == len(_ITEMS) else None
+    return items if end is not None and len(items) == len(_ITEMS) else None
 
 
 def _type_of(descr: re.Match[bytes]) -> tuple[bytes, str]:
@@ -140,13 +140,13 @@ def _type_of(descr: re.Match[bytes]) -> tuple[bytes, str]:
 
 
 def has_rows(data: bytes) -> bool:
-    """Whether the head that ``data`` begins with is one of numbers with two axes or more."""
+    """Return True if ``data`` begins with the header of numbers with at least two axes."""
     size = int.from_bytes(data[8 : 10 if data[6:7] == b"\1" else 12], "little")
     begin = 10 if data[6:7] == b"\1" else 12
-    found = _items(data[begin : begin + min(size, MAX_HEAD)])
-    if found is None:
+    items = _items(data[begin : begin + min(size, MAX_HEAD)])
+    if items is None:
         return False
-    return _type_of(found[b"descr"])[1] in TYPES and len(_NUMBER.findall(found[b"shape"][1])) > 1
+    return _type_of(items[b"descr"])[1] in TYPES and len(_NUMBER.findall(items[b"shape"][1])) > 1
 
 
 def refuse_odd(head: Head) -> None:

@@ -1,4 +1,4 @@
-"""What the numbers of plain arrays are, where somebody says it: positions or rotations."""
+"""Kind of plain arrays as named by the caller: positions or rotations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an array file holds beside its numbers, as a template and a detail.
+"""Content of an array file beside its numbers: a template and a detail.
 
 SPEC.md, "Template of arrays", is normative and has the tables.
 """
@@ -24,7 +24,7 @@ MAX_PIECES, MAX_RUNS = 2**16, 2**18  # of a file
 
 
 class Kind(IntEnum):
-    """What a piece of a file is."""
+    """Kind of a piece of a file."""
 
     TEXT = 0  # bytes that the template has
     OWN = 1  # bytes that the detail has

@@ -1,4 +1,4 @@
-"""What became of each array of a file, as its template tells it."""
+"""Use of each array of a file, from its template."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mcz.types import JsonObject
 LOCAL, HEADER = b"PK\3\4", 30  # how a member of a ZIP begins; bytes before its name
 
 
-def arrays_listed(source: Source, signals: Sequence[str]) -> list[JsonObject]:
+def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
     """The arrays of a file in order: ``name type order columns signal``, ``name`` alone where kept.
 
     ``columns`` are the numbers of a row, ``order`` is "C" or "F"; ``signals`` are the names of the
@@ -20,7 +20,7 @@ def arrays_listed(source: Source, signals: Sequence[str]) -> list[JsonObject]:
     """
     pieces = parse_arrays(source.template, source.detail)
     members = members_of(pieces) if source.format == "npz" else [("", pieces)]
-    return [_listed(name, own, signals) for name, own in members]
+    return [_list_array(name, own, signals) for name, own in members]
 
 
 def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
@@ -36,8 +36,8 @@ def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
     ]
 
 
-def _listed(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonObject:
-    listed = _kept(name)
+def _list_array(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonObject:
+    listed = _unlisted_array(name)
     for piece in pieces:
         if piece.kind == Kind.DATA:
             listed |= {
@@ -49,7 +49,7 @@ def _listed(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonO
     return listed
 
 
-def _kept(name: str) -> JsonObject:
+def _unlisted_array(name: str) -> JsonObject:
     return {"name": name, "type": None, "order": None, "columns": None, "signal": None}
 
 

@@ -1,4 +1,4 @@
-"""What the arrays of a file are: which one is the motion, which are signals beside it, the rate.
+"""Interpretation of the arrays of a file: the motion, further signals, the frame rate.
 
 Nothing here is normative: a template says where each column went.
 """
@@ -52,7 +52,7 @@ class Meaning:
 
 
 def meaning_of(arrays: Sequence[Array]) -> Meaning:
-    """What the arrays of a file mean; raises SourceError where none of them is a motion."""
+    """Interpret the arrays of a file; raises SourceError if none of them is a motion."""
     body = body_of(arrays)
     n_frames = body.n_frames if body is not None else _frames_of(arrays)
     rate, exact, odd = rate_of(arrays, n_frames)
@@ -102,13 +102,13 @@ def _frames_of(arrays: Sequence[Array]) -> int:
 
 
 def _reasons(arrays: Sequence[Array]) -> list[str]:
-    """Of the first arrays why they are no motion."""
+    """Reasons why the first arrays are no motion."""
     if len(arrays) > 1 and all(STAYS in array.kept for array in arrays):
         again = "numpy.savez(path, **numpy.load(other)) stores it anew"
         return [f"all of its {len(arrays)} members are {DEFLATED}: {again}"]
     shown = arrays[:4]
-    found = [f"{a.name!r} is {a.kept or f'of shape {a.head.shape}'}" for a in shown]
-    return [*found, "..."] if len(arrays) > len(shown) else found
+    reasons = [f"{a.name!r} is {a.kept or f'of shape {a.head.shape}'}" for a in shown]
+    return [*reasons, "..."] if len(arrays) > len(shown) else reasons
 
 
 def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> None:

@@ -40,7 +40,7 @@ def pieces_of(
         spans.append((field.at, field.at + size, piece))
     spans.sort(key=lambda span: span[:2])
     cuts = {0, len(data), *(cut for field in archive.fields for cut in (field.start, field.stop))}
-    starts, pieces = _filled(data, spans, sorted(cuts))
+    starts, pieces = _cut_pieces(data, spans, sorted(cuts))
     return [
         replace(piece, start=bisect_left(starts, piece.start), stop=bisect_left(starts, piece.stop))
         if piece.kind in (Kind.CRC, Kind.SIZE4, Kind.SIZE8)
@@ -49,7 +49,7 @@ def pieces_of(
     ]
 
 
-def _filled(
+def _cut_pieces(
     data: bytes, spans: Sequence[tuple[int, int, Piece]], cuts: Sequence[int]
 ) -> tuple[list[int], list[Piece]]:
     """The pieces of all spans with the text between, cut where others point; their offsets."""

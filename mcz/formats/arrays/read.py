@@ -89,7 +89,7 @@ def _pieces(
 
 
 def _metadata(arrays: Sequence[Array], archive: Archive, meaning: Meaning) -> dict[str, str]:
-    """What the file says in words, and what is odd about it."""
+    """Metadata of the file: its words, and notes on oddities."""
     notes = [f"{array.name} is {array.kept}" for array in arrays if array.is_loud]
     notes += [f"the CRC-32 of {name} is not that of its bytes" for name in archive.wrong]
     notes += meaning.notes

@@ -134,18 +134,18 @@ def _floats(signal: Signal, values: Items, columns: Any, type_: str) -> Items:
     nan = np.isnan(values)
     if grid is not None and nan.any():
         ordinals = signal.to_ordinals()[0][:, columns]
-        held = nan & _on_grid(signal, grid.kind)[:, columns]
-        bits[held] = grid.bits(ordinals[held])
+        stored = nan & _on_grid(signal, grid.kind)[:, columns]
+        bits[stored] = grid.bits(ordinals[stored])
     return words
 
 
 def _on_grid(signal: Signal, kind: GridKind) -> NDArray[np.bool_]:
-    """Where the grid of a signal is of a kind, (rows, channels)."""
-    found = np.zeros(signal.values.shape, np.bool_)
+    """Mask of the values on a grid of that kind, (rows, channels)."""
+    is_on_grid = np.zeros(signal.values.shape, np.bool_)
     for rows, columns, grid in signal.grid_blocks():
         if grid.kind == kind:
-            found[rows, columns] = True
-    return found
+            is_on_grid[rows, columns] = True
+    return is_on_grid
 
 
 def _integers(values: Items, kind: str, size: int) -> Items:

@@ -1,4 +1,4 @@
-"""How long the bones of a body are, by a model file of the user's own and the betas of the take."""
+"""Bone lengths of a body from the user's model file and the betas of the clip."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
         if not gender.isalnum():
             raise OptionError(f"the take states no gender, but {gender!r}", path=path)
         path = path.replace(GENDER, gender)
-    offsets = _offsets(path, _changed(path), skeleton.n_joints, _betas(source))
+    offsets = _offsets(path, _modification_time(path), skeleton.n_joints, _betas(source))
     joints = tuple(
         replace(joint, offset=offset)
         for joint, offset in zip(skeleton.joints, offsets, strict=True)
@@ -55,7 +55,7 @@ def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
     return replace(motion, skeleton=replace(skeleton, joints=joints))
 
 
-def _changed(path: str) -> int:
+def _modification_time(path: str) -> int:
     try:
         return Path(path).stat().st_mtime_ns
     except OSError as error:
@@ -66,8 +66,8 @@ def _changed(path: str) -> int:
 def _offsets(
     path: str, changed: int, n_joints: int, betas: tuple[float, ...] | None
 ) -> tuple[tuple[float, float, float], ...]:
-    found = offsets_of_model(path, n_joints, None if betas is None else np.array(betas))
-    return tuple((x, y, z) for x, y, z in found.tolist())
+    offsets = offsets_of_model(path, n_joints, None if betas is None else np.array(betas))
+    return tuple((x, y, z) for x, y, z in offsets.tolist())
 
 
 def _betas(source: Source) -> tuple[float, ...] | None:

@@ -1,4 +1,4 @@
-"""Whether a file of arrays is worth reading as motion, from its first bytes."""
+"""Detection of motion in array files by their first bytes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ DIRECTORY_END = b"PK\5\6"
 
 
 def is_motion(data: bytes) -> bool:
-    """Whether an NPY or NPZ that begins with ``data`` may have a row of numbers for each frame.
+    """Return True if an NPY or NPZ that begins with ``data`` may have a row of numbers per frame.
 
     What cannot be told from these bytes counts: the reader says what is wrong.
     """
