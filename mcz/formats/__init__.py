@@ -195,7 +195,7 @@ def has_known_suffix(path: str | Path) -> bool:
 
 
 def is_table(path: str | Path) -> bool:
-    """Whether a file is a table by its suffix."""
+    """Return True if the suffix is that of a table."""
     suffix = Path(path).suffix.lower()
     return any(f.is_table for f in FORMATS.values() if suffix in f.suffixes)
 
@@ -245,7 +245,7 @@ def _has_any(text: bytes, *words: bytes) -> bool:
 
 
 def recording_of(source: Source | None) -> Any:
-    """What ``source`` says of a recording beside all numbers, a ``mcz.Recording``; None: nothing.
+    """Recording metadata of ``source``, a ``mcz.Recording``, or None.
 
     Raises FormatError on bad bytes.
     """
@@ -262,7 +262,7 @@ def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | 
 
 
 def arrays_of(source: Source | None, signals: Sequence[str]) -> list[JsonObject] | None:
-    """What became of the arrays of a source, see ``arrays.listing``; None where it has none.
+    """List the use of each array of a source, see ``arrays.listing``; None without arrays.
 
     ``signals`` are the names of the clip's signals. Raises FormatError on bad bytes.
     """

@@ -49,7 +49,7 @@ def vendor_of(data: bytes) -> str | None:
 
 
 def is_motion(data: bytes) -> bool:
-    """Whether a file that begins with ``data`` seems to be a table of numbers.
+    """Return True if a file that begins with ``data`` seems to be a table of numbers.
 
     Looked at are the first ``SNIFFED`` bytes, so that a folder can be packed without the tables
     of words that lie in it.

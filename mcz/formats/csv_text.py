@@ -224,7 +224,7 @@ def _some_cells(line: bytes, separator: bytes | None) -> list[bytes]:
 
 
 def is_row(cells: Sequence[bytes]) -> bool:
-    """Whether cells are numbers, at least one, and what stands for none."""
+    """Return True if the cells are numbers, at least one, and placeholders for missing ones."""
     found = False
     for cell in cells:
         if _NUMBER.fullmatch(cell):

@@ -1,4 +1,4 @@
-"""How the frames of a text file are laid out: patterns of gaps and columns, and what departs.
+"""Frame layout of a text file: patterns of gaps and columns, and deviations.
 
 The text of a frame follows a *pattern*: runs of columns, each token behind the run's gap, and a
 tail. AMC and BVH share this; SPEC.md, "Source reconstruction", is normative and has the tables of

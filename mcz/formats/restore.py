@@ -57,7 +57,7 @@ def printed_count(layout: Layout, n_rows: int) -> bytes:
 
 
 def text_limit(source: Source, shapes: Sequence[tuple[int, int]]) -> int:
-    """How many bytes the rows of tables of these (rows, channels) may take together."""
+    """Limit in bytes of the rows of tables of these (rows, channels)."""
     limit = max(TEXT_LIMIT, TEXT_PER_CELL * sum(rows * (columns + 1) for rows, columns in shapes))
     return min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size)) if source.size else limit
 
@@ -88,7 +88,7 @@ def rows_text(
 
 
 def any_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:
-    """Whether rows print their frame number."""
+    """Return True if rows print their frame number."""
     return any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
 
 

@@ -14,7 +14,7 @@ MINUS, PLUS, HASH, ZERO, NINE, LF = 0x2D, 0x2B, 0x23, 0x30, 0x39, 0x0A
 
 
 def _is_at(text: Bytes, at: int, gaps: Bytes, start: int, stop: int) -> bool:
-    """Whether gaps[start:stop] stands at ``at``."""
+    """Return True if gaps[start:stop] is at ``at``."""
     if at + stop - start > len(text):
         return False
     for k in range(start, stop):
@@ -37,7 +37,7 @@ def _token_end(text: Bytes, at: int, cells: int) -> int:
 
 
 def _blanks(text: Bytes, at: int) -> int:
-    """How many 0x20 stand at ``at``."""
+    """Count the 0x20 bytes at ``at``."""
     start = at
     while at < len(text) and text[at] == BLANK:
         at += 1
@@ -57,7 +57,7 @@ def _number(text: Bytes, start: int, stop: int) -> int:
 
 
 def _begins_frame(text: Bytes, at: int) -> bool:
-    """Whether the next thing at ``at`` is a line with one integer, or the end."""
+    """Return True if a line with one integer, or the end, follows at ``at``."""
     while at < len(text) and text[at] <= BLANK:
         at += 1
     if at == len(text):

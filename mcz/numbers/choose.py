@@ -1,4 +1,4 @@
-"""Which grids a run of tokens may be on. The choice is an encoder's, nothing here is normative."""
+"""Encoder choice of the grid of a run of tokens; not normative."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def _tried(tokens: Tokens, rule: Rule, spare: float) -> tuple[Ints, Bools] | Non
 
 
 def bits_of(grid: Grid) -> float:
-    """About how many bits an ordinal has that nothing is known of, as ``candidates`` guesses."""
+    """Estimate the bits of an ordinal without context, for ``candidates``."""
     match grid.kind:
         case GridKind.TEXT32:
             return 40.0

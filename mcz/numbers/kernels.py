@@ -215,7 +215,7 @@ def _scaled(mantissa: int, shift: int, limit: int) -> int:
 
 
 def _scientific(mantissa: int, power: int, shape: int, places: int, flags: int) -> bool:
-    """Whether a token with an exponent is in the one form that is printed."""
+    """Return True if a token with an exponent has the printed form."""
     size = abs(power)
     width = 3 if flags & _EXP3 or size >= 100 else 1 if flags & _EXP1 and size < 10 else 2
     return (
@@ -232,7 +232,7 @@ def _scientific(mantissa: int, power: int, shape: int, places: int, flags: int) 
 def _positional(
     mantissa: int, shape: int, places: int, decimals: int, trim: int, flags: int
 ) -> bool:
-    """Whether a token without an exponent is in the one form that is printed."""
+    """Return True if a token without an exponent has the printed form."""
     point = shape & POINT != 0
     if trim and (places > 1 or (places == 1 and mantissa % 10 != 0)):
         good = mantissa % 10 != 0 and places <= decimals

@@ -80,7 +80,7 @@ def values_of(digits: int, style: int, magnitudes: Ints) -> Floats:
 
 
 def _tells(digits: int, style: int) -> bool:
-    """Whether the text tells the number from all others of its base."""
+    """Return True if the text determines the number among all of its base."""
     if digits > BASE_GENERAL:
         return True
     shown = style - EXPONENT + 1 if style >= EXPONENT else style - SIGNIFICANT
@@ -88,7 +88,7 @@ def _tells(digits: int, style: int) -> bool:
 
 
 def printer(style: int) -> Callable[[float], str]:
-    """What prints a binary64 >= 0, without flags."""
+    """Return a function that prints a binary64 >= 0, without flags."""
     if style >= EXPONENT:
         return f"{{:.{style - EXPONENT}e}}".format
     if style >= SIGNIFICANT:

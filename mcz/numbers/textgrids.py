@@ -52,7 +52,7 @@ def match(
 
 
 def uncertain(tokens: Tokens, kind: GridKind, digits: int, printed: Bools) -> Bools:
-    """Which tokens a TEXT grid may print or not, ``printed`` being those of the right shape.
+    """Mask of the tokens that need an exact check; ``printed`` are those of the right shape.
 
     A number of 15 digits (6 in binary32) that is no subnormal is its own shortest text.
     """
@@ -67,7 +67,7 @@ def uncertain(tokens: Tokens, kind: GridKind, digits: int, printed: Bools) -> Bo
 
 
 def long(tokens: Tokens) -> Bools:
-    """Which tokens are numbers of more digits than a match looks at."""
+    """Mask of the numbers with more digits than a match examines."""
     loops = kernels()
     found: Bools = tokens.fields[:, 2] & (loops.LONG | loops.BAD | loops.SPECIAL) == loops.LONG
     return found

@@ -96,7 +96,7 @@ def _left(left: Ints, grids: Sequence[Grid]) -> Iterator[tuple[Grid, list[int]]]
 
 @lru_cache(maxsize=64)
 def _rules(grids: tuple[Grid, ...]) -> Ints:
-    """How the compiled loop makes values of each grid."""
+    """Conversion rules of each grid for the kernel."""
     loops = _kernels("value")
     rules = np.empty((len(grids), loops.RULE_SIZE), np.int64)
     for rule, grid in zip(rules, grids, strict=True):
