@@ -22,7 +22,7 @@ from mcz.kinematics import (
     reach,
     virtual_markers_of,
 )
-from mcz.kinematics.frame_positions import FramePositions
+from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.sensitivity import sensitivities
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for

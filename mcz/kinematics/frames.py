@@ -1,4 +1,4 @@
-"""Point positions and joint rotations over many frames at once.
+"""Point positions and joint rotations: ``FramePoses`` of many frames, ``FramePositions`` of one.
 
 Compiled where the skeleton only turns and moves, from ``Chain`` otherwise: the same to 1e-9.
 """
@@ -11,9 +11,22 @@ from functools import lru_cache
 import numpy as np
 
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, SkeletonKey
-from mcz.kinematics.frame_kernels import Joints, Points, place_frames, turn_frames
-from mcz.kinematics.kernel_tables import is_elaborate, tables_of
-from mcz.kinematics.points import discard_infinite, listed_points, point_position
+from mcz.kinematics.frame_kernels import (
+    Joints,
+    Points,
+    place_frames,
+    position_points,
+    turn_frames,
+)
+from mcz.kinematics.points import (
+    discard_infinite,
+    listed_points,
+    marker_distance,
+    point_position,
+    points_and_markers_of,
+    points_of,
+    positions_of,
+)
 from mcz.motion import Skeleton
 
 
@@ -144,3 +157,93 @@ def frame_poses_of(skeleton: Skeleton) -> FramePoses:
 @lru_cache(maxsize=8)
 def _frame_poses_of(key: SkeletonKey) -> FramePoses:
     return FramePoses(key.skeleton)
+
+
+class FramePositions:
+    """Positions of the points of ``skeleton`` and, on request, its virtual markers.
+
+    Maps the channels of a frame, (n_channels,), to (n_places, 3) in length units, NaN where
+    unknown: the same as ``positions_of`` and ``virtual_markers_of`` to 1e-9. Raises as they do.
+    """
+
+    def __init__(self, skeleton: Skeleton, *, virtual_markers: bool = False) -> None:
+        self._skeleton, self._has_markers = skeleton, virtual_markers
+        self._distance = marker_distance(skeleton) if virtual_markers else 0.0
+        chain = Chain(skeleton)
+        own = points_of(skeleton)
+        self._numbers = [joint for joint, tails in enumerate(own) for _ in tails]
+        tails = [
+            np.zeros(3) if tail < 0 else chain.links[joint].tails[tail]
+            for joint, joint_tails in enumerate(own)
+            for tail in joint_tails
+        ]
+        self._firsts = [self._numbers.index(joint) for joint in range(skeleton.n_joints)]
+        self._tables = None if is_elaborate(chain) else tables_of(chain, self._numbers, tails)
+
+    def __call__(self, values: Floats) -> Floats:
+        if self._tables is None:
+            return self._from_batch(values)
+        n_points, n_joints = len(self._numbers), self._skeleton.n_joints
+        out = np.empty((n_points + (3 * n_joints if self._has_markers else 0), 3))
+        origins, axes = np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
+        filled = out[:n_points], origins, axes
+        position_points(values, *self._tables, *filled)
+        if self._has_markers:
+            points = out[self._firsts][:, None]
+            markers = points + self._distance * np.swapaxes(axes, 1, 2)
+            out[n_points:] = markers.reshape(3 * n_joints, 3)
+        out[~np.isfinite(out).all(axis=1)] = np.nan
+        return out
+
+    def _from_batch(self, values: Floats) -> Floats:
+        if self._has_markers:
+            both = points_and_markers_of(self._skeleton, values[None])
+            positions: Floats = np.concatenate(both, axis=1)[0]
+        else:
+            positions = positions_of(self._skeleton, values[None])[0]
+        return positions
+
+
+def is_elaborate(chain: Chain) -> bool:
+    """Return True if a joint has other channels than rotations and positions, or a repeated one."""
+    return any(
+        link.is_whole
+        or link.scales
+        or link.lengths
+        or len({component for component, _ in link.moves}) < len(link.moves)
+        for link in chain.links
+    )
+
+
+def tables_of(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Joints, Points]:
+    """Skeleton tables for the kernels."""
+    links = chain.links
+    n_joints = len(links)
+    most = max((len(link.turns) for link in links), default=0)
+    moves = np.full((n_joints, 3), -1, np.int64)
+    turns = np.full((n_joints, max(1, most), 2), -1, np.int64)
+    changes, backs, owns = (np.tile(np.eye(3), (n_joints, 1, 1)) for _ in range(3))
+    for joint, link in enumerate(links):
+        for component, column in link.moves:
+            moves[joint, component] = column
+        for turn, pair in enumerate(link.turns):
+            turns[joint, turn] = pair
+        if link.change is not None:
+            changes[joint] = link.change[:, :, 0]
+        if link.parent_back is not None:
+            backs[joint] = link.parent_back
+        own = chain.turned[joint]
+        if own is not None:
+            owns[joint] = own
+    joints = Joints(
+        np.array([link.parent for link in links], np.int64),
+        changes,
+        np.array([link.offset for link in links]).reshape(n_joints, 3),
+        backs,
+        owns,
+        np.array([link.replaces for link in links], np.int64),
+        moves,
+        turns,
+        float(chain.radians),
+    )
+    return joints, Points(np.array(points, np.int64), np.array(tails).reshape(len(points), 3))

@@ -24,7 +24,7 @@ from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
 from mcz.interrupts import held
-from mcz.kinematics.frame_positions import FramePositions
+from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.live.figures import Figures
 from mcz.motion import Motion, Signal, Skeleton

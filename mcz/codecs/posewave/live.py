@@ -21,7 +21,7 @@ from mcz.codecs.posewave.segment import decode_segment
 from mcz.codecs.posewave.segment_chain import SegmentChain
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import FormatError, LostFrameError, OptionError
-from mcz.kinematics.frame_positions import FramePositions
+from mcz.kinematics.frames import FramePositions
 from mcz.types import Params
 
 Floats = NDArray[np.float64]

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.posewave.arc import angle_of
-from mcz.codecs.posewave.trigonometry import Rule, sine_cosine
+from mcz.codecs.posewave.trigonometry import Rule, angle_of, sine_cosine
 from mcz.kernels import kernel
 from mcz.kernels.types import FloatColumns, Floats, Floats2, IntColumns, Ints
 

@@ -1,7 +1,9 @@
-"""Sine and cosine of angles, the same bits on every machine.
+"""Sine, cosine and arc tangent, the same bits on every machine.
 
-SPEC.md, "Pose metric", is normative: an angle less whole quarter turns, then two polynomials, by
-+ - * in one order. Off by less than 1e-12 up to 2^20 quarter turns.
+SPEC.md, "Pose metric" and "Axis orders", is normative. Sine and cosine: an angle less whole quarter
+turns, then two polynomials, by + - * in one order; exact to 1e-12 up to 2^20 quarter turns. Arc
+tangent: a quotient of at most tan(1/16 turn), its series, then whole eighths and quarters, by
++ - * / in one order; exact to 1e-15 of a turn.
 """
 
 from __future__ import annotations
@@ -14,6 +16,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BEYOND = 2.0**40  # a value of this magnitude or more counts as 0
+
+STEEP = 0.41421356237309503  # above it an eighth of a turn is taken off
+N_FACTORS = 20
+# Of the series x - x^3 / 3 + x^5 / 5 ..., the last factor first.
+LAST = 1.0 / (2 * N_FACTORS + 1.0)
+ARC = tuple(1.0 / (2 * k + 1.0) for k in range(N_FACTORS - 1, -1, -1))
 
 
 class Rule(NamedTuple):
@@ -56,3 +64,22 @@ def sine_cosine(angle: float, rule: Rule) -> tuple[float, float]:
     first = cosine if odd else sine
     second = sine if odd else cosine
     return first if turns < 2.0 else -first, -second if 1.0 <= turns <= 2.0 else second
+
+
+def angle_of(y: float, x: float, rule: Rule) -> float:
+    """Angle of (x, y), finite, in the unit of ``rule``: at most half a turn; 0 for (0, 0)."""
+    up, right = abs(y), abs(x)
+    small, large = min(up, right), max(up, right)
+    ratio = small / large if large > 0.0 else 0.0
+    steep = ratio > STEEP
+    rest = (ratio - 1.0) / (ratio + 1.0) if steep else ratio
+    square = rest * rest
+    total = LAST
+    for factor in ARC:
+        total = factor - square * total
+    quarter = rule.high + rule.low
+    angle = rest * total / rule.radians
+    angle = angle + 0.5 * quarter if steep else angle
+    angle = quarter - angle if up > right else angle
+    angle = 2.0 * quarter - angle if x < 0.0 else angle
+    return -angle if y < 0.0 else angle
