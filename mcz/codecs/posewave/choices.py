@@ -83,7 +83,7 @@ class Choice:
 
     header: bytes
     weights: Weights
-    keeper: ContactTracker | None = None
+    tracker: ContactTracker | None = None
 
 
 def choose(source: SignalSource, params: Params) -> Choice:
@@ -118,8 +118,8 @@ def choose(source: SignalSource, params: Params) -> Choice:
     if fields["levels"] is None:
         fields["levels"] = best_levels(source, skeleton, fields, weights, step_cm)
     fields["borrowing"] = min(1, fields["levels"])
-    fields["contacts"], keeper = _contacts(source, params, step / step_cm)
-    return Choice(build_header(**fields), weights, keeper)
+    fields["contacts"], tracker = _contacts(source, params, step / step_cm)
+    return Choice(build_header(**fields), weights, tracker)
 
 
 def _contacts(
@@ -310,10 +310,10 @@ def best_levels(
         header = parse_header(
             build_header(**{**fields, "levels": levels, "borrowing": min(1, levels)}), layout
         )
-        streams, found = encode_coded(header, skeleton, coded, weights)
-        found = orders.values(found[::SAMPLED], no_notes)
-        found[:, header.exact] = values[::SAMPLED, header.exact]
-        error = distortion(header, skeleton, values[::SAMPLED], found)
+        streams, decoded = encode_coded(header, skeleton, coded, weights)
+        decoded = orders.values(decoded[::SAMPLED], no_notes)
+        decoded[:, header.exact] = values[::SAMPLED, header.exact]
+        error = distortion(header, skeleton, values[::SAMPLED], decoded)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 
     return _minimize(tried, score)

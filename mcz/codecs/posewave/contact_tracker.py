@@ -131,13 +131,13 @@ class ContactTracker:
             warn(f"{message}{first} to {last}", ContactWarning, stacklevel=2)
 
     def _within(self, n_frames: int) -> list[Piece]:
-        found = []
+        clipped = []
         for piece in self.pieces:
             first = max(piece.first - self.first, 0)
             stop = min(piece.stop - self.first, n_frames)
             if first < stop:
-                found.append(replace(piece, first=first, n_frames=stop - first))
-        return found
+                clipped.append(replace(piece, first=first, n_frames=stop - first))
+        return clipped
 
     def _choose_shifts(
         self, corrections: Corrections, pieces: Sequence[Piece], targets: Floats

@@ -98,7 +98,7 @@ def _segments(
         length = min(length, most_frames(layout, header.exact_groups))
     lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
-    octaves, keeper, lossy = params["refinement"], choice.keeper, _lossy(header, layout)
+    octaves, tracker, lossy = params["refinement"], choice.tracker, _lossy(header, layout)
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
         own = None if octaves is None else octaves[first:stop]
@@ -112,10 +112,10 @@ def _segments(
         }
         values = reader(first, stop)
         if lossy:
-            if keeper:
-                keeper.first = first
+            if tracker:
+                tracker.first = first
             with np.errstate(over="ignore"):  # of values that are refused in the end
-                levels = encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
+                levels = encode_segment(header, skeleton, values, choice.weights, own, tracker)[0]
             streams |= {(level, lossy[0]): stream for level, stream in enumerate(levels)}
         places = itertools.product(range(header.levels + 1), range(len(layout.groups)))
         return tuple(streams.get(place, b"") for place in places)
@@ -123,8 +123,8 @@ def _segments(
     breaks = source.breaks if header.exact_groups else ()
     for first, stop, streams in segments_by_halving(layout.n_frames, lengths, code, breaks):
         yield Segment(first, stop - first, streams)
-    if keeper and header.contacts:
-        keeper.warn(skeleton, header.contacts)
+    if tracker and header.contacts:
+        tracker.warn(skeleton, header.contacts)
 
 
 def _lossy(header: Header, layout: Layout) -> list[int]:

@@ -100,7 +100,7 @@ def encode_coded(
     head = choose_head(header, values, kept, approx)
     classes, coder = classes_of(skeleton, header.whole), fresh_coder(header.start)
     rows = RowCoder(header, classes, kept, coder, NAME)
-    walk = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
+    levels = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
         room = room_of(pyramid, level, kept) + room_of_contacts(header.contacts, len(values))
@@ -111,14 +111,14 @@ def encode_coded(
         rows.begin(level, pyramid.kind(level), len(band), stream)
         rows.exponents[:] = pyramid.exponents(level, refinement)
         code = partial(rows.encode, weights.of(level))
-        (walk.code_details if level else walk.code_coarsest)(level, code, band, rows.exponents)
+        (levels.code_details if level else levels.code_coarsest)(level, code, band, rows.exponents)
         if level < pyramid.n_details:
             streams.append(stream.finish())
-    decoded = walk.values()
+    decoded = levels.values()
     if header.contacts and kept.any():
-        held = walk.held_points(header.contacts)
+        points = levels.held_points(header.contacts)
         (contacts or ContactTracker()).encode(
-            header.contacts, walk.usual.plan, held, stream, values, decoded
+            header.contacts, levels.usual.plan, points, stream, values, decoded
         )
     streams.append(stream.finish())
     empty = [b""] * (header.levels - pyramid.n_details)
@@ -151,22 +151,24 @@ def decode_segment(
     code_head(stream, kinds_of(skeleton, header.whole), moving, numbers, where)
     head = Head(moving == 1, numbers)
     kept = head.kept(header)
-    walk = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
-    held = walk.held_points(header.contacts) if header.contacts and kept.any() else None  # HOLD-07
+    levels = LevelCoder(header, skeleton, pyramid, kept, head.values(header))
+    contacts = header.contacts if kept.any() else None
+    points = levels.held_points(contacts) if contacts else None  # HOLD-07
     rows = RowCoder(header, classes, kept, coder, where)
     for level in range(pyramid.n_details + 1):
         if level >= len(streams):
-            walk.skip(level)
+            levels.skip(level)
             continue
         stream = Stream(coder, 0, streams[level]) if level else stream
         rows.begin(level, pyramid.kind(level), pyramid.rows(level), stream)
-        found = rows.decode(ends=level < pyramid.n_details or not held)
-        (walk.take_details if level else walk.take_coarsest)(level, found, rows.exponents)
-    values = walk.values()
-    if held and len(streams) > pyramid.n_details:
-        assert header.contacts is not None
-        plan = walk.usual.plan
-        decode_contacts(header.contacts, plan, held, stream, values, f"{where}: contacts")
+        coefficients = rows.decode(ends=level < pyramid.n_details or not points)
+        (levels.take_details if level else levels.take_coarsest)(
+            level, coefficients, rows.exponents
+        )
+    values = levels.values()
+    if contacts and points and len(streams) > pyramid.n_details:
+        plan = levels.usual.plan
+        decode_contacts(contacts, plan, points, stream, values, f"{where}: contacts")
     return orders.values(values, notes)
 
 

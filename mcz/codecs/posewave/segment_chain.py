@@ -28,14 +28,14 @@ class SegmentChain:
         self.header, self.skeleton = header, skeleton
         self._classes = classes_of(skeleton, header.whole)
         self._kinds = kinds_of(skeleton, header.whole)
-        self._walk: LevelCoder | None = None  # None: nothing can go on
+        self._level_coder: LevelCoder | None = None  # None: nothing can go on
         self._rows: RowCoder | None = None
 
     def copy(self) -> SegmentChain:
         """Return an independent copy."""
         clone = copy(self)
-        if self._walk is not None and self._rows is not None:
-            clone._walk, clone._rows = self._walk.copy(), self._rows.copy()
+        if self._level_coder is not None and self._rows is not None:
+            clone._level_coder, clone._rows = self._level_coder.copy(), self._rows.copy()
         return clone
 
     def decode(self, stream: bytes, n_frames: int, where: str, *, fresh: bool) -> Floats:
@@ -44,15 +44,15 @@ class SegmentChain:
             coding = Stream(fresh_coder(self.header.start), 0, stream)
             kept, numbers = np.zeros((2, len(self._classes)), np.int64)
             code_head(coding, self._kinds, kept, numbers, where)
-            walk, rows = self._begin(Head(kept == 1, numbers), n_frames, coding)
+            level_coder, rows = self._begin(Head(kept == 1, numbers), n_frames, coding)
         else:
-            walk, rows = self._so_far(where)
+            level_coder, rows = self._continued_state(where)
             rows.go_on(n_frames, Stream(rows.model.coder, 0, stream))  # PWAVE-29
-        self._walk = None
+        self._level_coder = None
         rows.where = where
-        walk.take_coarsest(0, rows.decode(), rows.exponents)
-        self._walk, self._rows = walk, rows
-        return walk.values()
+        level_coder.take_coarsest(0, rows.decode(), rows.exponents)
+        self._level_coder, self._rows = level_coder, rows
+        return level_coder.values()
 
     def encode(
         self, values: Floats, weight: float, exponent: int, *, fresh: bool
@@ -68,9 +68,9 @@ class SegmentChain:
             coder = fresh_coder(self.header.start)
             coding = Stream(coder, room_of(Pyramid(n_frames, 0, 0), 0, head.moving), None)
             code_head(coding, self._kinds, head.moving.astype(np.int64), head.numbers.copy(), NAME)
-            walk, rows = self._begin(head, n_frames, coding)
+            level_coder, rows = self._begin(head, n_frames, coding)
         else:
-            walk, rows = self._so_far(NAME)
+            level_coder, rows = self._continued_state(NAME)
             room = n_frames * (8 * rows.n_kept + 1) + 1024
             rows.go_on(n_frames, Stream(rows.model.coder, room, None))
         rows.exponents[:] = exponent
@@ -78,19 +78,19 @@ class SegmentChain:
         def code(first: int, wanted: Floats) -> Floats:
             return rows.encode(weight, first, wanted)
 
-        walk.code_coarsest(0, code, values[:, walk.kept], rows.exponents)
-        self._walk, self._rows = walk, rows
-        return rows.stream.finish(), walk.values()
+        level_coder.code_coarsest(0, code, values[:, level_coder.kept], rows.exponents)
+        self._level_coder, self._rows = level_coder, rows
+        return rows.stream.finish(), level_coder.values()
 
-    def _so_far(self, where: str) -> tuple[LevelCoder, RowCoder]:
-        if self._walk is None or self._rows is None:  # DATA-11
+    def _continued_state(self, where: str) -> tuple[LevelCoder, RowCoder]:
+        if self._level_coder is None or self._rows is None:  # DATA-11
             raise FormatError("goes on from a segment that is not there", where=where)
-        return self._walk, self._rows
+        return self._level_coder, self._rows
 
     def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[LevelCoder, RowCoder]:
         header = self.header
         pyramid = Pyramid(n_frames, 0, 0)
-        walk = LevelCoder(header, self.skeleton, pyramid, head.moving, head.values(header))
+        level_coder = LevelCoder(header, self.skeleton, pyramid, head.moving, head.values(header))
         rows = RowCoder(header, self._classes, head.moving, coding.coder, NAME)
         rows.begin(0, pyramid.kind(0), n_frames, coding)
-        return walk, rows
+        return level_coder, rows

@@ -117,14 +117,14 @@ def parsed(plan: Plan) -> Header:
 
 
 def segments_of(plan: Plan) -> list[Segment]:
-    chain, keeper = (
+    chain, tracker = (
         SegmentChain(parsed(plan), plan.skeleton),
         ContactTracker(plan.tolerance, plan.pieces),
     )
     edges = [0, *plan.ends, plan.n_frames] if plan.n_frames else []
     return [
         Segment(
-            start, stop - start, _streams(plan, chain, keeper, index, (start, stop)), fresh=fresh
+            start, stop - start, _streams(plan, chain, tracker, index, (start, stop)), fresh=fresh
         )
         for index, (start, stop) in enumerate(zip(edges, edges[1:], strict=False))
         for fresh in (index not in plan.on,)
@@ -132,14 +132,14 @@ def segments_of(plan: Plan) -> list[Segment]:
 
 
 def _streams(
-    plan: Plan, chain: SegmentChain, keeper: ContactTracker, index: int, frames: tuple[int, int]
+    plan: Plan, chain: SegmentChain, tracker: ContactTracker, index: int, frames: tuple[int, int]
 ) -> tuple[bytes, ...]:
     if index in plan.streams:
         return plan.streams[index]
     if not plan.skeleton.n_channels:
         return ()
     own, (start, stop) = plan.refinement, frames
-    keeper.first = start
+    tracker.first = start
     octaves = None if own is None else np.array(own[start:stop], np.int64)
     source, weights = plan.source[start:stop], Weights(plan.price, plan.price)
     if plan.on:
@@ -147,7 +147,7 @@ def _streams(
         return chain.encode(source, plan.price, octave, fresh=index not in plan.on)[:1]
     if not plan.lossy:
         return (b"",) * plan.n_resolutions
-    streams, _ = encode_segment(chain.header, plan.skeleton, source, weights, octaves, keeper)
+    streams, _ = encode_segment(chain.header, plan.skeleton, source, weights, octaves, tracker)
     return streams[: plan.n_resolutions]
 
 
