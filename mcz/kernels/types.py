@@ -25,5 +25,4 @@ FloatColumns = NDArray[np.float64]  # two axes
 Bytes = NDArray[np.uint8]
 Bytes2 = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
-Flags2 = NDArray[np.bool_]
 Items = NDArray[np.generic]  # numbers or words of any type, as a file or a caller has them
