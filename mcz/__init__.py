@@ -95,7 +95,7 @@ if TYPE_CHECKING:
     from mcz.retargeting.retargeting import retarget
     from mcz.retargeting.selection import select
     from mcz.tables import to_pandas, to_xarray
-    from mcz.viewing.showing import View, view
+    from mcz.viewing.view import View, view
     from mcz.writing.file import encode, to_npz, write
 
 __version__ = _version.VERSION
@@ -185,7 +185,7 @@ _HOMES = {
     "mcz.retargeting.selection": ("select",),
     "mcz.live.generators": ("LiveReader", "stream_decode", "stream_encode"),
     "mcz.live.reader_with_losses": ("StreamSummary",),
-    "mcz.viewing.showing": ("View", "view"),
+    "mcz.viewing.view": ("View", "view"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -12,11 +12,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import brief
 from mcz.errors import MotionError
 from mcz.kinematics import origins_of
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion, Skeleton
+from mcz.text_format import brief
 from mcz.types import JsonObject
 
 BLOCK = 2**20  # coordinates that are looked at in one go

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz import brief
+from mcz import text_format
 from mcz.checks import (
     INTEGER,
     NUMBER,
@@ -42,9 +42,9 @@ from mcz.clock import (
     times_form_fault,
     unit_of_times,
 )
-from mcz.displays import html_of
 from mcz.errors import MotionError, OutOfRangeError
 from mcz.indexing import row_numbers
+from mcz.notebook import html_of
 from mcz.numbers.blocks import grid_blocks as grid_blocks
 from mcz.numbers.exceptions import Exceptions as Exceptions
 from mcz.signal import ROLES as ROLES
@@ -118,7 +118,7 @@ class Motion:
     number_step: int = 1
     first_time: float | None = None
 
-    __repr__ = brief.motion_text
+    __repr__ = text_format.motion_text
     _repr_html_ = html_of
 
     def __post_init__(self) -> None:

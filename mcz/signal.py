@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz import brief
+from mcz import text_format
 from mcz.checks import (
     INTEGER,
     NAME,
@@ -120,7 +120,7 @@ class Signal:
     role: str | None = None
     of: int | None = None
 
-    __repr__ = brief.signal_text
+    __repr__ = text_format.signal_text
 
     def __post_init__(self) -> None:
         if type(self.values) is not np.ndarray and isinstance(self.values, np.ma.MaskedArray):

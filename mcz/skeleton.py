@@ -9,7 +9,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz import brief
+from mcz import text_format
 from mcz.checks import (
     DATA,
     INTEGER,
@@ -170,7 +170,7 @@ class Skeleton:
     base: bytes | None = None
     source: Source | None = field(default=None, compare=False, repr=False)
 
-    __repr__ = brief.skeleton_text
+    __repr__ = text_format.skeleton_text
 
     def __post_init__(self) -> None:
         check_fields(self, SKELETON)
@@ -269,7 +269,7 @@ class Skeleton:
                 joint = int(joint)
         if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
             return int(joint)
-        raise MotionError(f"no joint {joint!r} among {brief.among(self.addresses(), joint)}")
+        raise MotionError(f"no joint {joint!r} among {text_format.among(self.addresses(), joint)}")
 
 
 def first_columns(

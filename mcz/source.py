@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from mcz import brief
+from mcz import text_format
 from mcz.checks import DATA, HASH, INTEGER, TEXT, Rule, check_fields
 from mcz.errors import MotionError
 
@@ -47,7 +47,7 @@ class Source:
     size: int = 0
     sha256: bytes = b""
 
-    __repr__ = brief.source_text
+    __repr__ = text_format.source_text
 
     def __post_init__(self) -> None:
         check_fields(self, SOURCE)

@@ -21,9 +21,9 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
 GROUND = {
     "arguments",
-    "brief",
+    "text_format",
     "checks",
-    "displays",
+    "notebook",
     "errors",
     "hints",
     "extras",
@@ -40,8 +40,8 @@ ALLOWED = {
     "kernels": set(),
     "interrupts": set(),
     "types": set(),
-    "brief": set(),
-    "displays": set(),
+    "text_format": set(),
+    "notebook": set(),
     "hints": set(),
     "errors": {"hints"},
     "arguments": {"errors"},
@@ -49,7 +49,7 @@ ALLOWED = {
     "extras": {"errors"},
     "indexing": {"errors"},
     "schema": {"errors"},
-    "numbers": {"brief", "checks", "errors", "schema"},
+    "numbers": {"text_format", "checks", "errors", "schema"},
     "source": GROUND,
     "skeleton": GROUND | {"source"},
     "signal": GROUND | {"skeleton", "source"},
@@ -67,7 +67,7 @@ ALLOWED = {
     "jobs": {"errors", "hints", "threads"},
     "annexes": set(),
     "version": set(),
-    "queries": {"brief", "errors"},
+    "queries": {"text_format", "errors"},
     "coding": GROUND | {"annexes"},
     "transforms": GROUND,
     "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms", "units"},
@@ -327,7 +327,7 @@ MOST_PARAMETERS = 8
 def test_functions_have_few_parameters() -> None:
     """But for public functions with keywords, commands of click, and kernels."""
     public = {(home.replace(".", "/"), name) for name, home in mcz._HOME_OF.items()}
-    public |= {("mcz/dask/packing", "pack"), ("mcz/datasets/collecting", "dataset")}
+    public |= {("mcz/dask/packing", "pack"), ("mcz/datasets/member_list", "dataset")}
     public.add(("mcz/live/writer", "__init__"))
 
     def crowded(path: Path) -> list[str]:

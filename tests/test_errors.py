@@ -202,5 +202,5 @@ def test_the_library_names_no_option_of_the_command_line() -> None:
 
 NO_LIBRARY = {
     "pictures/chart_pages.py",  # variables of CSS
-    "viewing/building.py",  # options of npm
+    "viewing/page_build.py",  # options of npm
 }

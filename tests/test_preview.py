@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.cli.parts import preview_motion
+from mcz.cli.clip_selection import preview_motion
 from mcz.errors import OptionError
 from mcz.motion import Motion, Signal
 from mcz.reading.signal_info import SignalInfo

@@ -19,7 +19,6 @@ from mcz.bags.manifests import (
     manifest_text,
     tags_text,
 )
-from mcz.brief import counted
 from mcz.errors import (
     AccessError,
     ExistsError,
@@ -28,6 +27,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.reading.faults import quick_check
+from mcz.text_format import counted
 
 SUFFIX = ".mcz"
 OXUM = "Payload-Oxum"  # bytes and files of the payload, which we count ourselves

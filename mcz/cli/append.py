@@ -1,4 +1,4 @@
-"""``mcz append``: more files, folders or archives into an .mcz file."""
+"""``mcz append``: add files, folders or archives to an .mcz file."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from mcz.cli.archive_summary import print_file_results
 from mcz.cli.common import Exit, Failure, about, existing
 from mcz.cli.options import (
     check_force_rate,
@@ -19,12 +20,11 @@ from mcz.cli.options import (
     skeleton_option,
     threads_option,
 )
-from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 from mcz.types import Settings
 
 
-@click.command(short_help="More files into an .mcz.")
+@click.command(short_help="Add files to an .mcz.")
 @click.argument(
     "sources", metavar="SRC...", nargs=-1, required=True, type=click.Path(readable=False)
 )
@@ -109,7 +109,7 @@ def command(
             progress=progress,
             **_known(options),
         )
-    return conclude(report, target, as_json)
+    return print_file_results(report, target, as_json)
 
 
 def _known(options: Settings) -> Settings:

@@ -17,7 +17,7 @@ from mcz.cli.options import json_option
     "--info",
     metavar="NAME=TEXT",
     multiple=True,
-    help="A line of bag-info.txt, such as Source-Organization=TEXT; may be repeated.",
+    help="Add a line to bag-info.txt, such as Source-Organization=TEXT (repeatable).",
 )
 @json_option
 def command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_json: bool) -> Exit:

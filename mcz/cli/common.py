@@ -1,4 +1,4 @@
-"""What every command shares: exit codes, errors on one line, JSON, argument types."""
+"""Exit codes, one-line errors, files and argument types of all commands."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.damage import hinted
+from mcz.cli.damage_hint import hinted
 from mcz.cli.hints import OPTION_HINTS
 from mcz.cli.terminal import binary_output as binary_output
 from mcz.cli.terminal import echo as echo
@@ -135,7 +135,7 @@ OURS = SkeletonWarning, ContactWarning
 
 @contextmanager
 def _warnings_said() -> Iterator[None]:
-    """Let what the library warns of become lines on standard error, each once."""
+    """Print warnings of the library to standard error, each once."""
     with warnings.catch_warnings():
         for category in OURS:
             warnings.simplefilter("once", category)
@@ -152,12 +152,12 @@ def _warnings_said() -> Iterator[None]:
 
 
 def _is_starved(error: ImportError) -> bool:
-    """Whether a library could not be loaded for want of memory, as loaders word it."""
+    """Return whether a library failed to load for lack of memory, by the loader's message."""
     return "failed to map segment" in str(error) or "annot allocate memory" in str(error)
 
 
 def _failed(error: Exception, *, as_json: bool) -> Exit:
-    """Say what went wrong; return the exit code."""
+    """Print an error; return its exit code."""
     failure = _failure_of(error)
     if as_json and not isinstance(failure, JsonRefused):
         say_json({"error": _facts(failure)})
@@ -190,7 +190,7 @@ def _text_of(error: MczError) -> str:
 
 
 def _facts(error: MczError) -> JsonObject:
-    """What ``--json`` says of an error; docs/scripts.md lists the keys."""
+    """The ``--json`` document of an error; docs/scripts.md lists the keys."""
     facts = {
         "exit_code": int(code_of(error)),
         "class": error.kind if isinstance(error, Failure) else type(error).__name__,
@@ -206,7 +206,7 @@ class _Terminated(BaseException):
 
 @contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """Let SIGTERM end the block as an exception, as Ctrl-C does, so that it cleans up."""
+    """Raise an exception in the block on SIGTERM, so that it cleans up as on Ctrl-C."""
 
     def end(number: int, frame: object) -> None:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -233,7 +233,7 @@ def _prepare_streams() -> None:
 
 
 def _give_up_output() -> None:
-    """Where standard output takes no more, nothing shall be written to it when Python ends."""
+    """Redirect a broken standard output, so that Python does not fail on it at exit."""
     if sys.stdout is None:
         return
     try:
@@ -252,7 +252,7 @@ def code_of(error: Exception) -> Exit:
 
 @contextmanager
 def about(path: str) -> Iterator[None]:
-    """Say of what goes wrong inside that it is about the file ``path``, unless it is of another."""
+    """Add ``path`` to errors raised in the block that name no file yet."""
     try:
         yield
     except (BrokenPipeError, Failure):
@@ -312,7 +312,7 @@ def damage_of(path: str, damage: Sequence[str]) -> Exit:
 
 
 def exists(path: Path) -> Failure:
-    """That a file is there, and nobody said that it may be replaced."""
+    """The error about an existing file that ``--force`` would replace."""
     return Failure("it exists", Exit.USAGE, path=path, kind="ExistsError", hint=Hint.FORCE)
 
 

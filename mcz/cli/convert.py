@@ -9,6 +9,7 @@ import click
 from mcz.cli.common import Exit
 from mcz.cli.decode import decode
 from mcz.cli.decode_input import Input
+from mcz.cli.decode_options import DecodeOptions, refuse
 from mcz.cli.options import (
     ITS_RATE_HELP,
     arrays_option,
@@ -26,7 +27,6 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.suffixes import TARGETS, suffix_of
-from mcz.cli.wanted import Wanted, refuse
 from mcz.types import JsonObject, Params, Settings
 
 MCZ = ".mcz"
@@ -71,7 +71,7 @@ def command(
     own format has the same bytes; with --frames it is a part.
     """
     facts = {name: options.pop(name) for name in OF_SOURCES}
-    wanted = Wanted(**options)
+    wanted = DecodeOptions(**options)
     given = Input(file, max_decoded=max_decoded, facts=facts)
     suffix = suffix_of(output)
     refuse(not suffix and wanted.target is None, f"{output}: it has no suffix; --to says a format")
@@ -87,7 +87,7 @@ def command(
     return _encode(file, output, facts | _facts(wanted), force=force, as_json=as_json)
 
 
-def _facts(wanted: Wanted) -> JsonObject:
+def _facts(wanted: DecodeOptions) -> JsonObject:
     return {"rate": wanted.rate, "unit": wanted.unit, "up": wanted.up}
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli.clip_selection import ClipSelection, FilteredSelection, PreviewSelection
 from mcz.cli.common import (
     Exit,
     Failure,
@@ -16,9 +17,10 @@ from mcz.cli.common import (
     plural,
     say,
 )
+from mcz.cli.conversion_summary import ConversionSummary, summary_facts, summary_lines
 from mcz.cli.decode_input import SOURCE_GIVEN, Input
-from mcz.cli.delivery import Output, check_count, deliver
-from mcz.cli.made import Made, facts_of, told
+from mcz.cli.decode_options import EVENTS, DecodeOptions, check_options, check_signal, refuse
+from mcz.cli.decode_output import Output, check_count, deliver
 from mcz.cli.options import (
     decoded_option,
     force_option,
@@ -32,9 +34,7 @@ from mcz.cli.options import (
     up_option,
     where_option,
 )
-from mcz.cli.parts import Filtered, Part, Preview
 from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of, target_of_clip
-from mcz.cli.wanted import EVENTS, Wanted, check_options, check_signal, refuse
 from mcz.reading.fidelity import CONVERTED, RESTORED
 from mcz.types import JsonObject
 
@@ -142,7 +142,7 @@ def command(
     A file without clips gives its skeleton's ASF or its attachment. A source file in place of
     FILE.mcz is converted at once, as by mcz convert.
     """
-    wanted = Wanted(**options)
+    wanted = DecodeOptions(**options)
     refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     given = Input(file, salvage=salvage, unverified=unverified, max_decoded=max_decoded)
     return decode(given, wanted, output, names=names, where=where, force=force, as_json=as_json)
@@ -150,7 +150,7 @@ def command(
 
 def decode(
     given: Input,
-    wanted: Wanted,
+    wanted: DecodeOptions,
     output: str | None,
     *,
     names: tuple[str, ...],
@@ -169,20 +169,22 @@ def decode(
         check_options(wanted, salvage)
         check_signal(wanted)
     outputs: list[Output] = []
-    made: dict[str, Made] = {}
+    summaries: dict[str, ConversionSummary] = {}
     with given.opened() as (held, inputs):
         for clip in _chosen(held, output, names, where):
-            found, made[clip.name] = _of_clip(held, clip, _as_named(clip, output, wanted, salvage))
+            found, summaries[clip.name] = _of_clip(
+                held, clip, _as_named(clip, output, wanted, salvage)
+            )
             outputs += [part for part in found if part not in outputs]  # an ASF that clips share
         if not held.clips:
             _check_plain(file, wanted)
             outputs = [_other(held, names)]
             check_kept(output, outputs[0].name, is_skeleton=outputs[0].kind == "skeleton")
         facts: JsonObject = {"damage": held.damage, "unverified_segments": held.unverified}
-    deliver(inputs, output, outputs, force, as_json, facts | facts_of(made))
+    deliver(inputs, output, outputs, force, as_json, facts | summary_facts(summaries))
     if facts["unverified_segments"]:
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
-    for line in told(made):
+    for line in summary_lines(summaries):
         say(f"{file}: {line}")
     return damage_of(file, facts["damage"])
 
@@ -201,7 +203,9 @@ def _chosen(
     return clips
 
 
-def _as_named(clip: Clip, output: str | None, wanted: Wanted, salvage: bool) -> Wanted:
+def _as_named(
+    clip: Clip, output: str | None, wanted: DecodeOptions, salvage: bool
+) -> DecodeOptions:
     """``wanted`` as the suffix of the output says, unless ``--to`` does."""
     if wanted.target is None:
         plain = not (wanted.solve or wanted.preview)
@@ -211,7 +215,7 @@ def _as_named(clip: Clip, output: str | None, wanted: Wanted, salvage: bool) -> 
     return wanted
 
 
-def _check_plain(file: str, wanted: Wanted) -> None:
+def _check_plain(file: str, wanted: DecodeOptions) -> None:
     """Raise Failure for options of clips, where the file has none."""
     if wanted.target is not None or wanted.frames is not None or wanted.filtered:
         raise Failure(
@@ -221,41 +225,43 @@ def _check_plain(file: str, wanted: Wanted) -> None:
         )
 
 
-def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made]:
-    """The outputs of a clip as it is wanted, and what is to be said of how they were made."""
-    target, made = wanted.target, Made()
+def _of_clip(
+    held: File, clip: Clip, wanted: DecodeOptions
+) -> tuple[list[Output], ConversionSummary]:
+    """The outputs of a clip, and their summary."""
+    target, summary = wanted.target, ConversionSummary()
     part = _part(clip, wanted)
     if target is None:
         outputs = [_source(clip, part)]
-        made.notes = _rate_notes(clip, part, wanted)
+        summary.notes = _rate_notes(clip, part, wanted)
     elif wanted.is_converted:
         from mcz.conversion import left_out
         from mcz.reading.source_files import SourceOptions
 
         motion = part.motion()
         if wanted.solve:
-            motion, made.fit = _solved(clip, motion)
+            motion, summary.fit = _solved(clip, motion)
         elif target in ("amc", "bvh"):
             _check_moves(clip)
         unit = wanted.unit if motion.skeleton.unit_cm is None else None
         motion = SourceOptions(unit=unit, up=wanted.up).applied_to(motion)
         rate = None if wanted.filtered else wanted.rate
-        made.notes = _corrected(clip, rate)
+        summary.notes = _corrected(clip, rate)
         if wanted.is_scene:
-            made.scene = _scene(motion, target, rate, wanted)
-            outputs = [Output(target, f"{_stem(motion)}.{target}", made.scene.data, CONVERTED)]
+            summary.scene = _scene(motion, target, rate, wanted)
+            outputs = [Output(target, f"{_stem(motion)}.{target}", summary.scene.data, CONVERTED)]
         else:
             outputs = _converted(motion, target, rate, wanted.with_skeleton)
-        made.left_out = left_out(motion, target)
+        summary.left_out = left_out(motion, target)
     else:
         outputs = [_export(clip, target, part, wanted)]
-        made.left_out = _beside(clip, wanted)
+        summary.left_out = _beside(clip, wanted)
     if wanted.with_skeleton and target != "amc":
         outputs.append(_skeleton(held, _sourced(held, clip)))
-    return outputs, made
+    return outputs, summary
 
 
-def _rate_notes(clip: Clip, part: Part, wanted: Wanted) -> tuple[str, ...]:
+def _rate_notes(clip: Clip, part: ClipSelection, wanted: DecodeOptions) -> tuple[str, ...]:
     """Notes where the text that was written states other times than the clip has."""
     from mcz.reading.rate_notes import text_notes
 
@@ -276,16 +282,22 @@ def _corrected(clip: Clip, rate: Fraction | None) -> tuple[str, ...]:
     return (f"clip {clip.name}: its {text}",)
 
 
-def _part(clip: Clip, wanted: Wanted) -> Part:
+def _part(clip: Clip, wanted: DecodeOptions) -> ClipSelection:
     frames = wanted.frames
     if frames is not None:
         start, stop = frames
         frames = start, clip.n_frames if stop is None else stop
-    what = Filtered if wanted.filtered else Preview if wanted.preview else Part
+    what = (
+        FilteredSelection
+        if wanted.filtered
+        else PreviewSelection
+        if wanted.preview
+        else ClipSelection
+    )
     return what(clip, frames, wanted.resolution, wanted.decimate, wanted.rate)
 
 
-def _source(clip: Clip, part: Part) -> Output:
+def _source(clip: Clip, part: ClipSelection) -> Output:
     path = clip.source.path if clip.source else ""
     data = part.source_bytes()
     name = PurePosixPath(path).name or f"{_stem(clip)}.out"
@@ -315,7 +327,7 @@ def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
     return from_positions(motion, base)
 
 
-def _scene(motion: Motion, target: str, rate: Fraction | None, wanted: Wanted) -> SceneFile:
+def _scene(motion: Motion, target: str, rate: Fraction | None, wanted: DecodeOptions) -> SceneFile:
     """The motion as a file of animated nodes."""
     from mcz.conversion.scenes import to_scene
 
@@ -336,7 +348,7 @@ def _converted(
     ]
 
 
-def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
+def _export(clip: Clip, target: str, part: ClipSelection, wanted: DecodeOptions) -> Output:
     from mcz.tables.events import EVENT_EXPORTS
     from mcz.tables.files import EXPORTS, channel_names, channel_units
 
@@ -362,7 +374,7 @@ def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
     return Output(target, f"{_stem(clip)}.{target}", EXPORTS[target](table), CONVERTED)
 
 
-def _beside(clip: Clip, wanted: Wanted) -> tuple[str, ...]:
+def _beside(clip: Clip, wanted: DecodeOptions) -> tuple[str, ...]:
     """The signals that a table does not have, and --signal would write."""
     from mcz.conversion.losses import of_recording, of_text
 

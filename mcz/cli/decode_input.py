@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from mcz.cli.common import about, existing, opened, say
+from mcz.cli.decode_options import DecodeOptions, refuse
 from mcz.cli.hints import in_options
-from mcz.cli.wanted import Wanted, refuse
 from mcz.types import Params
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Input:
 
         return is_source(self.file)
 
-    def with_facts(self, wanted: Wanted) -> tuple[Input, Wanted]:
+    def with_facts(self, wanted: DecodeOptions) -> tuple[Input, DecodeOptions]:
         """The same with the facts among what is wanted of a source file, and the rest of that."""
         refuse(self.salvage or self.unverified, "--salvage and --unverified need an .mcz")
         facts = {"unit": wanted.unit, "up": wanted.up, "rate": wanted.rate}

@@ -1,16 +1,16 @@
-"""``mcz delete``: clips out of an .mcz, and every byte of them."""
+"""``mcz delete``: delete clips from an .mcz, and all their bytes."""
 
 from __future__ import annotations
 
 import click
 
-from mcz.cli.arranged import conclude, output_option
+from mcz.cli.archive_summary import print_clip_results
 from mcz.cli.common import Exit, Failure, about
-from mcz.cli.options import force_option, json_option, where_option
+from mcz.cli.options import force_option, json_option, output_option, where_option
 from mcz.cli.progress import Progress
 
 
-@click.command(short_help="Clips out of an .mcz, and every byte of them.")
+@click.command(short_help="Delete clips from an .mcz, and all their bytes.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @where_option
@@ -49,4 +49,4 @@ def command(
             force=force,
             progress=progress,
         )
-    return conclude(report, output or file, as_json, told=("deleted",))
+    return print_clip_results(report, output or file, as_json, listed=("deleted",))

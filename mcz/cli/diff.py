@@ -137,7 +137,7 @@ def command(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Wanted:
-    """What is compared, how, and what the two sides do not say themselves."""
+    """Options of a comparison, and facts that the files lack."""
 
     frames: Cut
     unit: str | None
@@ -228,7 +228,7 @@ def _range(frames: Cut, n_frames: int, what: str) -> tuple[int, int]:
 
 
 def _by_name(left: _Side, right: _Side) -> bool:
-    """Whether the clips of the same names are compared: two .mcz, not both of one clip."""
+    """Return whether clips are paired by name: two .mcz files, at least one with several clips."""
     return bool(left.file and right.file) and max(len(left.clips), len(right.clips)) > 1
 
 
@@ -246,7 +246,7 @@ def _taken(left: _Side, right: _Side, names: tuple[str, ...], where: str) -> tup
 
 
 def _common(left: _Side, right: _Side, names: Sequence[str]) -> tuple[str, ...]:
-    """Those of ``names`` that clips of both have; raises Failure where there is none."""
+    """The ``names`` of clips that both sides have; raises Failure if there are none."""
     held = set(left.clips) & set(right.clips)
     both = tuple(name for name in names if name in held)
     if not both:

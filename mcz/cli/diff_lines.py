@@ -1,13 +1,13 @@
-"""What ``mcz diff`` prints: its document as people read it."""
+"""Text output of ``mcz diff``."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from mcz.brief import first_of
 from mcz.cli.common import plural, table
 from mcz.cli.figures import figure_lines
 from mcz.cli.hints import in_options
+from mcz.text_format import first_of
 from mcz.types import JsonObject, Params
 
 FEW = 12  # names of joints that are shown
@@ -77,7 +77,7 @@ def _joint_lines(a: str, b: str, found: JsonObject) -> Iterator[str]:
 
 
 def _feet_line(feet: Params) -> str:
-    """What the contacts were found with."""
+    """The joints, axis and frame rate used to detect contacts."""
     guessed = " (guessed)" if feet["up_guessed"] else ""
     assumed = " (assumed)" if feet["rate_assumed"] else ""
     return (

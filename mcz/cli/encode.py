@@ -106,7 +106,7 @@ def _encode_piped(
     format_name: str | None,
     **options: Any,
 ) -> Exit:
-    from mcz.cli.piped import encode_lines, stored
+    from mcz.cli.encode_stdin import encode_lines, stored
     from mcz.live.text_writer import codes_live
     from mcz.writing.atomic import refuse_inputs
 
@@ -181,7 +181,7 @@ def _tell(target: str, written: Written, as_json: bool) -> None:
 
 
 def _is_special(target: str) -> bool:
-    """Whether the target is a device or a pipe, which cannot be read again."""
+    """Return whether the target is a device or a pipe, which cannot be read again."""
     path = Path(target)
     return "://" not in target and path.exists() and not (path.is_file() or path.is_dir())
 

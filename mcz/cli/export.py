@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import click
 
+from mcz.cli.archive_summary import print_file_results
 from mcz.cli.common import Exit, about, existing
 from mcz.cli.options import (
     clips_option,
@@ -19,7 +20,6 @@ from mcz.cli.options import (
     unit_option,
     where_option,
 )
-from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 from mcz.cli.suffixes import TARGETS
 
@@ -73,4 +73,4 @@ def command(
             max_decoded=max_decoded,
             progress=progress,
         )
-    return conclude(report, folder, as_json)
+    return print_file_results(report, folder, as_json)

@@ -19,7 +19,7 @@ from mcz.cli.common import (
     print_json,
     say,
 )
-from mcz.cli.damage import hinted
+from mcz.cli.damage_hint import hinted
 from mcz.cli.options import (
     clips_option,
     copies_option,

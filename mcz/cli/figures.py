@@ -107,7 +107,7 @@ def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
 
 
 def _where(held: Mapping[str, str], metric: str, what: str) -> str:
-    """Where the greatest is, as far as it is said: ``frame 7, point Head``."""
+    """The place of a maximum, if recorded: ``frame 7, point Head``."""
     words = ("frame", what)
     return ", ".join(f"{w} {held[f'{metric}_{w}']}" for w in words if f"{metric}_{w}" in held)
 
@@ -118,7 +118,7 @@ def _radius(held: Mapping[str, str]) -> str:
 
 
 def _contact_lines(held: Mapping[str, str]) -> Iterator[str]:
-    """How many contacts the feet have, and how far they slide in them."""
+    """Lines about the contacts of feet and their sliding."""
     if "contacts" not in held:
         return
     some = held["contacts"] != "0" and "contact_frames" in held

@@ -1,4 +1,4 @@
-"""``mcz info`` and ``mcz-info``: what a file holds and what each part of it costs."""
+"""``mcz info`` and ``mcz-info``: show the contents of a file and the size of each part."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.brief import first_of
 from mcz.cli.common import (
     EXIT_CODES,
     Exit,
@@ -25,6 +24,7 @@ from mcz.cli.common import (
     say,
     table,
 )
+from mcz.cli.duplicate_options import Once
 from mcz.cli.figures import figure_lines
 from mcz.cli.hints import OPTION_HINTS, in_options
 from mcz.cli.options import (
@@ -37,12 +37,12 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.previews import preview_lines
-from mcz.cli.recording import array_lines, recording_lines
-from mcz.cli.repeats import Once
+from mcz.cli.recording_lines import array_lines, recording_lines
 from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
 from mcz.errors import FormatError, MczError
+from mcz.text_format import first_of
 from mcz.types import JsonObject
 
 if TYPE_CHECKING:
@@ -59,10 +59,12 @@ RATIOS = (  # of the bytes that a codec wrote, which restore no source alone
 )
 
 
-@click.command(cls=Once, short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
+@click.command(cls=Once, short_help="Show the contents and sizes of a file.", epilog=EXIT_CODES)
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @json_option
-@click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")
+@click.option(
+    "--layout", "show_layout", is_flag=True, help="Print the meaning of every byte range."
+)
 @click.option(
     "--validate",
     "check",
@@ -341,7 +343,7 @@ def _clip_ratio(clip: JsonObject) -> str:
 
 
 def _notes(clips: list[JsonObject]) -> Iterator[str]:
-    """What was noticed about the sources of clips and their skeletons, each text once."""
+    """Notes on the sources of clips and skeletons, each text once."""
     named: dict[str, list[str]] = {}
     for clip in clips:
         for key in NOTES:

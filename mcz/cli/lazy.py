@@ -10,7 +10,7 @@ from importlib import import_module
 
 import click
 
-from mcz.cli.repeats import refuse_repeats
+from mcz.cli.duplicate_options import refuse_repeats
 
 
 def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
@@ -56,7 +56,7 @@ OTHER_NAMES = {
 
 
 def unknown(name: str, names: Sequence[str]) -> str:
-    """That there is no such command, and which are called nearly so."""
+    """The message about an unknown command, with similar names."""
     from difflib import get_close_matches
 
     near = get_close_matches(name.lower(), names, 3, 0.7)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.brief import spreadsheet_cell
 from mcz.cli.common import (
     Exit,
     JsonRefused,
@@ -22,6 +21,7 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.options import json_option, salvage_option, where_option
+from mcz.text_format import spreadsheet_cell
 from mcz.types import JsonObject
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[Js
 
 
 def _totals(clips: Sequence[Clip]) -> JsonObject:
-    """How many clips and frames there are, and seconds where the rate is known."""
+    """Total clips and frames, and seconds of the clips with a known rate."""
     known = [clip for clip in clips if clip.frame_rate is not None]
     return {
         "clips": len(clips),

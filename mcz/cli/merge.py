@@ -1,16 +1,16 @@
-"""``mcz merge``: several .mcz files in one."""
+"""``mcz merge``: merge several .mcz files."""
 
 from __future__ import annotations
 
 import click
 
-from mcz.cli.arranged import conclude
+from mcz.cli.archive_summary import print_clip_results
 from mcz.cli.common import Exit, about, existing
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 
 
-@click.command(short_help="Several .mcz in one, nothing coded anew.")
+@click.command(short_help="Merge several .mcz without re-encoding.")
 @click.argument(
     "sources", metavar="IN.mcz...", nargs=-1, required=True, type=click.Path(readable=False)
 )
@@ -51,4 +51,4 @@ def command(
             force=force,
             progress=progress,
         )
-    return conclude(report, output, as_json, told=("renamed",))
+    return print_clip_results(report, output, as_json, listed=("renamed",))

@@ -1,4 +1,4 @@
-"""``mcz meta``: what is said of clips, shown and set."""
+"""``mcz meta``: show and edit clip metadata."""
 
 from __future__ import annotations
 
@@ -50,17 +50,19 @@ def _to_pairs(
     return pairs
 
 
-@click.command(short_help="What is said of clips: shown, set, taken from a table.")
+@click.command(short_help="Show and edit clip metadata.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @clips_option
 @where_option
-@click.option("--file", "of_file", is_flag=True, help="Of the file as a whole, not of clips.")
+@click.option(
+    "--file", "of_file", is_flag=True, help="Edit the metadata of the file, not of clips."
+)
 @click.option(
     "--set", "pairs", metavar="KEY=VALUE", multiple=True, callback=_to_pairs,
-    help="Say this; may be repeated. Keys: docs/metadata.md, or x-... of your own.",
+    help="Set a key (repeatable). Keys: docs/metadata.md, or x-... of your own.",
 )  # fmt: skip
 @click.option(
-    "--remove", "removed", metavar="KEY", multiple=True, help="Say this no more; may be repeated."
+    "--remove", "removed", metavar="KEY", multiple=True, help="Remove a key (repeatable)."
 )
 @click.option(
     "--from", "table", metavar="TABLE.csv", type=click.Path(readable=False),
@@ -77,7 +79,7 @@ def _to_pairs(
     help="The columns of the table to take, as KEY=COLUMN where they are called otherwise. "
     "Default: all.",
 )  # fmt: skip
-@click.option("--skip-unknown", is_flag=True, help="Rows of the table without a clip are let be.")
+@click.option("--skip-unknown", is_flag=True, help="Ignore rows that match no clip.")
 @click.option(
     "--rate", metavar="R", callback=to_rate,
     help="Frames a second of clips whose source does not say it (AMC): rewrites the file. Default: "
@@ -105,9 +107,9 @@ def command(
     purge: bool,
     as_json: bool,
 ) -> Exit:
-    """Show what is said of the clips of FILE.mcz, or set it, and leave their bytes untouched.
+    """Show or edit the metadata of clips in FILE.mcz, without rewriting their data.
 
-    It is appended, and the last one said wins. What was said before stays in the bytes until
+    Changes are appended, and the last value wins. Earlier values stay in the file until
     --purge rewrites the file.
     """
     existing(file)
@@ -168,7 +170,7 @@ def _changes(
     said: Said,
     rows: Rows | None,
 ) -> tuple[dict[str, dict[str, str | None]], list[str]]:
-    """What is to be said of each clip, and the rows of the table without one."""
+    """Metadata changes by clip, and the table rows that match no clip."""
     changes: dict[str, dict[str, str | None]] = {}
     unknown: list[str] = []
     with opened(file) as held, about(file):
@@ -217,6 +219,6 @@ def _set(
     of_clips = plural(len(names - {""}), "clip")
     rates = f", the rate of {plural(of_rate, 'clip')}" if rate is not None else ""
     whole = " and of the file" if "" in names else ""
-    purged = ", and purged what was said before" if purge else ""
-    echo(f"{file}: changed what is said of {of_clips}{whole}{rates}{purged}")
+    purged = ", and purged earlier values" if purge else ""
+    echo(f"{file}: updated metadata of {of_clips}{whole}{rates}{purged}")
     return Exit.FINE

@@ -8,7 +8,8 @@ from functools import wraps
 
 import click
 
-from mcz.cli.common import Exit, Failure, echo, to_frames, to_params, to_rate
+from mcz.cli.common import Exit, Failure, echo, existing, to_frames, to_params, to_rate
+from mcz.cli.suffixes import file_in
 from mcz.types import Settings
 
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
@@ -57,10 +58,27 @@ def force_option(function: Function) -> Function:
     return click.option("--force", is_flag=True, help="Overwrite what exists.")(function)
 
 
+def output_option(function: Function) -> Function:
+    """``-o``; by default the command replaces its input file."""
+
+    @wraps(function)
+    def command(*, file: str, output: str | None, **options: object) -> object:
+        existing(file)
+        return function(file=file, output=output and file_in(output, file), **options)
+
+    return click.option(
+        "-o",
+        "--output",
+        metavar="OUT.mcz",
+        help="Write OUT.mcz and keep FILE.mcz. Default: replace FILE.mcz once the new file is "
+        "complete.",
+    )(command)
+
+
 def salvage_option(function: Function) -> Function:
     """``--salvage``, as the argument ``salvage`` of ``mcz.open``."""
     return click.option(
-        "--salvage", is_flag=True, help="Of a damaged file use what is whole; say what is not."
+        "--salvage", is_flag=True, help="Read the intact parts of a damaged file; report the rest."
     )(function)
 
 
@@ -145,8 +163,8 @@ where_option = click.option(
     "--where",
     metavar="QUERY",
     callback=_to_query,
-    help="Only clips of which this is true, such as \"subject == '05' and n_frames > 500\"; "
-    "docs/queries.md has all of it.",
+    help="Select the clips that match a query, such as \"subject == '05' and n_frames > 500\"; "
+    "see docs/queries.md.",
 )
 
 token_option = click.option(
@@ -163,7 +181,7 @@ param_option = click.option(
     metavar="KEY=VALUE",
     multiple=True,
     callback=to_params,
-    help="A parameter of the codec; may be repeated.",
+    help="Set a codec parameter (repeatable).",
 )
 
 
@@ -203,7 +221,7 @@ def arrays_option(function: Function) -> Function:
     return click.option(
         "--arrays",
         type=click.Choice(ARRAYS),
-        help="What the numbers of a plain .npy or .npz are, which does not say it.",
+        help="Set what the numbers of a plain .npy or .npz are.",
     )(function)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.cli.archive_summary import print_file_results
 from mcz.cli.common import Exit, Failure, about
 from mcz.cli.options import (
     check_force_rate,
@@ -22,7 +23,6 @@ from mcz.cli.options import (
     rate_option,
     threads_option,
 )
-from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
@@ -85,11 +85,11 @@ def command(
             progress=progress,
             **options,
         )
-    return conclude(report, target, as_json)
+    return print_file_results(report, target, as_json)
 
 
 def _packing(scheduler: str | None) -> Callable[..., Report]:
-    """What packs: this machine, or those of a scheduler."""
+    """The ``pack`` function: local, or on a Dask scheduler."""
     if scheduler is None:
         from mcz.editing.archive import pack
 

@@ -21,7 +21,7 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.hints import in_options
-from mcz.cli.moving import cut_of, moving_of, moving_options
+from mcz.cli.motion_input import cut_of, moving_of, moving_options
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 from mcz.cli.render import to_size

@@ -1,4 +1,4 @@
-"""What ``mcz info --preview`` adds: a line of motion and bars of bytes, in letters."""
+"""Text previews of ``mcz info --preview``: a sparkline of motion, bars of bytes."""
 
 from __future__ import annotations
 

@@ -1,16 +1,16 @@
-"""``mcz rename``: other names in an .mcz."""
+"""``mcz rename``: rename clips, attachments and aliases."""
 
 from __future__ import annotations
 
 import click
 
-from mcz.cli.arranged import conclude, output_option
+from mcz.cli.archive_summary import print_clip_results
 from mcz.cli.common import Exit, Failure, about
-from mcz.cli.options import force_option, json_option
+from mcz.cli.options import force_option, json_option, output_option
 from mcz.cli.progress import Progress
 
 
-@click.command(short_help="Other names for clips of an .mcz.")
+@click.command(short_help="Rename clips of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("names", metavar="OLD NEW...", nargs=-1, required=True)
 @output_option
@@ -33,4 +33,4 @@ def command(
         raise Failure("one old name is given twice", Exit.USAGE)
     with about(file), Progress() as progress:
         report = mcz.rename_clips(file, pairs, output=output, force=force, progress=progress)
-    return conclude(report, output or file, as_json, told=("renamed",))
+    return print_clip_results(report, output or file, as_json, listed=("renamed",))

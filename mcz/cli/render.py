@@ -21,7 +21,7 @@ from mcz.cli.common import (
     say,
 )
 from mcz.cli.hints import in_options
-from mcz.cli.moving import cut_of, moving_of, moving_options
+from mcz.cli.motion_input import cut_of, moving_of, moving_options
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in

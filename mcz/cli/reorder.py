@@ -1,16 +1,16 @@
-"""``mcz reorder``: the clips of an .mcz in another order."""
+"""``mcz reorder``: reorder the clips of an .mcz."""
 
 from __future__ import annotations
 
 import click
 
-from mcz.cli.arranged import conclude, output_option
+from mcz.cli.archive_summary import print_clip_results
 from mcz.cli.common import Exit, Failure, about
-from mcz.cli.options import force_option, json_option
+from mcz.cli.options import force_option, json_option, output_option
 from mcz.cli.progress import Progress
 
 
-@click.command(short_help="The clips of an .mcz in another order.")
+@click.command(short_help="Reorder the clips of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @click.option(
@@ -41,4 +41,4 @@ def command(
         report = mcz.reorder_clips(
             file, names, by=by, output=output, force=force, progress=progress
         )
-    return conclude(report, output or file, as_json, told=())
+    return print_clip_results(report, output or file, as_json, listed=())

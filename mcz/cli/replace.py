@@ -1,4 +1,4 @@
-"""``mcz replace``: other values for one joint of an .mcz, nothing else coded anew."""
+"""``mcz replace``: replace the values of one joint without re-encoding the others."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import cell_text
 from mcz.cli.common import (
     Exit,
     Failure,
@@ -28,12 +27,13 @@ from mcz.cli.common import (
 from mcz.cli.options import copies_option, force_option, json_option
 from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
+from mcz.text_format import cell_text
 
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
 
 
-@click.command(short_help="Other values for one joint of an .mcz.")
+@click.command(short_help="Replace the values of one joint.")
 @click.argument("file", metavar="IN.mcz", type=click.Path(readable=False))
 @click.argument("output", metavar="[OUT.mcz]", required=False, type=click.Path(readable=False))
 @click.option("--joint", metavar="J", required=True, help="The joint, by name or index.")

@@ -9,10 +9,10 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import cell_text
 from mcz.cli.common import literal
 from mcz.errors import OptionError, SourceError
 from mcz.motion import Skeleton
+from mcz.text_format import cell_text
 from mcz.types import JsonObject
 
 MOST_LINE = 2**24  # bytes of a line
@@ -110,7 +110,7 @@ class Rows:
 
 
 def _are_coordinates(names: Sequence[str]) -> bool:
-    """Whether these are names of coordinates; a joint may be called like a column of ours."""
+    """Return whether the names are coordinates; a joint may be named like one of our columns."""
     return bool(names) and all(name.rpartition(".")[2] in COORDINATES for name in names)
 
 

@@ -1,4 +1,4 @@
-"""What ``mcz info`` prints of a source file: the lines, as people read them."""
+"""Text output of ``mcz info`` about a source file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mcz.cli.common import plural
 from mcz.cli.previews import preview_lines
-from mcz.cli.recording import array_lines, recording_lines
+from mcz.cli.recording_lines import array_lines, recording_lines
 from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 from mcz.types import JsonObject
 

@@ -1,16 +1,16 @@
-"""``mcz split``: the clips of an .mcz spread over several."""
+"""``mcz split``: split an .mcz into several."""
 
 from __future__ import annotations
 
 import click
 
-from mcz.cli.arranged import conclude
+from mcz.cli.archive_summary import print_clip_results
 from mcz.cli.common import Exit, about, existing
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 
 
-@click.command(short_help="The clips of an .mcz spread over several.")
+@click.command(short_help="Split an .mcz into several by a key.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @click.option(
@@ -37,4 +37,4 @@ def command(file: str, folder: str, by: str, rest: str | None, force: bool, as_j
     existing(file)
     with about(file), Progress() as progress:
         report = mcz.split(file, folder, by=by, rest=rest, force=force, progress=progress)
-    return conclude(report, folder, as_json, told=("written",))
+    return print_clip_results(report, folder, as_json, listed=("written",))

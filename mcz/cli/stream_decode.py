@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 import numpy as np
 
-from mcz.brief import spreadsheet_cell
 from mcz.cli.common import (
     Exit,
     Failure,
@@ -26,11 +25,12 @@ from mcz.cli.common import (
     say,
     text_output,
 )
+from mcz.cli.encode_stdin import NAME, live_input
 from mcz.cli.hints import OPTION_HINTS
 from mcz.cli.options import rate_option, token_option
-from mcz.cli.piped import NAME, live_input
 from mcz.cli.rows import NUMBER, STATE
 from mcz.errors import TruncatedError
+from mcz.text_format import spreadsheet_cell
 
 TIMEOUT = 30.0  # seconds; ``mcz stream encode --listen`` sends a heartbeat every 5
 

@@ -19,6 +19,7 @@ from mcz.cli.common import (
     existing,
     say,
 )
+from mcz.cli.encode_stdin import NAME, aborting, live_input, live_output, rate_warning, report_live
 from mcz.cli.options import (
     force_option,
     param_option,
@@ -27,7 +28,6 @@ from mcz.cli.options import (
     unit_option,
     up_option,
 )
-from mcz.cli.piped import NAME, aborting, live_input, live_output, rate_warning, report_live
 from mcz.cli.rows import Rows, skeleton_in
 
 if TYPE_CHECKING:

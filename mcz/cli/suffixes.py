@@ -33,7 +33,7 @@ def suffix_of(output: str | None) -> str:
 
 
 def is_folder(output: str) -> bool:
-    """Whether an output is, or is to be, a folder."""
+    """Return whether an output is a folder or ends in a path separator."""
     return output[-1:] in (os.sep, os.altsep) or Path(output).is_dir()
 
 
@@ -93,7 +93,7 @@ def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
 
 def _unknown(output: str, suffix: str, text: str, own: tuple[str, ...]) -> Failure:
     """The refusal of a suffix, with the nearest that would do."""
-    from mcz.brief import nearest
+    from mcz.text_format import nearest
 
     known = list(dict.fromkeys((*filter(None, own), *(f".{name}" for name in TARGETS))))
     near = nearest(suffix, known).replace("'", "")

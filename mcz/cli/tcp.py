@@ -14,7 +14,7 @@ from time import monotonic, sleep
 from typing import BinaryIO
 
 from mcz.cli.common import Exit, Failure, say
-from mcz.cli.piped import Awaited
+from mcz.cli.encode_stdin import Awaited
 
 MOST_WAITING = 4 * 2**20  # bytes that a client may be behind
 LINGER = 10.0  # seconds that clients have for the rest, once all is coded
@@ -43,7 +43,7 @@ def _is_name(host: str) -> bool:
 def connected(
     text: str, token: str | None = None, timeout: float | None = None
 ) -> Iterator[BinaryIO]:
-    """What comes from ``HOST:PORT``, as a binary stream; ``token`` is what the sender may ask for.
+    """Connect to ``HOST:PORT`` and yield its binary stream; ``token`` is sent first if given.
 
     The stream ends after ``timeout`` seconds of silence. Raises Failure where nothing comes at all.
     """
@@ -71,7 +71,7 @@ def line_of(token: str) -> bytes:
 
 
 def is_here(host: str) -> bool:
-    """Whether only this machine reaches an address that is listened on."""
+    """Return whether a listening address is reachable from this machine only."""
     from ipaddress import ip_address
 
     return ip_address(host.partition("%")[0]).is_loopback
@@ -109,7 +109,7 @@ class Listener:
 
     @property
     def is_open_to_others(self) -> bool:
-        """Whether other machines may reach the port."""
+        """Return whether other machines can reach the port."""
         return not is_here(str(self._server.getsockname()[0]))
 
     def wait_for(self, n_clients: int) -> None:
@@ -130,7 +130,7 @@ class Listener:
         return len(data)
 
     def beat(self, write: Callable[[], None]) -> None:
-        """Let ``write`` write a heartbeat."""
+        """Call ``write`` and send its bytes as a heartbeat."""
         self._is_beat = True
         try:
             write()

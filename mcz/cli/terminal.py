@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 import click
 
-from mcz.brief import ODD
-from mcz.brief import printable as printable
 from mcz.errors import AccessError, OptionError
+from mcz.text_format import ODD
+from mcz.text_format import printable as printable
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -56,7 +56,7 @@ STATUS = StatusLine()
 
 
 def columns_of(letter: str) -> int:
-    """How many columns of a terminal a printable letter takes."""
+    """The terminal columns of a printable letter."""
     if unicodedata.combining(letter):
         return 0
     return 2 if unicodedata.east_asian_width(letter) in "WF" else 1
@@ -70,7 +70,7 @@ def echo(*lines: str) -> None:
 
 
 def can_show(letters: str) -> bool:
-    """Whether the encoding of standard output has these letters."""
+    """Return whether standard output can encode these letters."""
     try:
         letters.encode(getattr(sys.stdout, "encoding", None) or "ascii")
     except (UnicodeError, LookupError):
@@ -79,7 +79,7 @@ def can_show(letters: str) -> bool:
 
 
 def is_terminal() -> bool:
-    """Whether standard output is a terminal."""
+    """Return whether standard output is a terminal."""
     return sys.stdout is not None and sys.stdout.isatty()
 
 

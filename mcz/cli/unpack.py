@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import click
 
+from mcz.cli.archive_summary import print_file_results
 from mcz.cli.common import Exit, about, existing
-from mcz.cli.damage import hinted
+from mcz.cli.damage_hint import hinted
 from mcz.cli.options import (
     clips_option,
     decoded_option,
@@ -16,7 +17,6 @@ from mcz.cli.options import (
     threads_option,
     where_option,
 )
-from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
 
@@ -74,4 +74,4 @@ def command(
             max_decoded=max_decoded,
             progress=progress,
         )
-    return conclude(report, folder, as_json)
+    return print_file_results(report, folder, as_json)

@@ -20,7 +20,6 @@ from mcz.cli.common import (
     print_json,
     say,
 )
-from mcz.cli.filed import Filed
 from mcz.cli.hints import OPTION_HINTS, in_options
 from mcz.cli.options import (
     decoded_option,
@@ -31,6 +30,7 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.progress import Progress
+from mcz.cli.verify_report import VerifyReport
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
 from mcz.types import JsonObject
 
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     "--report",
     metavar="REPORT",
     type=click.Path(readable=False),
-    help="Also write a report to be filed: REPORT.txt or REPORT.json.",
+    help="Also write a report file: REPORT.txt or REPORT.json.",
 )
 @click.option(
     "--date", metavar="DATE", help="The date of the report. Default: now; 'none' leaves it out."
@@ -88,39 +88,43 @@ def command(
     if Path(file).is_dir() and (where is not None or source is not None):
         raise Failure("--where and --source are of one file, not of a bag", Exit.USAGE)
     counts = ""
-    filed = None if report is None else Filed(report, date, force, inputs=(file,))
+    report_file = None if report is None else VerifyReport(report, date, force, inputs=(file,))
     if Path(file).is_dir():
-        return _bag(file, quick, max_decoded, filed, as_json)
+        return _bag(file, quick, max_decoded, report_file, as_json)
     if quick:
-        rows, counts = _quickly(file, filed)
+        rows, counts = _verify_quickly(file, report_file)
     else:
-        rows = _fully(file, source, where, max_decoded, filed)
+        rows = _verify_fully(file, source, where, max_decoded, report_file)
     failed = [row for row in rows if row["problems"]]
-    if filed is not None:
-        filed.write(rows, quick=quick, where=where)
+    if report_file is not None:
+        report_file.write(rows, quick=quick, where=where)
     if as_json:
         print_json({"verified": not failed, "mode": "quick" if quick else "full", "parts": rows})
     elif not failed:
-        echo(_praise(file, rows, counts))
-    _say_problems(file, failed)
+        echo(_success_line(file, rows, counts))
+    _print_problems(file, failed)
     return Exit.NOT_VERIFIED if failed else Exit.FINE
 
 
-def _praise(file: str, rows: list[JsonObject], counts: str) -> str:
+def _success_line(file: str, rows: list[JsonObject], counts: str) -> str:
     """One line about a sound file; ``counts``: of a quick check."""
     if counts:
         return f"{file}: checksums right, {counts}; values and sources were not checked"
     return f"{file}: verified, {', '.join(_counts(rows))}"
 
 
-def _say_problems(file: str, failed: list[JsonObject]) -> None:
+def _print_problems(file: str, failed: list[JsonObject]) -> None:
     for row in failed:
         for problem in row["problems"]:
             say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
 
 
 def _bag(
-    folder: str, quick: bool, max_decoded: int | None, filed: Filed | None, as_json: bool
+    folder: str,
+    quick: bool,
+    max_decoded: int | None,
+    report_file: VerifyReport | None,
+    as_json: bool,
 ) -> Exit:
     """Check a bag, and each archive in it."""
     from mcz.bags import check_bag, is_bag
@@ -136,21 +140,21 @@ def _bag(
         path, counts = str(Path(folder) / name), ""
         try:
             if quick:
-                rows, counts = _quickly(path, filed)
+                rows, counts = _verify_quickly(path, report_file)
             else:
-                rows = _fully(path, None, None, max_decoded, filed)
-            if filed is not None:
-                documents.append(filed.document(rows, quick=quick, where=None))
+                rows = _verify_fully(path, None, None, max_decoded, report_file)
+            if report_file is not None:
+                documents.append(report_file.document(rows, quick=quick, where=None))
         except MczError as error:  # the others are checked all the same
             rows = [_row("file", "", [error.describe(OPTION_HINTS, with_path=False)])]
         failed = [row for row in rows if row["problems"]]
         files.append({"file": name, "verified": not failed, "parts": rows})
         fine = fine and not failed
         if not failed and not as_json:
-            echo(_praise(path, rows, counts))
-        _say_problems(path, failed)
-    if filed is not None:
-        filed.write_bag(found, fine, files, documents)
+            echo(_success_line(path, rows, counts))
+        _print_problems(path, failed)
+    if report_file is not None:
+        report_file.write_bag(found, fine, files, documents)
     if as_json:
         mode = "quick" if quick else "full"
         document = {"verified": fine, "mode": mode, "problems": found.problems, "files": files}
@@ -163,41 +167,45 @@ def _bag(
     return Exit.FINE if fine else Exit.NOT_VERIFIED
 
 
-def _fully(
-    file: str, source: str | None, where: str | None, max_decoded: int | None, filed: Filed | None
+def _verify_fully(
+    file: str,
+    source: str | None,
+    where: str | None,
+    max_decoded: int | None,
+    report_file: VerifyReport | None,
 ) -> list[JsonObject]:
-    """What is said of each part of the file."""
+    """The verification row of each part of the file."""
     try:
         with opened(file, max_decoded=max_decoded) as held, Progress() as progress:
             rows = list(_parts(held, where, progress))
             if source is not None:
                 rows.append(_compare(held, source))
-            if filed is not None:
-                filed.take(held)
+            if report_file is not None:
+                report_file.take(held)
     except MczError as error:
         if not is_unsound(error):
             raise
-        if filed is not None:
-            filed.take_bytes(file)
+        if report_file is not None:
+            report_file.take_bytes(file)
         rows = [_row("structure", "", [error.describe(OPTION_HINTS, with_path=False)])]
     return rows
 
 
-def _quickly(file: str, filed: Filed | None) -> tuple[list[JsonObject], str]:
+def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[JsonObject], str]:
     """One row, that of the checksums; and what was seen."""
     from mcz.reading.faults import quick_check
 
     target = given(file)
     with about(file), Progress() as progress:
         seen, problems = quick_check(target, lambda done, total: progress(done, total, file))
-    if filed is not None:
+    if report_file is not None:
         try:
             with opened(file) as held:
-                filed.take(held)
+                report_file.take(held)
         except MczError as error:
             if not is_unsound(error):
                 raise
-            filed.take_bytes(file)
+            report_file.take_bytes(file)
     counts = f"{seen.n_chunks:,} chunks"
     if seen.n_packets:
         counts += f", {seen.n_packets:,} packets"
@@ -209,7 +217,7 @@ def _quickly(file: str, filed: Filed | None) -> tuple[list[JsonObject], str]:
 
 
 def is_unsound(error: MczError) -> bool:
-    """Whether the file is no sound MCZ file, rather than one that cannot be read, or not here."""
+    """Return whether the error means a malformed file, not an unsupported one."""
     return isinstance(error, FormatError) and not isinstance(error, UnsupportedError | LimitError)
 
 
@@ -258,7 +266,7 @@ def _compare(held: File, source: str) -> JsonObject:
 
 
 def _find(held: File, source: str) -> Callable[[], bytes]:
-    """What restores the file that is called like ``source``."""
+    """The function that restores the stored file with the name of ``source``."""
     name = Path(source).name
     for clip in held.clips.values():
         if clip.source is not None and PurePosixPath(clip.source.path).name == name:

@@ -44,7 +44,7 @@ from mcz.types import Settings
 
 if TYPE_CHECKING:
     from mcz.viewing.embedding import PageWritten
-    from mcz.viewing.shelf import Shelf
+    from mcz.viewing.file_registry import Shelf
 
 SAID = ("skeleton", "rate", "unit", "up", "arrays", "model")  # what a file may not say itself
 OF_PAGE = ("clips", "where", "codec", "effort", "params", "max_decoded", "most", "force")
@@ -118,7 +118,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
         output = file_in(output, files[0], ".rrd" if options["rerun"] else ".html")
     in_rerun = is_rerun(options.pop("rerun"), output)
     _check_use(output, options, in_rerun)
-    from mcz.viewing.shelf import Shelf, put
+    from mcz.viewing.file_registry import Shelf, put
 
     def told(line: str) -> None:
         if as_json:

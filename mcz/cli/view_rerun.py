@@ -18,7 +18,7 @@ from mcz.types import JsonObject, Settings
 if TYPE_CHECKING:
     from mcz.motion import Motion
     from mcz.reading.clip import Clip
-    from mcz.viewing.shelf import Shelf
+    from mcz.viewing.file_registry import Shelf
 
 SUFFIX = ".rrd"
 FACTS = ("rate", "unit", "up")
@@ -27,7 +27,7 @@ SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def is_rerun(rerun: bool, output: str | None) -> bool:
-    """Whether rerun is wanted: by its name, or by the suffix of its files. Raises Failure."""
+    """Return whether ``--rerun`` or the output suffix selects rerun; raises Failure."""
     is_file = output is not None and output.lower().endswith(SUFFIX)
     if rerun and output is not None and not is_file:
         raise Failure(f"with --rerun a file is called OUT{SUFFIX}", Exit.USAGE, path=output)
@@ -99,7 +99,7 @@ def _write(shelf: Shelf, output: str, options: Settings) -> tuple[list[JsonObjec
 
 
 def _log(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[JsonObject], int]:
-    """What was logged, and how many clips could not be."""
+    """Log the clips; return their rows and the number of failures."""
     from mcz.adapters.rerun import to_rerun, view_of
     from mcz.errors import MczError
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 from importlib import import_module
 from typing import NamedTuple
 
-from mcz.brief import among
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError, UnsupportedError
+from mcz.text_format import among
 
 
 class CodecEntry(NamedTuple):

@@ -9,8 +9,8 @@ import re
 from collections.abc import Callable
 from datetime import date, datetime
 
-from mcz.brief import nearest
 from mcz.errors import OptionError
+from mcz.text_format import nearest
 
 PRIVATE = "x-"
 SPDX = re.compile(r"\(*[A-Za-z0-9.+:-]+\)*( (AND|OR|WITH) \(*[A-Za-z0-9.+:-]+\)*)*")

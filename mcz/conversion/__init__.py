@@ -10,8 +10,8 @@ from mcz.conversion.acclaim import to_amc
 from mcz.conversion.counted_times import COUNTING, with_counted_times
 from mcz.conversion.hierarchy import to_bvh
 from mcz.conversion.losses import held, left_out
+from mcz.conversion.marker_fit import Fit, from_positions
 from mcz.conversion.markers import to_c3d
-from mcz.conversion.solved import Fit, from_positions
 from mcz.conversion.tables import needs_rate, to_storage, to_trc
 from mcz.errors import OptionError
 from mcz.formats import FORMATS

@@ -6,7 +6,7 @@ of a part of a clip, ``caches`` keeps them, ``Dataset`` counts, cuts, shuffles a
 
 from __future__ import annotations
 
-from mcz.datasets.collecting import dataset
+from mcz.datasets.member_list import dataset
 from mcz.datasets.windows import Dataset, Window
 
 __all__ = ["Dataset", "Window", "dataset"]

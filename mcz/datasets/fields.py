@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
-from mcz.brief import nearest
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.frames import FramePoses
@@ -19,6 +18,7 @@ from mcz.poses.derivatives import accelerations_of, velocities_of
 from mcz.poses.motion_like import joint_numbers, scale_to
 from mcz.poses.trajectories import chosen_points, point_names
 from mcz.skeleton import Joints, joint_columns
+from mcz.text_format import nearest
 from mcz.types import Reals
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import counted
 from mcz.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
 from mcz.datasets.fields import FIELDS, Subject, names_of
 from mcz.datasets.members import Member
@@ -23,6 +22,7 @@ from mcz.errors import OptionError, OutOfRangeError
 from mcz.indexing import row_numbers
 from mcz.poses.conversions import continuous_signs
 from mcz.reading.file import File
+from mcz.text_format import counted
 from mcz.types import JsonObject, Reals
 
 RUNS_SHARE = 4  # a quarter of the cache is for frames as they were decoded

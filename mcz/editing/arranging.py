@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
-from mcz.brief import counted, nearest, shown
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.editing.carrying import SAME, Change
@@ -42,6 +41,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.clips import clips_meant, listed
 from mcz.reading.fields import Where, getter_of
 from mcz.reading.file import File, open
+from mcz.text_format import counted, nearest, shown
 from mcz.types import Progress, Target
 from mcz.writing.draft import check_name
 

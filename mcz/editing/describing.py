@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
 
-from mcz.brief import shown
 from mcz.container.metadata import Record, applied
 from mcz.container.metadata_keys import SPELLINGS, check_said
 from mcz.container.writer import Writer
@@ -23,6 +22,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.rate_notes import states_rate
+from mcz.text_format import shown
 from mcz.types import Progress, Target
 
 Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more

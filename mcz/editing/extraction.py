@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import BinaryIO
 
-from mcz.brief import brief
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
@@ -50,6 +49,7 @@ from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_info import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
+from mcz.text_format import brief
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Amend, check_values

@@ -14,7 +14,6 @@ from functools import partial
 from itertools import count
 from pathlib import PurePosixPath
 
-from mcz.brief import counted, shown
 from mcz.container import payloads
 from mcz.container.writer import Writer
 from mcz.editing.carrying import UNPROTECTED, Change
@@ -38,6 +37,7 @@ from mcz.errors import OptionError
 from mcz.reading.clips import listed
 from mcz.reading.file import File, open
 from mcz.schema import parse
+from mcz.text_format import counted, shown
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
 from mcz.writing.draft import Draft

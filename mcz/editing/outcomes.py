@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from mcz.brief import brief
 from mcz.errors import ExistsError, MczError, remark_of
+from mcz.text_format import brief
 
 
 @dataclass(frozen=True, slots=True)

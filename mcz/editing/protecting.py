@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from mcz.brief import brief
 from mcz.container.chunks import CRC, FOOT, Chunk, ChunkFlag, ChunkType, build_foot, build_header
 from mcz.container.directory import Directory
 from mcz.container.index import build_index
@@ -26,6 +25,7 @@ from mcz.reading.faults import recovery_chunks
 from mcz.recovery.making import Step, made
 from mcz.recovery.packets import Key, read_packet
 from mcz.recovery.shape import Shape, shape_for
+from mcz.text_format import brief
 
 DEFAULT = 0.05  # redundancy
 TRIES = 16  # to find the size of an index that names the chunk whose size depends on it

@@ -14,7 +14,6 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.brief import brief
 from mcz.container.source import ByteSource
 from mcz.editing.protecting import chunk_bytes
 from mcz.errors import FormatError
@@ -24,6 +23,7 @@ from mcz.recovery.code import LANE, encoded, recovered
 from mcz.recovery.making import Step, computed, made
 from mcz.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
 from mcz.recovery.shape import HASH, Shape
+from mcz.text_format import brief
 from mcz.types import Progress, Target
 
 MOST_SHIFTS = 16

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mcz.brief import brief
 from mcz.container import note_records, payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.segments import GROUP_NOTES, MASKS, SegmentHeader
@@ -29,6 +28,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.stored_clip import with_indices
 from mcz.schema import parse
+from mcz.text_format import brief
 from mcz.types import Progress, Target, Values
 from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import check_values

@@ -9,11 +9,11 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from mcz.brief import among, cell_text
 from mcz.container.metadata_keys import INTERPRETED, KEYS, PRIVATE, SPELLINGS
 from mcz.errors import OptionError, reason_of
 from mcz.reading.clips import listed, names_of
 from mcz.reading.file import File
+from mcz.text_format import among, cell_text
 
 NAMES = ("clip", "name", "path", "file")  # columns that name the clip, the first that there is
 DELIMITERS = ",;\t"

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import brief, counted
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics.chain import Floats
@@ -21,6 +20,7 @@ from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import first_points, positions_of
 from mcz.motion import Motion, Skeleton
 from mcz.skeleton import column_of, signs_of
+from mcz.text_format import brief, counted
 
 Flags = NDArray[np.bool_]
 

@@ -1,7 +1,7 @@
 """Positions as a domain: a motion as the positions of its points, markers that name their skeleton.
 
 SPEC.md, "Kinematics", has the points, and "Positions" there what a clip of them says. The way back
-is in ``mcz/conversion/solved.py``.
+is in ``mcz/conversion/marker_fit.py``.
 """
 
 from __future__ import annotations

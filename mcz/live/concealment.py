@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import brief
 from mcz.errors import LostFrameError
+from mcz.text_format import brief
 from mcz.types import Values
 
 Floats = NDArray[np.float64]

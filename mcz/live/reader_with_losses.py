@@ -12,7 +12,6 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import brief
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import parse_head
@@ -34,6 +33,7 @@ from mcz.errors import (
 from mcz.live.clip_state import ClipState, LiveClip, Shared, begin, row_of
 from mcz.live.concealment import Concealer, LiveFrame, Lost
 from mcz.schema import MAX_COUNT, parse
+from mcz.text_format import brief
 
 MOST_MADE_UP = 65_536  # frames in place of lost ones, and one more for every byte that came
 MOST_REMARKS = 20

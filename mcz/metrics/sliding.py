@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcz.brief import brief
 from mcz.kinematics.contacts import Contact, Contacts, FootTracks
 from mcz.metrics.sums import Number, Values, mean_of
+from mcz.text_format import brief
 
 MM = 10.0  # of a cm
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz import brief
+from mcz import text_format
 from mcz.checks import DATA_ITEMS, array_of, check_fields
 from mcz.errors import MotionError
 
@@ -23,7 +23,7 @@ class Exceptions:
     channels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     texts: tuple[bytes, ...] = ()
 
-    __repr__ = brief.exceptions_text
+    __repr__ = text_format.exceptions_text
 
     def __post_init__(self) -> None:
         check_fields(self, EXCEPTIONS)

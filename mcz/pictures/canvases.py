@@ -8,10 +8,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import printable
 from mcz.kinematics.chain import Floats
 from mcz.pictures.libraries import library, new_figure, quietly
 from mcz.pictures.themes import Theme
+from mcz.text_format import printable
 
 Pixels = NDArray[np.uint8]
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
-from mcz.brief import printable
+from mcz.text_format import printable
 
 STYLE = """
 :root { color-scheme: light dark; --ground: #fbfbf9; --ink: #1f2328; --quiet: #5b626a;

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mcz.brief import printable
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.pictures.chart_pages import ChartPage, Sheet, data_uri
 from mcz.pictures.libraries import new_figure, quietly
 from mcz.pictures.themes import THEMES, Theme, theme_of
+from mcz.text_format import printable
 from mcz.types import Settings
 from mcz.writing.atomic import replacing
 

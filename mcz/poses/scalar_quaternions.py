@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import shown
 from mcz.errors import OptionError
 from mcz.motion import Channel, Skeleton
+from mcz.text_format import shown
 
 Floats = NDArray[np.float64]
 Quaternion = tuple[int, ...]  # four columns

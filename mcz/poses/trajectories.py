@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from mcz.brief import among, brief
 from mcz.clock import known_timeline
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import first_points
@@ -27,6 +26,7 @@ from mcz.poses.motion_like import (
     values_of,
 )
 from mcz.skeleton import Joints, column_of, joint_list, signs_of
+from mcz.text_format import among, brief
 from mcz.types import Reals
 
 

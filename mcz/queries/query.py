@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from mcz.brief import among, nearest, shown
 from mcz.errors import OptionError
 from mcz.queries.evaluation import truth_of
 from mcz.queries.parser import parse
 from mcz.queries.tokens import fault, tokens
 from mcz.queries.tree import names_in, printed
 from mcz.queries.values import Lookup
+from mcz.text_format import among, nearest, shown
 
 
 class Query:

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mcz.brief import shown
 from mcz.errors import OptionError
 from mcz.queries.values import LONGEST_NUMBER, NUMBER, as_number
+from mcz.text_format import shown
 
 LONGEST = 4096  # characters of a query
 AROUND = 24  # characters that an error shows on each side

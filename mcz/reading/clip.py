@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from mcz.brief import shown
 from mcz.clock import (
     TIMES,
     Column,
@@ -28,12 +27,12 @@ from mcz.clock import (
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
-from mcz.displays import html_of
 from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.formats import FORMATS
 from mcz.hints import Hint
 from mcz.kinematics import point_names
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
+from mcz.notebook import html_of
 from mcz.reading.decimation import decimated, decimated_rows
 from mcz.reading.signal_info import SignalInfo, groups_of
 from mcz.reading.signal_reader import SignalReader
@@ -41,6 +40,7 @@ from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton, s
 from mcz.reading.stored_clip import StoredClip
 from mcz.reading.views import ClipValues, FrameValues, Masked, Preview, preview
 from mcz.skeleton import Joints, joint_list
+from mcz.text_format import shown
 from mcz.types import Values
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from contextlib import suppress
 from pathlib import PurePosixPath
 from weakref import WeakValueDictionary
 
-from mcz import brief
-from mcz.brief import nearest
+from mcz import text_format
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.errors import FormatError, OptionError, UnknownNameError
 from mcz.reading.clip import Clip
+from mcz.text_format import nearest
 
 FEW = 8  # names that a message lists
 Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
@@ -109,7 +109,7 @@ class Clips(Mapping[str, Clip]):
         self._alive: WeakValueDictionary[str, Clip] = WeakValueDictionary()
         self._last: deque[Clip] = deque(maxlen=KEPT)
 
-    __repr__ = brief.clips_text
+    __repr__ = text_format.clips_text
 
     def __getitem__(self, name: str) -> Clip:
         """The clip that ``name`` means; raises UnknownNameError, which suggests a name."""

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from mcz.brief import brief
 from mcz.container.checksums import Checked, check_checksums
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.reader import Container
@@ -28,6 +27,7 @@ from mcz.reading.sharing import shared_out
 from mcz.reading.signal_info import read_segments
 from mcz.recovery.making import made
 from mcz.recovery.packets import read_packet
+from mcz.text_format import brief
 from mcz.types import Target
 
 HEADINGS = tuple(

@@ -12,7 +12,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from mcz.brief import counted, shown
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, ChunkType
 from mcz.container.directory import AttachmentRow
@@ -37,6 +36,7 @@ from mcz.reading.fields import Where, taken
 from mcz.reading.lost_skeletons import restore_skeletons
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
+from mcz.text_format import counted, shown
 from mcz.threads import checked
 from mcz.types import JsonObject, Params, Target
 

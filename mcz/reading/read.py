@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from mcz.brief import first_of
 from mcz.errors import OptionError, SkeletonWarning, SourceError
 from mcz.formats import Format, format_of
 from mcz.formats.bones import Match, match_bones
@@ -23,6 +22,7 @@ from mcz.hints import Hint
 from mcz.motion import Motion, Skeleton
 from mcz.reading.file import is_mcz, open
 from mcz.reading.source_files import SourceOptions, load, read_skeleton, read_source
+from mcz.text_format import first_of
 from mcz.units import in_unit
 
 NONE = "none"  # given in place of a skeleton file: do without

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
-from mcz.brief import first_of
 from mcz.container import payloads
 from mcz.container.chunks import CRC, FOOT, FRAMING, HEADER, SIGNATURE, Chunk, ChunkType
 from mcz.container.reader import Container
@@ -21,6 +20,7 @@ from mcz.reading.fields import packet_framing
 from mcz.reading.file import File
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build
+from mcz.text_format import first_of
 
 MOST_NAMED = 4  # joints of a group whose names are told
 

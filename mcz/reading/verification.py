@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 
-from mcz.brief import counted, printable
 from mcz.container import payloads
 from mcz.container.source import ByteSource
 from mcz.errors import MczError
@@ -13,6 +12,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import Attachment, File
 from mcz.reading.source_info import source_facts
 from mcz.schema import parse
+from mcz.text_format import counted, printable
 from mcz.types import JsonObject, Params
 
 BLOCK = 1024 * 1024  # bytes that are hashed at a time

@@ -21,7 +21,7 @@ from mcz.motion import (
     Signal,
     Skeleton,
 )
-from mcz.retargeting.edited import computed
+from mcz.retargeting.channels import computed
 from mcz.retargeting.turns import back, finite, held, local_turns, relative, set_local_turns
 
 STRETCHING = ("sx", "sy", "sz", "length")

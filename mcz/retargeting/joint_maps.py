@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from mcz.brief import nearest
 from mcz.errors import OptionError
 from mcz.motion import Skeleton
 from mcz.retargeting.joint_names import SKELETONS, SMPL_BODY
+from mcz.text_format import nearest
 
 LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")  # parts of a side
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from mcz.brief import among
 from mcz.errors import OptionError
 from mcz.motion import Skeleton
-from mcz.retargeting.edited import turns
+from mcz.retargeting.channels import turns
+from mcz.text_format import among
 
 
 def matched(

@@ -25,7 +25,7 @@ from mcz.motion import (
     Vector,
     joint_columns,
 )
-from mcz.retargeting.edited import check_channels, edited
+from mcz.retargeting.channels import check_channels, edited
 from mcz.retargeting.sides import counterparts
 
 AXES = ("x", "y", "z")

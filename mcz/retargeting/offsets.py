@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mcz.errors import OptionError
 from mcz.motion import Motion, Skeleton
-from mcz.retargeting.edited import edited
+from mcz.retargeting.channels import edited
 
 Given = TypeVar("Given", Motion, Skeleton)
 

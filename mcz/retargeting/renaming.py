@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeVar
 
-from mcz.brief import among
 from mcz.errors import OptionError
 from mcz.motion import Motion, Skeleton
-from mcz.retargeting.edited import edited
+from mcz.retargeting.channels import edited
+from mcz.text_format import among
 
 Named = TypeVar("Named", Motion, Skeleton)
 

@@ -8,13 +8,13 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from mcz.brief import among
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.kinematics.chain import IDENTITY, Floats
 from mcz.kinematics.rest_pose import rest_positions
 from mcz.motion import Skeleton
 from mcz.retargeting.joint_maps import limbs_of
 from mcz.retargeting.matching import nearest_above
+from mcz.text_format import among
 
 SHORT = 1e-9  # of the longest bone: no direction
 UNLIKE = 10.0  # degrees between bones at rest: more than people differ

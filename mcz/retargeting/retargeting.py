@@ -18,7 +18,7 @@ from mcz.kinematics import origins_of, point_set
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, multiply_matrices
 from mcz.kinematics.targets import Targets
 from mcz.motion import Motion, Skeleton
-from mcz.retargeting.edited import check_channels, computed, edited
+from mcz.retargeting.channels import check_channels, computed, edited
 from mcz.retargeting.matching import matched, nearest_above
 from mcz.retargeting.rest_poses import rest_turns, usual_alike
 from mcz.retargeting.sizes import size_ratio

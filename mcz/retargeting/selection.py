@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from mcz.brief import among
 from mcz.errors import MotionError, OptionError
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton, joint_columns
 from mcz.retargeting.baking import baked
-from mcz.retargeting.edited import check_channels, edited
+from mcz.retargeting.channels import check_channels, edited
+from mcz.text_format import among
 
 SCALING = ("sx", "sy", "sz")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
-from mcz.brief import among
 from mcz.errors import OptionError
+from mcz.text_format import among
 
 # A whole word: "LeftUpLeg", "upperarm_left", "LEFT_HIP", but neither "Bright" nor "cleft".
 _WORD = re.compile(r"Left|Right|LEFT|RIGHT|(?<![A-Za-z])(?:left|right)")

@@ -12,7 +12,7 @@ from mcz.kinematics import reach
 from mcz.kinematics.chain import Floats, to_world
 from mcz.kinematics.rest_pose import rest_positions
 from mcz.motion import POSITION_KINDS, Skeleton
-from mcz.retargeting.edited import moves
+from mcz.retargeting.channels import moves
 from mcz.retargeting.matching import nearest_above
 from mcz.retargeting.turns import back
 

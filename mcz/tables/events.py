@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mcz.brief import printable, spreadsheet_cell
+from mcz.text_format import printable, spreadsheet_cell
 from mcz.types import Settings
 
 TEXTS = ("label", "context", "subject", "description")

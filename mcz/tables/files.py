@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import printable, spreadsheet_cell
 from mcz.clock import numbers_or_rows
 from mcz.errors import MotionError
 from mcz.motion import Channel, Joint, Motion, Skeleton
 from mcz.tables.arrays import pose_arrays
+from mcz.text_format import printable, spreadsheet_cell
 from mcz.types import Settings
 
 DECIMALS = 12  # of times in a CSV

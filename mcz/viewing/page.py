@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 
 from mcz.errors import AccessError, FormatError, reason_of
-from mcz.viewing.building import built
-from mcz.viewing.shelf import Say
+from mcz.viewing.file_registry import Say
+from mcz.viewing.page_build import built
 
 PACKAGED = Path(__file__).with_name("viewer.html")  # in a wheel that was built with it
 OTHER = "MCZ_VIEWER_PAGE"  # an environment variable: a page to be taken in place of ours

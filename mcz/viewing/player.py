@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mcz.brief import counted, shown
 from mcz.errors import MczError, reason_of
-from mcz.viewing.drawn import RATE, Drawn, Figure, Moving, drawn, figure, frames_read
+from mcz.text_format import counted, shown
+from mcz.viewing.player_data import RATE, Drawn, Figure, Moving, drawn, figure, frames_read
 
 MOST_BYTES = 300_000
 SPARE = 500  # bytes that numbers may have more than they had in the first try

@@ -13,12 +13,12 @@ from threading import BoundedSemaphore, Thread
 from typing import Any
 
 from mcz.errors import AccessError, OptionError, reason_of
+from mcz.viewing.file_registry import Shelf
 from mcz.viewing.handler import Handler
+from mcz.viewing.open_pages import Visitors
 from mcz.viewing.page import Page
-from mcz.viewing.shelf import Shelf
+from mcz.viewing.server_tasks import Work, lossy_codecs
 from mcz.viewing.site import Site
-from mcz.viewing.visitors import Visitors
-from mcz.viewing.work import Work, lossy_codecs
 
 GRACE = 5.0  # seconds that a page has to come back, as when it is loaded anew
 MOST_CONNECTIONS = 128

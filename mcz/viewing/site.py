@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mcz.viewing.file_registry import Shelf
+from mcz.viewing.open_pages import Visitors
 from mcz.viewing.page import Page
-from mcz.viewing.shelf import Shelf
-from mcz.viewing.visitors import Visitors
-from mcz.viewing.work import Work
+from mcz.viewing.server_tasks import Work
 
 
 @dataclass(slots=True)

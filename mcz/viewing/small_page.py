@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 from mcz.errors import AccessError, MczError
 from mcz.reading.file import open as mcz_open
+from mcz.viewing.file_registry import Shelf, Shelved
 from mcz.viewing.page import OTHER, Page, page
 from mcz.viewing.player import player
-from mcz.viewing.shelf import Shelf, Shelved
 
 MOST_CLIPS = 12  # players on a page, of at most 300 kB each
 TEMPLATE = """<!doctype html>

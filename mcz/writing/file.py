@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from mcz.brief import brief
 from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, Directory
 from mcz.container.limits import profile_named
@@ -24,6 +23,7 @@ from mcz.motion import Motion
 from mcz.reading.source_files import SourceOptions
 from mcz.tables.files import table_of
 from mcz.tables.files import to_npz as npz_of
+from mcz.text_format import brief
 from mcz.threads import limited
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import refuse_inputs, replacing

@@ -15,8 +15,8 @@ import pytest
 
 import mcz
 from mcz import AccessError
-from mcz.viewing import building
-from mcz.viewing.building import built
+from mcz.viewing import page_build
+from mcz.viewing.page_build import built
 
 ROOT = Path(mcz.__file__).parents[1]
 PAGE = Path(__file__).with_name("page.html")
@@ -27,7 +27,7 @@ def checkout(tmp_path: Path) -> Path:
     """A source checkout without the page."""
     names = ("build.mjs", "package.json", "package-lock.json", "src/main.js", "../js/mcz.js")
     for name in names:
-        path = tmp_path / building.VIEWER / name
+        path = tmp_path / page_build.VIEWER / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("")
         changed(path, 100)
@@ -66,9 +66,9 @@ def test_it_is_built_once_and_when_sources_change(checkout: Path, programs: list
     assert len(said) == 2
     assert built(said.append, checkout) == page
     assert len(programs) == 2
-    viewer = checkout / building.VIEWER
+    viewer = checkout / page_build.VIEWER
     made = (page, viewer / "node_modules" / ".package-lock.json")
-    for name in ("tools/js/mcz.js", f"{building.VIEWER}/src/main.js"):
+    for name in ("tools/js/mcz.js", f"{page_build.VIEWER}/src/main.js"):
         for path in made:
             changed(path, 200)
         changed(checkout / name, 300)
@@ -88,7 +88,7 @@ def test_without_npm_the_command_is_said(
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(AccessError, match=r"\(cd tools/viewer && npm ci && npm run build\)"):
         built(lambda line: None, checkout)
-    page = checkout / building.VIEWER / "dist" / "viewer.html"
+    page = checkout / page_build.VIEWER / "dist" / "viewer.html"
     page.parent.mkdir()
     page.write_bytes(PAGE.read_bytes())
     changed(page, 50)

@@ -19,8 +19,8 @@ import pytest
 
 import mcz
 from mcz import AccessError, OptionError
-from mcz.viewing import browser, showing
-from mcz.viewing.visitors import Visitors
+from mcz.viewing import browser, view
+from mcz.viewing.open_pages import Visitors
 from tests.commands import Call
 
 
@@ -206,7 +206,7 @@ def test_view_serves_motions_clips_and_files(samples: Path, temporary: Path) -> 
                 assert served["walk"].codec == "mrdwt"
             assert get(shown.url, "files/2").startswith(b"\x89MCZ")
     shown.close()
-    assert not showing._OPEN
+    assert not view._OPEN
     assert not list(temporary.iterdir())
     with pytest.raises(OSError):
         get(shown.url, "api.json")
@@ -226,7 +226,7 @@ def test_a_clip_of_a_stream_is_served(samples: Path, tmp_path: Path) -> None:
 
 def test_view_opens_the_browser(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
-    monkeypatch.setattr(showing, "show", opened.append)
+    monkeypatch.setattr(view, "show", opened.append)
     with mcz.view(samples / "walk.bvh") as shown:
         assert opened == [shown.url]
 
@@ -256,7 +256,7 @@ def test_a_terminal_of_ipython_is_no_notebook(monkeypatch: pytest.MonkeyPatch) -
     for shell in (None, SimpleNamespace()):
         module = SimpleNamespace(get_ipython=lambda shell=shell: shell)
         monkeypatch.setitem(sys.modules, "IPython", module)  # type: ignore[arg-type]
-        assert not showing.in_notebook()
+        assert not view.in_notebook()
 
 
 def test_the_browser_is_that_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None:

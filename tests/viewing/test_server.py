@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 import mcz
 from mcz import AccessError, FormatError, OptionError
 from mcz.annexes import annex_bytes
-from mcz.viewing import shelf as shelf_module
+from mcz.viewing import file_registry as shelf_module
+from mcz.viewing.file_registry import Shelf, put
 from mcz.viewing.page import Page, page
 from mcz.viewing.requests import Refused, range_of
 from mcz.viewing.server import Server
-from mcz.viewing.shelf import Shelf, put
 from tests.motions import smooth
 from tests.viewing.asking import Answer, ask, ask_anywhere, convert, form, post, raw, serving
 

@@ -10,9 +10,9 @@ import pytest
 
 import mcz
 from mcz import AccessError
-from mcz.viewing import building, page
+from mcz.viewing import page, page_build
+from mcz.viewing.file_registry import Shelf, put
 from mcz.viewing.server import Server
-from mcz.viewing.shelf import Shelf, put
 from mcz.viewing.small_page import MOST_CLIPS, viewer_page
 from tests.viewing.asking import ask
 
@@ -20,10 +20,10 @@ from tests.viewing.asking import ask
 @pytest.fixture
 def without_npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A source checkout in which the page was never built, on a machine without npm."""
-    (tmp_path / building.VIEWER).mkdir(parents=True)
-    (tmp_path / building.VIEWER / "build.mjs").touch()
+    (tmp_path / page_build.VIEWER).mkdir(parents=True)
+    (tmp_path / page_build.VIEWER / "build.mjs").touch()
     monkeypatch.delenv(page.OTHER, raising=False)
-    monkeypatch.setattr(page, "built", lambda say: building.built(say, tmp_path))
+    monkeypatch.setattr(page, "built", lambda say: page_build.built(say, tmp_path))
     monkeypatch.setattr(shutil, "which", lambda name: None)
 
 

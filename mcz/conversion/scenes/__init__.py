@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mcz.brief import brief
 from mcz.conversion.scenes.gltf import glb
 from mcz.conversion.scenes.keys import keyed
 from mcz.conversion.scenes.nodes import Scene, scene_of
@@ -17,6 +16,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.motion import Motion
 from mcz.reading.source_files import SourceOptions
+from mcz.text_format import brief
 from mcz.version import VERSION
 
 KEY_ERROR_MM = 0.1

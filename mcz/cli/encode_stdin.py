@@ -171,7 +171,7 @@ def rate_warning(traffic: LiveTraffic) -> str:
 
 @contextmanager
 def live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _Late]:
-    """Where frames go at once, so that what was written before a crash stays."""
+    """Open an unbuffered output, which keeps all frames written before a crash."""
     if target in (None, "-"):
         yield binary_output()
         return
@@ -203,5 +203,5 @@ class _Late:
 
 
 def _is_special(path: Path) -> bool:
-    """Whether ``path`` is a device or a pipe, which is there to be written to."""
+    """Return whether ``path`` is a device or a pipe, which needs no ``--force``."""
     return path.exists() and not (path.is_file() or path.is_dir())

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import brief
 from mcz.conversion.hierarchy import PRINTED
 from mcz.errors import MotionError
 from mcz.kinematics import point_names, point_set, points_and_markers_of, positions, positions_of
@@ -16,6 +15,7 @@ from mcz.kinematics.inverse import solve_ik
 from mcz.kinematics.marker_motion import without_note
 from mcz.kinematics.targets import unsolved_channels
 from mcz.motion import Motion, Signal, Skeleton
+from mcz.text_format import brief
 
 FARTHEST = 2.0**100  # length units
 

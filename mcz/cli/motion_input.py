@@ -1,4 +1,4 @@
-"""The one motion of a file that a command draws, whatever its format, and options that tell it."""
+"""Input options of ``mcz render`` and ``mcz plot``, and the motion that they select."""
 
 from __future__ import annotations
 

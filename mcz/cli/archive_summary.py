@@ -1,4 +1,4 @@
-"""How commands over many files end: a count of each result, one line an error, an exit code."""
+"""Summaries of commands over many files or clips: counts of results, errors, an exit code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MANY = 50  # files of one kind that are named for one reason; --json names all
 
 
 def _table(report: Report) -> Iterator[str]:
-    """What became of the files of each kind, where there is more than one kind."""
+    """Results by kind of file; empty where there is only one kind."""
     kinds: dict[str, list[Outcome]] = {}
     for outcome in report.outcomes:
         kinds.setdefault(PurePosixPath(outcome.path).suffix.lower() or "-", []).append(outcome)
@@ -39,7 +39,7 @@ def _damage(report: Report) -> dict[str, list[str]]:
 
 
 def _summary(report: Report) -> str:
-    """How many files became what, and the bytes: of an MCZ file against those of its sources."""
+    """Counts of results, and the bytes of the sources and of the MCZ file."""
     counts = Counter(outcome.result for outcome in report.outcomes)
     shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
     held = [outcome for outcome in report.outcomes if outcome.result in HELD]
@@ -51,7 +51,7 @@ def _summary(report: Report) -> str:
 
 
 def _say_left_out(report: Report, target: str) -> None:
-    """Say on standard error how many files of which kinds are not in the MCZ file."""
+    """Print to standard error the number of files left out, by kind."""
     kinds = Counter(
         PurePosixPath(outcome.path).suffix.lower() or "without suffix"
         for outcome in report.outcomes
@@ -63,7 +63,7 @@ def _say_left_out(report: Report, target: str) -> None:
 
 
 def _say_notes(report: Report) -> None:
-    """Say on standard error what was left out and why, and what was noticed about the rest."""
+    """Print to standard error why files were left out, and the notes on the others."""
     said: Counter[tuple[str, str, str]] = Counter()
     noted: Counter[tuple[str, str]] = Counter()
     for outcome in report.outcomes:
@@ -86,8 +86,8 @@ def _say_notes(report: Report) -> None:
             say(f"{files}: {in_options(note)} (--json names them)")
 
 
-def conclude(report: Report, target: str, as_json: bool) -> Exit:
-    """Print what became of the files; the errors last, one line each on standard error."""
+def print_file_results(report: Report, target: str, as_json: bool) -> Exit:
+    """Print the results of files, errors last; return the exit code."""
     if as_json:
         rows = [
             {
@@ -121,3 +121,23 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         return Exit.BAD_INPUT
     lost = report.damage or report.count("salvaged") or damaged
     return Exit.SALVAGED if lost else Exit.FINE
+
+
+def print_clip_results(report: Report, target: str, as_json: bool, listed: tuple[str, ...]) -> Exit:
+    """Print the results of clips, each clip whose result is ``listed`` on its own line."""
+    counts = Counter(outcome.result for outcome in report.outcomes)
+    if as_json:
+        rows = [{"name": o.path, "result": o.result, "message": o.message} for o in report.outcomes]
+        document = {"target": target, "bytes": report.size, "counts": counts}
+        print_json(document | {"names": rows, "left_out": report.left_out})
+        return Exit.FINE
+    shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
+    size = "" if report.size is None else f"; the file {report.size:,} bytes"
+    echo(f"{target}: {plural(len(report.outcomes), 'name')} ({shown}){size}")
+    for outcome in report.outcomes:
+        if outcome.result in listed:
+            arrow = "as" if outcome.result == "renamed" else "-"
+            echo(f"  {outcome.path}: {outcome.result} {arrow} {outcome.message}")
+    for text in report.left_out:
+        say(f"left out: {text}")
+    return Exit.FINE

@@ -14,9 +14,9 @@ from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.types import JsonObject
 from mcz.viewing.browser import show
+from mcz.viewing.file_registry import Shelf, Stored, put
 from mcz.viewing.player import player
 from mcz.viewing.server import Server
-from mcz.viewing.shelf import Shelf, Stored, put
 from mcz.viewing.small_page import viewer_page
 
 _OPEN: set[View] = set()  # those that are served, whether anybody keeps them or not

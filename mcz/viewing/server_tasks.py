@@ -25,9 +25,9 @@ from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
 from mcz.reading.source_files import SourceOptions
 from mcz.types import JsonObject, Params
+from mcz.viewing.file_registry import Shelf, Shelved, encode, kind_of, pack
 from mcz.viewing.multipart import Readable, boundary_of, save_files
 from mcz.viewing.requests import Refused, object_of, params_of, text_of
-from mcz.viewing.shelf import Shelf, Shelved, encode, kind_of, pack
 
 MOST_POSTED = 2**30  # bytes of the files that the page may give at once
 MOST_WAITING = 8  # requests that wait for their turn

@@ -1,4 +1,4 @@
-"""What is said of outputs that were computed, as JSON and in words: skeletons fitted, scenes."""
+"""Summaries of converted outputs, as JSON and text: skeleton fits, scenes, notes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class Made:
-    """How the outputs of a clip were made, where there is something to say about it."""
+class ConversionSummary:
+    """Fit, scene and notes of one converted clip."""
 
     fit: Fit | None = None
     scene: SceneFile | None = None
@@ -23,8 +23,8 @@ class Made:
     notes: tuple[str, ...] = ()
 
 
-def facts_of(clips: Mapping[str, Made]) -> JsonObject:
-    """What ``--json`` says: of one clip "fit" and "scene", of more "fits" and "scenes" by name.
+def summary_facts(clips: Mapping[str, ConversionSummary]) -> JsonObject:
+    """The ``--json`` facts: "fit" and "scene" of one clip, "fits" and "scenes" by name of several.
 
     "left_out" has by the names of clips what their formats have no place for, "notes" what else is
     to be known of them.
@@ -44,13 +44,13 @@ def facts_of(clips: Mapping[str, Made]) -> JsonObject:
     return facts
 
 
-def told(clips: Mapping[str, Made]) -> Iterator[str]:
+def summary_lines(clips: Mapping[str, ConversionSummary]) -> Iterator[str]:
     """The same in words, a line a thing."""
     for made in clips.values():
         if made.fit is not None:
-            yield _fit_told(made.fit)
+            yield _fit_line(made.fit)
         if made.scene is not None:
-            yield from _scene_told(made.scene)
+            yield from _scene_lines(made.scene)
         scene_notes = () if made.scene is None else made.scene.notes
         yield from (text for text in made.left_out if text not in scene_notes)
         yield from made.notes
@@ -69,7 +69,7 @@ def _scene(scene: SceneFile) -> JsonObject:
     }
 
 
-def _scene_told(scene: SceneFile) -> Iterator[str]:
+def _scene_lines(scene: SceneFile) -> Iterator[str]:
     unit = "mm" if scene.has_unit else "units"
     at = "" if scene.frame is None else f" (frame {scene.frame}, {scene.point})"
     yield (
@@ -92,7 +92,7 @@ def _fit(fit: Fit) -> JsonObject:
     }
 
 
-def _fit_told(fit: Fit) -> str:
+def _fit_line(fit: Fit) -> str:
     scale, unit = (1.0, "units") if fit.unit_cm is None else (fit.unit_cm, "cm")
     if fit.mean_error is None or fit.max_error is None:
         text = "inverse kinematics: no position is known"

@@ -1,4 +1,4 @@
-"""The report of a verification as a file: ``mcz verify --report``."""
+"""Report files of ``mcz verify --report``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SUFFIXES = (".txt", ".json")
 NONE = "none"  # as a date
 
 
-class Filed:
+class VerifyReport:
     """A report at ``path``, which must be new unless ``force``; raises Failure at once."""
 
     def __init__(self, path: str, date: str | None, force: bool, inputs: Sequence[str]) -> None:
@@ -60,7 +60,7 @@ class Filed:
         return report(self._facts, rows, tool=tool, date=self.date, quick=quick, chosen=where)
 
     def write(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> None:
-        """Write the report of ``rows``, what is said of each part."""
+        """Write the report of ``rows``, one for each part."""
         from mcz.reading.verification import text_lines
 
         document = self.document(rows, quick=quick, where=where)
@@ -75,7 +75,7 @@ class Filed:
     ) -> None:
         """Write the report of a bag: of itself, then the ``documents`` of the archives in it.
 
-        ``files``: what is said of each archive, those that could not be read too.
+        ``files``: a row for each archive, unreadable ones included.
         """
         from mcz import __version__
         from mcz.reading.verification import bag_lines, text_lines

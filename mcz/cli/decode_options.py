@@ -1,4 +1,4 @@
-"""What ``mcz decode`` is asked for, and which of its options go together."""
+"""Options of ``mcz decode``, and checks of their combinations."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from mcz.cli.suffixes import CONVERSIONS, SCENES
 EVENTS = "events"  # a signal that tables make of a recording
 
 
-class Wanted(NamedTuple):
-    """What of a file is wanted, and as what: the options of these names."""
+class DecodeOptions(NamedTuple):
+    """The options of ``mcz decode`` and ``mcz convert``, by name."""
 
     frames: tuple[int, int | None] | None = None
     joints: str | None = None
@@ -32,16 +32,16 @@ class Wanted(NamedTuple):
 
     @property
     def is_converted(self) -> bool:
-        """Whether the target is a format of motions."""
+        """Return whether the target is a motion or scene format."""
         return self.target in CONVERSIONS or self.is_scene
 
     @property
     def is_scene(self) -> bool:
-        """Whether the target is a format of animated nodes."""
+        """Return whether the target is a scene format."""
         return self.target in SCENES
 
 
-def check_options(wanted: Wanted, salvage: bool) -> None:
+def check_options(wanted: DecodeOptions, salvage: bool) -> None:
     """Raise Failure for options that do not go together."""
     if not wanted.target or wanted.is_converted:
         refuse(wanted.joints is not None, "--joints needs --to csv or --to npz")
@@ -61,7 +61,7 @@ def check_options(wanted: Wanted, salvage: bool) -> None:
     )
 
 
-def check_signal(wanted: Wanted) -> None:
+def check_signal(wanted: DecodeOptions) -> None:
     """Raise Failure for options that do not go with a signal that is not the motion."""
     numbers = wanted.target is not None and not wanted.is_converted
     refuse(wanted.signal is not None and not numbers, "--signal needs --to csv or --to npz")
@@ -84,6 +84,6 @@ def check_signal(wanted: Wanted) -> None:
 
 
 def refuse(wrong: bool, reason: str) -> None:
-    """Raise Failure with the reason where something is wrong."""
+    """Raise Failure with the reason if ``wrong``."""
     if wrong:
         raise Failure(reason, Exit.USAGE)

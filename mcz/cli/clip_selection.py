@@ -1,4 +1,4 @@
-"""What ``mcz decode`` takes of a clip: its source file, a motion, or a table of numbers."""
+"""Parts of a clip as ``mcz decode`` writes them: a source file, a motion or a table."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ Masked = tuple[Values, NDArray[np.bool_] | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """Some frames of a clip, at a resolution; ``rate`` is its frame rate where it says none."""
+class ClipSelection:
+    """Selected frames of a clip at a resolution; ``rate`` is used if the clip states none."""
 
     clip: Clip
     frames: tuple[int, int] | None
@@ -67,7 +67,7 @@ class Part:
         return self._table(values, mask, signal, names, units)
 
     def events(self, events: Sequence[Event]) -> list[Event]:
-        """Those of the events that are in the frames, by their times."""
+        """The events within the selected frames, by time."""
         timeline, (start, stop) = self._timeline(), self.frames or (0, self.clip.n_frames)
         if self.frames is None or timeline is None or start == stop:
             return list(events)
@@ -118,7 +118,7 @@ class Part:
         return self.clip.read_masked(self.frames, joints, self.resolution)
 
 
-class Filtered(Part):
+class FilteredSelection(ClipSelection):
     """The same, with the post filter."""
 
     def fidelity(self, data: bytes) -> str:
@@ -144,7 +144,7 @@ class Filtered(Part):
         return filtered_part(self.clip, self.frames, joints, self.resolution, rate=self.rate)
 
 
-class Preview(Part):
+class PreviewSelection(ClipSelection):
     """The frames of a clip that can be read without decoding the rest."""
 
     def motion(self) -> Motion:

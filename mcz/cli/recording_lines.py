@@ -1,4 +1,4 @@
-"""What ``mcz info`` prints of a recording: events, force platforms, channels, outputs."""
+"""Recording lines of ``mcz info``: events, force platforms, channels, outputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""No option is given twice, unless that makes a list: the last would count, the others be lost."""
+"""Reject repeated options."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def refuse_repeats(
 
 
 class Once(click.Command):
-    """A command that is called by itself, and refuses what a group refuses for its own."""
+    """A command outside a group that rejects repeated options."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if not ctx.resilient_parsing:

@@ -1,19 +1,19 @@
-"""What a command that refuses a damaged file says of the rest of it."""
+"""Hint at what can be salvaged from a damaged file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from mcz.brief import counted
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
 from mcz.hints import Hint
+from mcz.text_format import counted
 from mcz.types import Params
 
 
 @contextmanager
 def hinted(target: str | bytes, options: Params) -> Iterator[None]:
-    """Add to the error about a damaged file what is whole in it, and how to get that."""
+    """Add the intact parts of a damaged file, and the hint to salvage them, to its error."""
     try:
         yield
     except (UnsupportedError, LimitError):
@@ -30,7 +30,7 @@ def hinted(target: str | bytes, options: Params) -> Iterator[None]:
 
 
 def _whole(target: str | bytes) -> str | None:
-    """What is whole in a damaged file on this machine; None where nothing is."""
+    """Counts of the intact parts of a damaged local file; None if there are none."""
     import mcz
 
     if isinstance(target, str) and "://" in target:

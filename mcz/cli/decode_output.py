@@ -1,4 +1,4 @@
-"""Outputs of ``mcz decode`` on their way to files: all of them, or none."""
+"""Write the outputs of ``mcz decode``, all or none."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def deliver(
 
 
 def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Path]:
-    """Where each output belongs: the first under the name that was given, if one was."""
+    """The path of each output; an output name given by the user is that of the first."""
     named = output is not None and not is_folder(output)
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:
