@@ -9,8 +9,13 @@ from typing import TYPE_CHECKING
 from mcz.types import JsonObject
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from mcz.cli.clip_selection import ClipSelection
+    from mcz.cli.decode_options import DecodeOptions
     from mcz.conversion import Fit
     from mcz.conversion.scenes import SceneFile
+    from mcz.reading.clip import Clip
 
 
 @dataclass(slots=True)
@@ -109,3 +114,24 @@ def _fit_line(fit: Fit) -> str:
     if fit.unsolved:
         text += f"; left at 0: {', '.join(fit.unsolved)}"
     return text
+
+
+def rate_notes(clip: Clip, part: ClipSelection, wanted: DecodeOptions) -> tuple[str, ...]:
+    """Notes on text files whose stated times differ from those of the clip."""
+    from mcz.reading.rate_notes import text_notes
+
+    if wanted.decimate:
+        return ()
+    is_file = not wanted.filtered and clip.gives_file(part.frames, wanted.resolution)
+    start = part.frames[0] if part.frames else 0
+    notes = text_notes(clip, start, is_file=is_file)
+    return tuple(f"clip {clip.name}: {note}" for note in notes)
+
+
+def rate_change_notes(clip: Clip, rate: Fraction | None) -> tuple[str, ...]:
+    """A note if ``--rate`` replaces the rate of the clip."""
+    own = clip.frame_rate
+    if own is None or rate is None or own == rate:
+        return ()
+    text = f"{float(own):g} frames a second are written as {float(rate):g}, as was asked for"
+    return (f"clip {clip.name}: its {text}",)

@@ -17,7 +17,13 @@ from mcz.cli.common import (
     plural,
     say,
 )
-from mcz.cli.conversion_summary import ConversionSummary, summary_facts, summary_lines
+from mcz.cli.conversion_summary import (
+    ConversionSummary,
+    rate_change_notes,
+    rate_notes,
+    summary_facts,
+    summary_lines,
+)
 from mcz.cli.decode_input import SOURCE_GIVEN, Input
 from mcz.cli.decode_options import EVENTS, DecodeOptions, check_options, check_signal, refuse
 from mcz.cli.decode_output import Output, check_count, deliver
@@ -233,7 +239,7 @@ def _of_clip(
     part = _part(clip, wanted)
     if target is None:
         outputs = [_source(clip, part)]
-        summary.notes = _rate_notes(clip, part, wanted)
+        summary.notes = rate_notes(clip, part, wanted)
     elif wanted.is_converted:
         from mcz.conversion import left_out
         from mcz.reading.source_files import SourceOptions
@@ -246,7 +252,7 @@ def _of_clip(
         unit = wanted.unit if motion.skeleton.unit_cm is None else None
         motion = SourceOptions(unit=unit, up=wanted.up).applied_to(motion)
         rate = None if wanted.filtered else wanted.rate
-        summary.notes = _corrected(clip, rate)
+        summary.notes = rate_change_notes(clip, rate)
         if wanted.is_scene:
             summary.scene = _scene(motion, target, rate, wanted)
             outputs = [Output(target, f"{_stem(motion)}.{target}", summary.scene.data, CONVERTED)]
@@ -259,27 +265,6 @@ def _of_clip(
     if wanted.with_skeleton and target != "amc":
         outputs.append(_skeleton(held, _sourced(held, clip)))
     return outputs, summary
-
-
-def _rate_notes(clip: Clip, part: ClipSelection, wanted: DecodeOptions) -> tuple[str, ...]:
-    """Notes where the text that was written states other times than the clip has."""
-    from mcz.reading.rate_notes import text_notes
-
-    if wanted.decimate:
-        return ()
-    is_file = not wanted.filtered and clip.gives_file(part.frames, wanted.resolution)
-    start = part.frames[0] if part.frames else 0
-    notes = text_notes(clip, start, is_file=is_file)
-    return tuple(f"clip {clip.name}: {note}" for note in notes)
-
-
-def _corrected(clip: Clip, rate: Fraction | None) -> tuple[str, ...]:
-    """A note where ``--rate`` replaces a rate that the clip has."""
-    own = clip.frame_rate
-    if own is None or rate is None or own == rate:
-        return ()
-    text = f"{float(own):g} frames a second are written as {float(rate):g}, as was asked for"
-    return (f"clip {clip.name}: its {text}",)
 
 
 def _part(clip: Clip, wanted: DecodeOptions) -> ClipSelection:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from mcz.brief import among
 from mcz.errors import OptionError
 from mcz.motion import Skeleton
+from mcz.text_format import among
 
 GROUPS = {
     "hands": r"hand|wrist|finger|thumb|index|middle|ring|pinky",

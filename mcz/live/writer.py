@@ -13,7 +13,6 @@ from types import MappingProxyType, TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import brief
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container.chunks import REPEATED, ChunkFlag, ChunkType
@@ -29,6 +28,7 @@ from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.live.figures import Figures
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.reading.stored_clip import with_indices
+from mcz.text_format import brief
 from mcz.types import Params
 from mcz.writing.clip_writer import begin_open_clip
 from mcz.writing.draft import check_metadata

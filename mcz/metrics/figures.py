@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mcz.brief import brief
 from mcz.metrics.sliding import Sliding
 from mcz.metrics.sums import Number, times
+from mcz.text_format import brief
 
 Entries = dict[str, float | int | str | None]
 NO_CONTACTS = dict.fromkeys(

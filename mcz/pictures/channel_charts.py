@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mcz.angles import Unwrapper
-from mcz.brief import among, printable
 from mcz.errors import MczError, MotionError, OptionError
 from mcz.hints import Hint, Remark
 from mcz.kinematics.chain import Floats
@@ -20,6 +19,7 @@ from mcz.pictures.charts import Chart, legend, line, rows_of, styled
 from mcz.pictures.themes import Theme
 from mcz.poses import velocities
 from mcz.poses.motion_like import signal_of
+from mcz.text_format import among, printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

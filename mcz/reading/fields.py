@@ -10,7 +10,6 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
-from mcz.brief import among
 from mcz.codecs import codec_by_id
 from mcz.container.chunks import FRAMING, HEADER, ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
@@ -20,6 +19,7 @@ from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.errors import OptionError, UnsupportedError
 from mcz.formats import format_by_id
 from mcz.reading.clip import Clip
+from mcz.text_format import among
 
 if TYPE_CHECKING:
     from mcz.queries import Query, Value

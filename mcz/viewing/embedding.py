@@ -9,16 +9,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from mcz.brief import brief
 from mcz.codecs import choose_name, codec_by_name
 from mcz.errors import LimitError, MczError
 from mcz.hints import Hint, with_hint
 from mcz.metrics.diff_document import diff_document
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
+from mcz.text_format import brief
 from mcz.types import JsonObject, Params, Target
+from mcz.viewing.file_registry import FACTS, Shelf, Shelved
 from mcz.viewing.page import Page
-from mcz.viewing.shelf import FACTS, Shelf, Shelved
 from mcz.viewing.tables import deflated, tables_for
 from mcz.writing.atomic import replacing
 
