@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from mcz.conversion.scenes import SceneFile, to_glb, to_usda
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
-    from mcz.editing.arranging import delete_clips, rename_clips, reorder_clips, split
-    from mcz.editing.describing import set_metadata, set_rate
+    from mcz.editing.batch_report import Outcome, Report
     from mcz.editing.exporting import export
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.merging import merge
-    from mcz.editing.outcomes import Outcome, Report
+    from mcz.editing.metadata_edit import set_metadata, set_rate
     from mcz.editing.protecting import Protection
     from mcz.editing.recovering import Recovery
+    from mcz.editing.reorganize import delete_clips, rename_clips, reorder_clips, split
     from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
     from mcz.editing.rewriting import protect
@@ -107,15 +107,15 @@ _HOMES = {
     "mcz.adapters.pybvh": ("from_pybvh", "to_pybvh"),
     "mcz.adapters.rerun": ("to_rerun",),
     "mcz.bags": ("BagCheck", "bag", "check_bag"),
-    "mcz.editing.describing": ("set_metadata", "set_rate"),
+    "mcz.editing.metadata_edit": ("set_metadata", "set_rate"),
     "mcz.editing.exporting": ("export",),
     "mcz.tables": ("to_pandas", "to_xarray"),
     "mcz.datasets": ("Dataset", "Window", "dataset"),
     "mcz.editing.archive": ("append", "pack"),
     "mcz.editing.unpacking": ("unpack",),
-    "mcz.editing.arranging": ("delete_clips", "rename_clips", "reorder_clips", "split"),
+    "mcz.editing.reorganize": ("delete_clips", "rename_clips", "reorder_clips", "split"),
     "mcz.editing.merging": ("merge",),
-    "mcz.editing.outcomes": ("Outcome", "Report"),
+    "mcz.editing.batch_report": ("Outcome", "Report"),
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions", "left_out"),

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import mcz
 from mcz.container.chunks import FOOT, build_foot
-from mcz.container.feeding import packets
 from mcz.container.packets import FRAME, Packet, build_packet, implied_by
+from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
 from mcz.container.segments import mask_of
 from mcz.container.segments import parse_header as parse_segment

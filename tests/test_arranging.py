@@ -18,7 +18,7 @@ from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.scan import scan
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.editing.arranging import natural
+from mcz.editing.reorganize import natural
 from mcz.sample import write_samples
 from tests import live_codec
 from tests.motions import skeleton
@@ -230,8 +230,8 @@ def test_names_swap_and_sources_follow(files: tuple[Path, Path]) -> None:
 def test_a_rate_that_is_set_later(files: tuple[Path, Path], takes: Path, tmp_path: Path) -> None:
     from fractions import Fraction
 
-    from mcz.editing.carrying import Change
-    from mcz.editing.outcomes import Report
+    from mcz.editing.batch_report import Report
+    from mcz.editing.chunk_copier import Change
     from mcz.editing.rewriting import rewriting, whole
 
     path = tmp_path / "one.mcz"

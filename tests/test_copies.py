@@ -24,7 +24,7 @@ from mcz.container.writer import Writer
 from mcz.formats import FORMATS
 from mcz.reading.report import info
 from mcz.sample import write_samples
-from mcz.writing.draft import Draft
+from mcz.writing.write_transaction import Draft
 from tests.commands import run
 from tests.motions import smooth, written
 from tests.repair import use

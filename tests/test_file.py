@@ -20,7 +20,7 @@ from mcz.container.value_hash import canonical
 from mcz.numbers import Grid, GridKind
 from mcz.reading.faults import validate
 from mcz.reading.report import info
-from mcz.writing.draft import METADATA_KEYS
+from mcz.writing.write_transaction import METADATA_KEYS
 from tests.motions import motions, skeleton, smooth, written
 
 

@@ -21,7 +21,7 @@ import mcz
 from mcz import jobs
 from mcz.editing import coded_parts
 from mcz.jobs.pool import Pool
-from mcz.reading import sharing
+from mcz.reading import parallel_clips
 from mcz.reading.faults import validate
 from mcz.sample import write_samples
 from tests.commands import run
@@ -65,7 +65,7 @@ def fail(error: Exception) -> None:
 @pytest.fixture
 def no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coded_parts, "answers", here)
-    monkeypatch.setattr(sharing, "answers", here)
+    monkeypatch.setattr(parallel_clips, "answers", here)
 
 
 @pytest.fixture(scope="module")
@@ -270,7 +270,7 @@ def test_full_disk_leaves_nothing(
 SLOW = """
 import operator, time
 from mcz.jobs.pool import Pool
-from mcz.reading import sharing
+from mcz.reading import parallel_clips
 with Pool(2) as pool:
     for answer in pool.in_order(operator.eq, [1, 2]):
         answer()

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container.source import ByteSource
 from mcz.editing.protecting import protections
-from mcz.recovery import making
+from mcz.recovery import encoder
 from mcz.recovery.code import encoded, log_weights, recovered, runs_of
-from mcz.recovery.field import logarithms, over, times
+from mcz.recovery.galois_field import logarithms, over, times
+from mcz.recovery.layout import Shape, shape_for
 from mcz.recovery.packets import build_packet, read_packet
-from mcz.recovery.shape import Shape, shape_for
 from mcz.sample import write_samples
 from tests.clocked_files import bvh
 
@@ -166,7 +166,7 @@ def test_bad_blocks_are_solved_by_columns(
     archive: bytes, shapes: list[Shape], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same bytes, whatever fits in memory at once; one burst crosses the end of a RECV."""
-    monkeypatch.setattr(making, "AT_ONCE", 1 << 11)
+    monkeypatch.setattr(encoder, "AT_ONCE", 1 << 11)
     shape = shapes[0]
     for at in (100, shape.stop - shape.burst):
         bad = archive[:at] + bytes(shape.burst) + archive[at + shape.burst :]
@@ -361,10 +361,10 @@ def test_large_blocks_are_worked_on_by_columns(monkeypatch: pytest.MonkeyPatch) 
     def read(block: int) -> bytes:
         return blocks[block].tobytes()
 
-    wanted = list(making.made(shape, read)[1])
-    monkeypatch.setattr(making, "AT_ONCE", 1 << 12)
-    monkeypatch.setattr(making, "IN_MEMORY", 1 << 10)
-    assert list(making.made(shape, read)[1]) == wanted
+    wanted = list(encoder.made(shape, read)[1])
+    monkeypatch.setattr(encoder, "AT_ONCE", 1 << 12)
+    monkeypatch.setattr(encoder, "IN_MEMORY", 1 << 10)
+    assert list(encoder.made(shape, read)[1]) == wanted
 
 
 VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
@@ -478,8 +478,8 @@ def test_a_full_disk_of_temporary_files(
         def write(self, data: object) -> int:
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(making, "IN_MEMORY", 0)
-    monkeypatch.setattr(making.tempfile, "TemporaryFile", Full)
+    monkeypatch.setattr(encoder, "IN_MEMORY", 0)
+    monkeypatch.setattr(encoder.tempfile, "TemporaryFile", Full)
     path = tmp_path / "a.mcz"
     path.write_bytes(small[1])
     with pytest.raises(mcz.AccessError, match="No space left on device; recovery data take"):

@@ -14,7 +14,7 @@ import pytest
 import mcz
 from mcz import SkeletonWarning, SourceError
 from mcz.reading.source_files import SourceOptions
-from mcz.writing.entry import EncodingOptions
+from mcz.writing.source_encoder import EncodingOptions
 from tests.commands import Call
 from tests.live_codec import encode_live
 

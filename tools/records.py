@@ -17,7 +17,7 @@ import construct
 import numpy as np
 
 from mcz.annexes import annex_bytes
-from mcz.container.packed import chunk_id, plain_id
+from mcz.container.dictionary_deflate import chunk_id, plain_id
 from mcz.container.payloads import AFTER_WORDS, ENCODING
 from mcz.errors import MczError
 from mcz.schema import EXTENDED, Record, build, read_varint, varint

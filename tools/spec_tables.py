@@ -36,7 +36,7 @@ MODULES = (
     "mcz.container.note_records",
     "mcz.container.copies",
     "mcz.container.metadata",
-    "mcz.container.packed",
+    "mcz.container.dictionary_deflate",
     "mcz.codecs.wavelet.wavelet",
     "mcz.codecs.curves.qbc",
     "mcz.codecs.pca.pca",

@@ -12,7 +12,7 @@ from mcz.cli.hints import in_options
 from mcz.reading.fidelity import GIVEN_BACK
 
 if TYPE_CHECKING:
-    from mcz.editing.outcomes import Outcome, Report
+    from mcz.editing.batch_report import Outcome, Report
 
 
 HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "written", *GIVEN_BACK)

@@ -104,7 +104,7 @@ def encode_lines(
     """Encode standard input frame by frame to ``target``, - or None being standard output."""
     from mcz.live.text_writer import begin_live
     from mcz.reading.source_files import SourceOptions
-    from mcz.writing.entry import encoding_options
+    from mcz.writing.source_encoder import encoding_options
 
     options["profile"] = options["profile"] != "base"
     for name in ("verbatim", "profile", "copies", "effort"):

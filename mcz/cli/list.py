@@ -65,7 +65,7 @@ def command(
     with opened(file, salvage=salvage) as held, about(file):
         clips = held.chosen(where=where)
         if sort is not None:
-            from mcz.editing.arranging import in_order
+            from mcz.editing.reorganize import in_order
 
             clips = in_order(held, clips, sort)
         rows = _rows(held, clips, names)

@@ -25,7 +25,7 @@ from mcz.cli.options import clips_option, json_option, where_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mcz.editing.describing import Said
+    from mcz.editing.metadata_edit import Said
     from mcz.reading.clip import Clip
     from mcz.reading.file import File
 
@@ -36,7 +36,7 @@ def _to_pairs(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, str]:
     """Callback of ``KEY=VALUE``; the value is text as it stands."""
-    from mcz.editing.describing import registered_key
+    from mcz.editing.metadata_edit import registered_key
 
     pairs = {}
     for value in values:
@@ -122,7 +122,7 @@ def command(
             return _show(held, _chosen(held, clips, where, of_file), as_json)
     rows = None
     if table is not None:
-        from mcz.editing.tables_of_clips import from_table
+        from mcz.editing.metadata_table import from_table
 
         columns = None if take is None else [name.strip() for name in take.split(",")]
         rows = partial(from_table, table, match=match, take=columns, skip_unknown=skip_unknown)

@@ -27,7 +27,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
-    from mcz.editing.outcomes import Report
+    from mcz.editing.batch_report import Report
 
 
 @click.command(short_help="A folder of motion files to one .mcz.")

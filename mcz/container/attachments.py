@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
+from mcz.container.dictionary_deflate import decoded
 from mcz.container.directory import AttachmentRow
-from mcz.container.packed import decoded
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import parse
 

@@ -13,15 +13,15 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from mcz.container.chunks import Chunk, ChunkType
+from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import ClipRow, Directory, parse_head
 from mcz.container.events import ChunkEvent, Event, Fault, PacketEvent
-from mcz.container.feeding import events
 from mcz.container.grammar import INDEX, START
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import index_limit
-from mcz.container.packed import chunk_id
 from mcz.container.packets import END
 from mcz.container.parser import ALL, Parser
+from mcz.container.parser_drivers import events
 from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, UnsupportedError
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from mcz.container import payloads
 from mcz.container.chunks import COPIED, FRAMING, SIGNATURE, Chunk, ChunkType, build_chunk
+from mcz.container.dictionary_deflate import decoded
 from mcz.container.directory import Directory
-from mcz.container.feeding import chunks
 from mcz.container.limits import check
-from mcz.container.packed import decoded
+from mcz.container.parser_drivers import chunks
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
 from mcz.schema import build, deflate, parse, parse_all

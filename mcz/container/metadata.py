@@ -11,10 +11,10 @@ from sys import intern
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
+from mcz.container.dictionary_deflate import decoded, smallest
 from mcz.container.directory import ClipRow
 from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.container.metadata_keys import INTERPRETED
-from mcz.container.packed import decoded, smallest
 from mcz.errors import FormatError
 from mcz.schema import build, parse, parse_all, parse_until
 

@@ -13,6 +13,7 @@ from weakref import finalize
 
 from mcz.container import payloads
 from mcz.container.attachments import joined_parts
+from mcz.container.chunk_repair import is_like, scan_for_salvage
 from mcz.container.chunks import (
     FOOT,
     FRAMING,
@@ -28,6 +29,8 @@ from mcz.container.chunks import (
     read_payload,
 )
 from mcz.container.copies import Copy, copy_chunks, uncopied
+from mcz.container.decoded_cache import Runs
+from mcz.container.dictionary_deflate import chunk_id, plain_id, plain_payload
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -39,10 +42,7 @@ from mcz.container.directory import (
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.metadata import Placed, Record, Remembered, applied, records_in
-from mcz.container.packed import chunk_id, plain_id, plain_payload
 from mcz.container.packets import CHECK_SIZE, FRAME, MOST_HEAD, Packet, implied_by, is_packet
-from mcz.container.restoring import is_like, scan_for_salvage
-from mcz.container.runs import Runs
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,

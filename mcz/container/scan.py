@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from mcz.container.bounds import NOBODY, Bounds, Owners
 from mcz.container.chunks import FOOT, REPEATED, Chunk, ChunkType, read_payload
+from mcz.container.clip_bounds import NOBODY, Bounds, Owners
+from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import Found, SegmentRow
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
-from mcz.container.feeding import events
 from mcz.container.grammar import BODY, CLIP, GRAMMAR, INDEX, NAMED, OTHER, START
-from mcz.container.packed import chunk_id
 from mcz.container.packets import END
+from mcz.container.parser_drivers import events
 from mcz.container.repeats import chunks_in
 from mcz.container.scanner import Scanner
 from mcz.container.source import ByteSource

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import HEADER, Chunk, ChunkType
+from mcz.container.dictionary_deflate import plain_id, plain_payload
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -22,11 +23,10 @@ from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEven
 from mcz.container.grammar import NAMED, OTHER
 from mcz.container.index_reader import IndexCheck
 from mcz.container.limits import check, index_limit
-from mcz.container.packed import plain_id, plain_payload
 from mcz.container.packets import SEGMENT
 from mcz.container.parser import ALL, PASS, Parser
-from mcz.container.plain import check_plain
 from mcz.container.segments import GROUP_NOTES, parse_header
+from mcz.container.small_profile import check_plain
 from mcz.errors import FormatError, LimitError
 from mcz.schema import parse
 

@@ -23,6 +23,7 @@ from mcz.container.chunks import (
     build_header,
 )
 from mcz.container.copies import Copy, build_copies, runs, worth_it
+from mcz.container.dictionary_deflate import chunk_id, plain_id, smallest
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -32,7 +33,6 @@ from mcz.container.directory import (
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
 from mcz.container.metadata import Record, build_metas
-from mcz.container.packed import chunk_id, plain_id, smallest
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -42,8 +42,8 @@ from mcz.container.packets import (
     build_packet,
     implied_by,
 )
-from mcz.container.plain import check_plain
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
+from mcz.container.small_profile import check_plain
 from mcz.errors import FormatError, MotionError
 from mcz.motion import Skeleton
 from mcz.schema import build

@@ -12,16 +12,16 @@ from mcz.container.limits import profile_named
 from mcz.dask.cluster import Cluster, connected
 from mcz.dask.sources import FarAsk, Found, coded_there, listed, skeletons_beside
 from mcz.editing.archive import write_in_turn
+from mcz.editing.batch_report import Outcome, Report
 from mcz.editing.coded_parts import Far, Part, ask_of
 from mcz.editing.folders import NO_MOTION, motion_files
-from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.jobs import Answer
 from mcz.reading.source_files import SourceOptions
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
-from mcz.writing.draft import Draft
-from mcz.writing.entry import Entry, WritingOptions, encoding_options
+from mcz.writing.source_encoder import Entry, WritingOptions, encoding_options
+from mcz.writing.write_transaction import Draft
 
 
 def pack(

@@ -13,7 +13,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.faults import Problem
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
-from mcz.reading.sharing import can_be_shared, shared_out
+from mcz.reading.parallel_clips import can_be_shared, shared_out
 from mcz.types import Target
 
 Result = TypeVar("Result")

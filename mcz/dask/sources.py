@@ -11,9 +11,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from mcz.container.source import file_system
+from mcz.editing.batch_report import Outcome
 from mcz.editing.coded_parts import Ask, Part, coded
 from mcz.editing.folders import files_below, size_of
-from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, MczError, OptionError, SourceError
 from mcz.formats import wants_skeleton
 from mcz.hints import Remark

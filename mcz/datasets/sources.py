@@ -13,7 +13,7 @@ from weakref import finalize
 import numpy as np
 
 from mcz.clock import Timeline, known_timeline
-from mcz.container.runs import Runs, SharedRuns
+from mcz.container.decoded_cache import Runs, SharedRuns
 from mcz.datasets.caches import Arrays
 from mcz.datasets.fields import Field, Rows, Subject, features_of, subject_of
 from mcz.datasets.members import Member

@@ -12,8 +12,10 @@ from mcz.container import payloads
 from mcz.container.limits import profile_named
 from mcz.container.metadata import Record
 from mcz.editing.appending import growing
-from mcz.editing.carrying import UNPROTECTED
+from mcz.editing.batch_report import Outcome, Report
+from mcz.editing.chunk_copier import UNPROTECTED
 from mcz.editing.coded_parts import Far, ahead
+from mcz.editing.file_times import stamp
 from mcz.editing.folders import (
     files_below,
     left_out,
@@ -23,8 +25,6 @@ from mcz.editing.folders import (
     sources_named,
 )
 from mcz.editing.merging import add_files
-from mcz.editing.mtimes import stamp
-from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.safe_names import notes_on
 from mcz.editing.stored_files import Content, stored_files
@@ -36,8 +36,8 @@ from mcz.reading.file import File
 from mcz.reading.source_files import SourceOptions
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import refuse_inputs, replacing
-from mcz.writing.draft import Draft, check_name
-from mcz.writing.entry import Entry, WritingOptions, encoding_options
+from mcz.writing.source_encoder import Entry, WritingOptions, encoding_options
+from mcz.writing.write_transaction import Draft, check_name
 
 
 def pack(

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
-from mcz.editing.carrying import Change
+from mcz.editing.chunk_copier import Change
 from mcz.editing.folders import size_of
 from mcz.editing.rewriting import ALIAS, CLIP, SKELETON, carry, whole
 from mcz.editing.stored_files import Content
@@ -25,10 +25,10 @@ from mcz.formats import wants_skeleton
 from mcz.jobs import ONE, Answer, useful
 from mcz.jobs.pool import answers
 from mcz.reading.file import open
-from mcz.reading.sharing import only_own
+from mcz.reading.parallel_clips import only_own
 from mcz.reading.source_files import SourceOptions
-from mcz.writing.draft import Draft, check_name, clip_name
-from mcz.writing.entry import EncodingOptions, Entry
+from mcz.writing.source_encoder import EncodingOptions, Entry
+from mcz.writing.write_transaction import Draft, check_name, clip_name
 
 
 @dataclass(frozen=True, slots=True)

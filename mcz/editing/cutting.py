@@ -13,9 +13,9 @@ from functools import partial
 from mcz.clock import numbering_of, part_begins
 from mcz.codecs.contract import Span
 from mcz.container import payloads
+from mcz.container.dictionary_deflate import parse_skel
 from mcz.container.directory import SegmentRow
 from mcz.container.limits import Profile
-from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.time_base import put_time_base, time_base_of

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 
 from mcz.conversion import TARGETS, converted_files, left_out
 from mcz.conversion.scenes import WRITERS, to_scene
-from mcz.editing.outcomes import Outcome, Report, failed
+from mcz.editing.batch_report import Outcome, Report, failed
 from mcz.editing.safe_names import Folder, PortableNames
 from mcz.editing.unpacking import safe_path
 from mcz.errors import FormatError, MczError, OptionError
@@ -18,7 +18,7 @@ from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open, suffixes_of
-from mcz.reading.sharing import shared_out
+from mcz.reading.parallel_clips import shared_out
 from mcz.reading.source_files import SourceOptions
 from mcz.tables.files import EXPORTS, table_of
 from mcz.types import JsonObject, Target

@@ -17,15 +17,7 @@ from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.segments import SegmentHeader
 from mcz.container.value_hash import ValueDigest, value_hash
-from mcz.editing.anew import (
-    OF_JOINTS,
-    check_anew,
-    joints_alone,
-    settings_of,
-    settings_of_joints,
-    with_own_source,
-)
-from mcz.editing.carrying import Carrier, said_of
+from mcz.editing.chunk_copier import Carrier, said_of
 from mcz.editing.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
@@ -37,6 +29,14 @@ from mcz.editing.cutting import (
     note_source,
     plan_cut,
     recoded_quality,
+)
+from mcz.editing.reencode import (
+    OF_JOINTS,
+    check_anew,
+    joints_alone,
+    settings_of,
+    settings_of_joints,
+    with_own_source,
 )
 from mcz.editing.rewriting import writer_like
 from mcz.errors import FormatError, MotionError, OptionError

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from mcz.editing.outcomes import Outcome
+from mcz.editing.batch_report import Outcome
 from mcz.errors import AccessError, OptionError, reason_of, remark_of
 from mcz.formats import FORMATS
 from mcz.hints import Hint, Remark

@@ -16,8 +16,8 @@ from pathlib import PurePosixPath
 
 from mcz.container import payloads
 from mcz.container.writer import Writer
-from mcz.editing.carrying import UNPROTECTED, Change
-from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.batch_report import Outcome, Report
+from mcz.editing.chunk_copier import UNPROTECTED, Change
 from mcz.editing.protecting import protect_written, redundancy_of
 from mcz.editing.rewriting import (
     ALIAS,
@@ -40,7 +40,7 @@ from mcz.schema import parse
 from mcz.text_format import counted, shown
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
-from mcz.writing.draft import Draft
+from mcz.writing.write_transaction import Draft
 
 
 def merge(

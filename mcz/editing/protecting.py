@@ -22,9 +22,9 @@ from mcz.container.source import ByteSource
 from mcz.editing.appending import IN_MEMORY, growing
 from mcz.errors import FormatError, OptionError
 from mcz.reading.faults import recovery_chunks
-from mcz.recovery.making import Step, made
+from mcz.recovery.encoder import Step, made
+from mcz.recovery.layout import Shape, shape_for
 from mcz.recovery.packets import Key, read_packet
-from mcz.recovery.shape import Shape, shape_for
 from mcz.text_format import brief
 
 DEFAULT = 0.05  # redundancy

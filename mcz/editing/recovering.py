@@ -20,9 +20,9 @@ from mcz.errors import FormatError
 from mcz.indexing import merged_ranges
 from mcz.reading.file import reached
 from mcz.recovery.code import LANE, encoded, recovered
-from mcz.recovery.making import Step, computed, made
+from mcz.recovery.encoder import Step, computed, made
+from mcz.recovery.layout import HASH, Shape
 from mcz.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
-from mcz.recovery.shape import HASH, Shape
 from mcz.text_format import brief
 from mcz.types import Progress, Target
 

@@ -19,10 +19,10 @@ from mcz.container import note_records, payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.segments import GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
-from mcz.editing.anew import check_anew, settings_of
 from mcz.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
 from mcz.editing.extraction import Copier, Copying
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
+from mcz.editing.reencode import check_anew, settings_of
 from mcz.editing.rewriting import disk_path, hold
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open

@@ -24,8 +24,8 @@ from mcz.container.metadata import Record
 from mcz.container.reader import Container
 from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
-from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
-from mcz.editing.outcomes import Report
+from mcz.editing.batch_report import Report
+from mcz.editing.chunk_copier import SAME, UNPROTECTED, Carrier, Change, said_of
 from mcz.editing.protecting import (
     DEFAULT,
     Protection,
@@ -42,8 +42,8 @@ from mcz.errors import (
 )
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
-from mcz.recovery import making
-from mcz.recovery.shape import check_redundancy
+from mcz.recovery import encoder
+from mcz.recovery.layout import check_redundancy
 from mcz.schema import parse
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
@@ -245,7 +245,7 @@ def protect(
     redundancy: float = DEFAULT,
     *,
     anew: bool = False,
-    progress: making.Step | None = None,
+    progress: encoder.Step | None = None,
 ) -> list[Protection]:
     """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
 
@@ -264,7 +264,7 @@ def protect(
 
 
 def _protected_anew(
-    target: Target, redundancy: float, progress: making.Step | None
+    target: Target, redundancy: float, progress: encoder.Step | None
 ) -> Protection | None:
     """Rewrite a file with recovery data for all of it; None, and nothing done, where it has none.
 

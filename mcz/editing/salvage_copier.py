@@ -14,8 +14,8 @@ from pathlib import PurePosixPath
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
+from mcz.container.dictionary_deflate import parse_skel
 from mcz.container.directory import ClipRow
-from mcz.container.packed import parse_skel
 from mcz.editing.cutting import ClipCut, note_source
 from mcz.editing.extraction import Copier, Copying
 from mcz.editing.recovering import Recovery

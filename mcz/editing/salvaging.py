@@ -17,7 +17,7 @@ from typing import BinaryIO
 from mcz.container.chunks import END_MAGIC, FOOT, SIGNATURE, ChunkType, parse_foot
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource
-from mcz.editing.carrying import UNPROTECTED
+from mcz.editing.chunk_copier import UNPROTECTED
 from mcz.editing.cutting import ClipCut, plan_cut
 from mcz.editing.extraction import Copying
 from mcz.editing.salvage_copier import (

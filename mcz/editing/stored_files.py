@@ -15,7 +15,7 @@ from mcz.container.source import Forward
 from mcz.errors import FormatError
 from mcz.reading.file import File
 from mcz.schema import parse, parse_until, read_varint
-from mcz.writing.draft import Digest
+from mcz.writing.write_transaction import Digest
 
 Content = dict[bytes, tuple[int, bytes]]  # SHA-256 of a file -> what ALIA says of it
 

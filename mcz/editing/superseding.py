@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mcz.container.metadata_keys import SAID
-from mcz.editing.arranging import delete_clips
-from mcz.editing.describing import set_metadata
+from mcz.editing.metadata_edit import set_metadata
+from mcz.editing.reorganize import delete_clips
 from mcz.editing.stored_files import stored_files
 from mcz.reading.file import File, open
 from mcz.reading.source_files import read_bytes

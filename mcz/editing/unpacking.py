@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 
 from mcz.container.strict import check_path
-from mcz.editing.mtimes import set_time
-from mcz.editing.outcomes import Outcome, Report, failed
+from mcz.editing.batch_report import Outcome, Report, failed
+from mcz.editing.file_times import set_time
 from mcz.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
 from mcz.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
 from mcz.errors import FormatError, MczError, OptionError
@@ -21,8 +21,8 @@ from mcz.reading.clips import listed
 from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
+from mcz.reading.parallel_clips import shared_out
 from mcz.reading.rate_notes import text_notes
-from mcz.reading.sharing import shared_out
 from mcz.types import Progress, Settings, Target
 
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
+from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import parse_head
 from mcz.container.events import ChunkEvent, Fault, FootEvent, PacketEvent
-from mcz.container.feeding import Stream
 from mcz.container.limits import BASE, check
-from mcz.container.packed import chunk_id
+from mcz.container.parser_drivers import Stream
 from mcz.container.repeats import chunks_in
 from mcz.container.segments import FRESH, SegmentHeader, parse_header
 from mcz.container.tolerant_parser import TolerantParser

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType, build_foot
+from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import SegmentRow
 from mcz.container.events import ChunkEvent, PacketEvent
-from mcz.container.feeding import Stream
-from mcz.container.packed import chunk_id
+from mcz.container.parser_drivers import Stream
 from mcz.container.reader import Container
 from mcz.container.scanner import Scanner
 from mcz.container.segments import FRESH

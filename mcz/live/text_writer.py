@@ -17,7 +17,7 @@ from mcz.reading.read import NOTE as SKELETON_NOTE
 from mcz.reading.source_files import SourceOptions, read_skeleton
 from mcz.types import Params
 from mcz.units import facing, in_unit
-from mcz.writing.entry import EncodingOptions, rate_notes
+from mcz.writing.source_encoder import EncodingOptions, rate_notes
 
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 

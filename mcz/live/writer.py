@@ -25,13 +25,12 @@ from mcz.errors import LimitError, MotionError, OptionError
 from mcz.interrupts import held
 from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
-from mcz.live.figures import Figures
+from mcz.live.quality_figures import Figures
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.reading.stored_clip import with_indices
 from mcz.text_format import brief
 from mcz.types import Params
 from mcz.writing.clip_writer import begin_open_clip
-from mcz.writing.draft import check_metadata
 from mcz.writing.planning import (
     Prepared,
     StoredSkeleton,
@@ -43,6 +42,7 @@ from mcz.writing.planning import (
 )
 from mcz.writing.quality import CHUNK, quality_payload, texts_of
 from mcz.writing.signal_source import MemorySource
+from mcz.writing.write_transaction import check_metadata
 
 MOST_OVER = 1.05  # of a rate: that it is held
 REPEATED_SHARE = 0.1  # of a rate, for what is repeated to those who join

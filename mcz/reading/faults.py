@@ -23,9 +23,9 @@ from mcz.jobs import limited
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open, reached
-from mcz.reading.sharing import shared_out
+from mcz.reading.parallel_clips import shared_out
 from mcz.reading.signal_info import read_segments
-from mcz.recovery.making import made
+from mcz.recovery.encoder import made
 from mcz.recovery.packets import read_packet
 from mcz.text_format import brief
 from mcz.types import Target

@@ -17,9 +17,9 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
+from mcz.container.dictionary_deflate import chunk_id, pack_skeleton
 from mcz.container.directory import ClipRow
 from mcz.container.limits import check, check_decoded
-from mcz.container.packed import chunk_id, pack_skeleton
 from mcz.container.reader import Container
 from mcz.container.skeletons import build_skeleton
 from mcz.errors import MczError

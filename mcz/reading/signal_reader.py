@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Request, Span
 from mcz.codecs.known_answers import check_known_answer
+from mcz.container.decoded_cache import MOST_OF_ONE, Run
 from mcz.container.limits import check_decoded
 from mcz.container.masks import parse_mask
 from mcz.container.reader import Container
-from mcz.container.runs import MOST_OF_ONE, Run
 from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
 from mcz.errors import FormatError, MczError
 from mcz.kernels import lacks_compiled_kernels
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind, values_of
 from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
-from mcz.reading.salvage import salvage
+from mcz.reading.segment_salvage import salvage
 from mcz.reading.signal_info import SignalInfo
 from mcz.threads import in_force, in_order, timed, worthwhile
 from mcz.types import Values

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mcz.recovery.field import ORDER, Ints, log_of_product, logarithms, skews
+from mcz.recovery.galois_field import ORDER, Ints, log_of_product, logarithms, skews
 from mcz.threads import in_force, in_order
 
 LANE = 8  # bytes of a lane: blocks are that many, or a multiple

@@ -13,7 +13,7 @@ from construct import Int8ul, Int32ul, Int64ul
 
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError
-from mcz.recovery.shape import HASH, HEAD, Shape
+from mcz.recovery.layout import HASH, HEAD, Shape
 from mcz.schema import Exactly, Record, bounded, build, field, parse_until
 
 MAGIC = b"\x89RCV\r\n\x1a\n"

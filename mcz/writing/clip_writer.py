@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import Codec, Segment
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
+from mcz.container.dictionary_deflate import pack_skeleton
 from mcz.container.limits import Profile, check
-from mcz.container.packed import pack_skeleton
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.skeletons import build_skeleton
@@ -35,7 +35,6 @@ from mcz.reading.signal_info import SignalInfo, read_signal
 from mcz.reading.signal_reader import SignalReader
 from mcz.reading.stored_clip import with_indices, with_names
 from mcz.types import Params, Progress, Values
-from mcz.writing.draft import alias_once
 from mcz.writing.planning import (
     ClipPlan,
     Prepared,
@@ -46,6 +45,7 @@ from mcz.writing.planning import (
 )
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource
+from mcz.writing.write_transaction import alias_once
 
 NO_HASH = bytes(32)
 

@@ -27,10 +27,10 @@ from mcz.text_format import brief
 from mcz.threads import limited
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import refuse_inputs, replacing
-from mcz.writing.draft import Draft, check_metadata
-from mcz.writing.entry import Entry, encoding_options
 from mcz.writing.planning import prepare, under_its_path, with_true_sources
+from mcz.writing.source_encoder import Entry, encoding_options
 from mcz.writing.tuning import write_motion
+from mcz.writing.write_transaction import Draft, check_metadata
 
 SHORT = 65536  # bytes of a source file whose skeleton and texts are a large part of what is written
 

@@ -16,7 +16,7 @@ from mcz import live_frames
 from mcz.formats import FORMATS
 from mcz.live.strict_reader import StrictFrames
 from mcz.reading.source_files import SourceOptions
-from mcz.writing.entry import EncodingOptions
+from mcz.writing.source_encoder import EncodingOptions
 from tests.commands import ENV, ROOT, Started
 from tests.live_codec import encode_live
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from mcz.codecs import ENTRIES
 from mcz.container import payloads
-from mcz.container.packed import decoded
+from mcz.container.dictionary_deflate import decoded
 from mcz.container.packets import FRAME, SEGMENT, Packet
 from mcz.container.segments import parse_header
 from mcz.errors import MczError

@@ -30,9 +30,9 @@ from mcz.container.chunks import (
     read_chunk,
 )
 from mcz.container.directory import Directory
-from mcz.container.feeding import packets
 from mcz.container.index import build_index
 from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet, implied_by
+from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
 from mcz.container.segments import SegmentHeader, mask_of, parse_header
 from mcz.container.source import open_source

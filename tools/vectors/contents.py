@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from mcz.codecs import CODECS, bitstream_name
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, parse_header
+from mcz.container.dictionary_deflate import unpacked
 from mcz.container.limits import BASE
-from mcz.container.packed import unpacked
 from mcz.errors import MczError
 from mcz.formats import FORMATS
 from mcz.schema import parse

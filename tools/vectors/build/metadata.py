@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mcz.container import payloads
+from mcz.container.dictionary_deflate import words
 from mcz.container.metadata import Record, record_bytes
-from mcz.container.packed import words
 from mcz.schema import deflate
 from tools.records import built
 

@@ -14,8 +14,8 @@ from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.codecs.wavelet.wavelet import WaveletHeader
 from mcz.container import index_records, note_records, payloads
+from mcz.container.dictionary_deflate import decoded, words
 from mcz.container.index_records import Index
-from mcz.container.packed import decoded, words
 from mcz.formats import notes
 from mcz.formats.arrays.layout import ArrayTemplate
 from mcz.formats.c3d_layout import C3dDetail, C3dOutputsTemplate, C3dTemplate

@@ -24,7 +24,6 @@ from mcz.container.chunks import (
     parse_header,
 )
 from mcz.container.directory import ClipRow, Directory, SegmentRow, signal_rows
-from mcz.container.feeding import packets
 from mcz.container.index import Listing, end_of, segment_rows
 from mcz.container.index_reader import ClipTables, directory_of, parse_index
 from mcz.container.index_records import PreviousIndex
@@ -38,6 +37,7 @@ from mcz.container.packets import (
     implied_by,
     packet_check,
 )
+from mcz.container.parser_drivers import packets
 from mcz.container.segments import SegmentHeader, build_segment, mask_of
 from mcz.container.segments import parse_header as parse_segment
 from mcz.container.source import open_source

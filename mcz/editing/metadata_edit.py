@@ -11,8 +11,8 @@ from mcz.container.metadata import Record, applied
 from mcz.container.metadata_keys import SPELLINGS, check_said
 from mcz.container.writer import Writer
 from mcz.editing.appending import growing
-from mcz.editing.carrying import Change
-from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.batch_report import Outcome, Report
+from mcz.editing.chunk_copier import Change
 from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.rewriting import CLIP, rewriting, steps, whole
 from mcz.errors import ChecksumError, OptionError

@@ -13,9 +13,9 @@ import numpy as np
 
 from mcz.errors import AccessError, reason_of
 from mcz.recovery.code import LANE, encoded, runs_of
-from mcz.recovery.field import Ints
+from mcz.recovery.galois_field import Ints
+from mcz.recovery.layout import Shape
 from mcz.recovery.packets import Key, build_packet, short_hash
-from mcz.recovery.shape import Shape
 
 READ = Callable[[int], bytes]  # a data block, its padding with it
 AT_ONCE = 1 << 26  # bytes of the blocks of a run that are in memory

@@ -14,8 +14,8 @@ from pathlib import Path, PurePosixPath
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.editing.carrying import SAME, Change
-from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.batch_report import Outcome, Report
+from mcz.editing.chunk_copier import SAME, Change
 from mcz.editing.rewriting import (
     ALIAS,
     ATTACHMENT,
@@ -43,7 +43,7 @@ from mcz.reading.fields import Where, getter_of
 from mcz.reading.file import File, open
 from mcz.text_format import counted, nearest, shown
 from mcz.types import Progress, Target
-from mcz.writing.draft import check_name
+from mcz.writing.write_transaction import check_name
 
 FOLDER = "folder"  # split by the first part of the names
 

@@ -32,9 +32,9 @@ from mcz.reading.source_info import stating_rate
 from mcz.types import Params, Progress
 from mcz.units import in_unit
 from mcz.writing.clip_writer import write_skeletons
-from mcz.writing.draft import Draft, check_name, clip_name
 from mcz.writing.planning import StoredSkeleton, prepare, read_with
 from mcz.writing.tuning import write_motion
+from mcz.writing.write_transaction import Draft, check_name, clip_name
 
 
 @dataclass(frozen=True, slots=True)

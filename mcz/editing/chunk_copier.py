@@ -13,13 +13,13 @@ from itertools import takewhile
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk, ChunkFlag, ChunkType, read_chunk
+from mcz.container.dictionary_deflate import chunk_id, parse_skel
 from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
-from mcz.container.feeding import chunks
 from mcz.container.grammar import CLIP
 from mcz.container.index import segment_rows
 from mcz.container.index_reader import parse_segments
 from mcz.container.metadata import Record, as_one
-from mcz.container.packed import chunk_id, parse_skel
+from mcz.container.parser_drivers import chunks
 from mcz.container.reader import Container
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, FormatError

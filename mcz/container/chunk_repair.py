@@ -23,10 +23,10 @@ from mcz.container.chunks import (
 )
 from mcz.container.copies import Copy, parse_copies
 from mcz.container.directory import Directory, Found, parse_head
-from mcz.container.feeding import packets
 from mcz.container.index_reader import Listed, directory_of, read_indexes
 from mcz.container.limits import BASE, index_limit
 from mcz.container.packets import END
+from mcz.container.parser_drivers import packets
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource, Overlay
 from mcz.container.writer import build_head

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
-from mcz.container.packed import is_packed
+from mcz.container.dictionary_deflate import is_packed
 from mcz.errors import LimitError
 from mcz.numbers import GridKind
 from mcz.schema import Record, parse
