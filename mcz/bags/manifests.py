@@ -52,7 +52,7 @@ def read_manifest(text: str) -> Iterator[tuple[str, str]]:
 
 
 def is_inside(path: str) -> bool:
-    """Whether ``path``, of a manifest, stays in the bag, on every system."""
+    """Return True if a path of a manifest stays in the bag on every system."""
     pure = PurePosixPath(path)
     odd = pure.is_absolute() or ".." in pure.parts or "\\" in path or "\0" in path
     return bool(pure.parts) and not odd and ":" not in pure.parts[0] and pure.parts[0] != "~"

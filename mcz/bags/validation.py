@@ -1,4 +1,4 @@
-"""Whether a bag is whole and as it was made: its manifests against the files that are there."""
+"""Validation of a bag: its manifests against its files."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MANIFEST = re.compile(r"(tag)?manifest-([a-z0-9]+)\.txt")
 
 @dataclass(slots=True)
 class BagCheck:
-    """What was found: ``problems``, of which a valid bag has none.
+    """Result of a validation: ``problems``, of which a valid bag has none.
 
     ``files``: the paths of the payload, of ``n_bytes``. ``info``: the lines of bag-info.txt.
     ``algorithms``: those of the payload's manifests.
@@ -43,7 +43,7 @@ class BagCheck:
 
 
 def is_bag(folder: str | os.PathLike[str]) -> bool:
-    """Whether ``folder`` says that it is a bag."""
+    """Return True if ``folder`` declares itself a bag."""
     return (Path(folder) / DECLARATION).is_file()
 
 

@@ -34,7 +34,7 @@ Told = Callable[[int, int], object]
 
 @dataclass(slots=True)
 class Checked:
-    """What a pass has seen; ``faults``: where each is, and what is wrong, in file order.
+    """Findings of one pass; ``faults``: the place and kind of each, in file order.
 
     ``indexed``: whether the file ends with an INDX, which was compared with what is there.
     """
@@ -221,7 +221,7 @@ def _differing(places: Sequence[_ClipPlaces], rows: Sequence[ClipRow]) -> list[s
 
 
 def places_of(row: ClipRow) -> _ClipPlaces:
-    """Those of a clip that an index lists; raises FormatError where the index is wrong."""
+    """Places of a clip as an index lists them; raises FormatError for a wrong index."""
     places = _ClipPlaces(row.clip, cend=row.cend, ancillary=row.ancillary)
     for segment in row.segments:
         places.segment(segment.offset, segment.size, segment.packet)

@@ -181,7 +181,7 @@ def _end(chunk: Chunk, found: Found) -> int:
 
 
 def _fault(source: ByteSource, copy: Copy) -> str:
-    """What is wrong with the chunk of which there is a copy, "" where it is sound."""
+    """Name the fault of a chunk that has a copy; "" for a sound one."""
     try:
         chunk = read_chunk(source, copy.offset)
         read_payload(source, chunk, chunk.length or 0)
@@ -242,6 +242,6 @@ def restore_from_index(source: ByteSource, found: Found) -> list[str]:
 
 
 def is_like(source: ByteSource, offset: int, chunk: bytes) -> bool:
-    """Whether what lies at ``offset`` is this ``chunk``, damaged: most of its bytes are there."""
+    """Return True if most bytes of ``chunk`` stand at ``offset``, though damaged."""
     there = source.read(offset, max(0, min(len(chunk), source.size - offset)))
     return bool(4 * sum(map(eq, there, chunk)) >= 3 * len(chunk))

@@ -70,7 +70,7 @@ COPIED = (*REPEATED, ChunkType.SRCE, ChunkType.ALIA, ChunkType.CEND)
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Where a chunk lies; ``length`` is that of its payload, None while it is open."""
+    """A chunk's place in a file; ``length`` is that of its payload, None while it is open."""
 
     type: bytes
     flags: int = field(compare=False)

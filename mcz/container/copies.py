@@ -26,7 +26,7 @@ SMALL_PART = 64  # a model is copied where the file has this many times its byte
 
 @dataclass(frozen=True, slots=True)
 class Copy:
-    """What a COPY says of one chunk of the file: where it begins, its type, its payload."""
+    """A copy of one chunk, from COPY: its offset, type and payload."""
 
     offset: int
     type: bytes
@@ -61,7 +61,7 @@ def runs(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
 
 
 def worth_it(copy: Copy, n_bytes: int) -> bool:
-    """Whether a file of ``n_bytes`` should have it: no model that is a large part of the file."""
+    """Return True if a copy pays in a file of ``n_bytes``: one of a large model does not."""
     return copy.type != ChunkType.MODL or len(copy.payload) * SMALL_PART <= n_bytes
 
 

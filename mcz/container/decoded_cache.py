@@ -1,4 +1,4 @@
-"""What was decoded of a file and may be asked for again, as neighboring windows do."""
+"""Cache of decoded segments, for neighboring windows."""
 
 from __future__ import annotations
 

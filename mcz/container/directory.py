@@ -1,4 +1,4 @@
-"""What a file holds and where: built by the writer, by a scan, or from INDX (``index.py``)."""
+"""Directory of a file: built by the writer, by a scan, or from INDX (``index.py``)."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class ClipRow:
         return None
 
     def __eq__(self, other: object) -> bool:
-        """Whether the two say the same, one of them perhaps packed."""
+        """Compare contents, one of them perhaps packed."""
         if not isinstance(other, ClipRow):
             return NotImplemented
         return all(getattr(self, f.name) == getattr(other, f.name) for f in fields(ClipRow))

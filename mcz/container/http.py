@@ -133,7 +133,7 @@ class HttpFile(io.RawIOBase):
 
 
 def _is_empty(answer: Answer) -> bool:
-    """Whether the answer says that the file has no bytes, so no range of them either."""
+    """Return True if the answer states an empty file, which has no range."""
     found = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
     return answer.status == 416 and found is not None and found[3] == "0"
 

@@ -35,7 +35,7 @@ sleep = time.sleep
 
 
 class Answer(NamedTuple):
-    """What a server answers; of ``body`` no more than was asked for, and a byte."""
+    """A server's answer; ``body`` is at most the requested bytes and one more."""
 
     status: int
     reason: str
@@ -44,7 +44,7 @@ class Answer(NamedTuple):
 
 
 class _Goal(NamedTuple):
-    """Where a request goes."""
+    """Address of a request."""
 
     scheme: str
     host: str
@@ -216,7 +216,7 @@ def _exchange(line: _Line, goal: _Goal, headers: dict[str, str], most: int) -> t
 
 
 def _words(error: Exception) -> str:
-    """What went wrong, in words."""
+    """Describe an error."""
     if isinstance(error, http.client.IncompleteRead):
         came = len(error.partial)
         return f"{came + (error.expected or 0)} bytes are announced, {came} came"
@@ -226,7 +226,7 @@ def _words(error: Exception) -> str:
 
 
 def _may_pass(error: Exception) -> bool:
-    """Whether another attempt may do better."""
+    """Return True if a retry may succeed."""
     if isinstance(error, ConnectionRefusedError | ssl.SSLError):
         return False
     return isinstance(error, ConnectionError | TimeoutError | http.client.IncompleteRead)

@@ -220,7 +220,7 @@ class ClipTables:
 
     @cached_property
     def _fields(self) -> list[tuple[Any, ...]]:
-        """Of each clip the fields of its row, and places in other tables."""
+        """Fields of each clip's row, and places in other tables."""
         number, bounds = self.clips.numbers, (self.signal_bounds, self.segment_bounds)
         columns = [
             *(number(name) for name in ("skeleton", "n_frames")),

@@ -34,7 +34,7 @@ class Profile:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many joints and channels a skeleton may have, checked while it is parsed."""
+        """Greatest numbers of joints and channels of a skeleton, checked while it is parsed."""
         return {"joints": self.joints, "channels": self.channels}
 
 
@@ -111,7 +111,7 @@ def output_limit(file_bytes: int) -> int:
 
 
 class Search:
-    """What a search for the next whole thing reads in vain, which is seldom much."""
+    """Budget of bytes that a search for the next whole chunk may read in vain."""
 
     def __init__(self) -> None:
         self.tried = 0

@@ -1,4 +1,4 @@
-"""Who writes to a file: one process at a time, and others can tell that one is at it.
+"""Write locks: one process writes to a file at a time, and others can see that it does.
 
 A lock is advice, which not every file system takes; where none can be had, all goes on without.
 """
@@ -26,7 +26,7 @@ def lock(stream: BinaryIO) -> bool:
 
 
 def is_locked(stream: BinaryIO) -> bool:
-    """Whether another process has taken the file of ``stream``."""
+    """Return True if another process has locked the file of ``stream``."""
     taken = _take(stream)
     if taken:
         _release(stream)
@@ -34,7 +34,7 @@ def is_locked(stream: BinaryIO) -> bool:
 
 
 def is_abandoned(stream: BinaryIO) -> bool:
-    """Whether no process has taken the file, of which one did once; this one has it then."""
+    """Return True, with the lock taken, for a file that its writer has abandoned."""
     return _take(stream) is True
 
 
@@ -42,7 +42,7 @@ if sys.platform == "win32":
     import msvcrt
 
     def _take(stream: BinaryIO) -> bool | None:
-        """Whether the file could be taken; None where there are no locks."""
+        """Try to lock the file; None on systems without locks."""
         return _lock_far(stream, msvcrt.LK_NBLCK)
 
     def _release(stream: BinaryIO) -> None:
@@ -63,7 +63,7 @@ else:
     import fcntl
 
     def _take(stream: BinaryIO) -> bool | None:
-        """Whether the file could be taken; None where there are no locks."""
+        """Try to lock the file; None on systems without locks."""
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:

@@ -1,4 +1,4 @@
-"""What is said of clips behind them, in chunks of their own: META.
+"""Metadata of clips in chunks of their own: META.
 
 SPEC.md, "META", is normative.
 """
@@ -24,7 +24,7 @@ PAIR = 100  # bytes that Python takes for a pair, beside its letters
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What a META says of the clip ``name``, or with "" of the whole file.
+    """A META record of the clip ``name``, or with "" of the whole file.
 
     ``removed`` are keys that are not there any more, ``entries`` what is there from now on.
     """
@@ -38,14 +38,14 @@ Placed = dict[str, list[tuple[int, Record]]]  # by name, each with where its MET
 
 
 class Remembered:
-    """What the CLIPs of a file say, for later questions; beyond ``MOST_KEPT`` nothing is kept."""
+    """Cache of the metadata in CLIPs, up to ``MOST_KEPT``."""
 
     def __init__(self) -> None:
         self._pairs: dict[str, dict[str, str]] = {}
         self._size = 0
 
     def of(self, row: ClipRow, payload: Callable[[Chunk], bytes]) -> Mapping[str, str]:
-        """What the CLIP of ``row`` says; its payload is asked for where that is not kept."""
+        """Return the metadata in the CLIP of ``row``, whose payload is read unless cached."""
         found = self._pairs.get(row.name)
         if found is None:
             clip = parse_until(payloads.Clip, payload(row.clip), row.clip.label, "source")
@@ -129,7 +129,7 @@ def records_in(
     *,
     lenient: bool,
 ) -> Placed:
-    """What META ``chunks`` say of each name, and where they begin, in file order.
+    """Collect the META records of each name, and their offsets, in file order.
 
     ``lenient``: of one that is damaged nothing is taken, and nothing raised.
     """

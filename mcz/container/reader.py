@@ -177,18 +177,18 @@ class Container:
 
     @cached_property
     def _records(self) -> Placed:
-        """What META chunks say of each name, read once."""
+        """META records of each name, read once."""
         chunks = self.directory.clips.ancillary(ChunkType.META)
         return records_in(chunks, self.payload, self.source.size, lenient=self.salvage)
 
     def said_of(self, name: str) -> list[Record]:
-        """What META chunks behind the clip ``name`` say of it; "": of the file as a whole."""
+        """META records of the clip ``name``; "": of the file as a whole."""
         row = self.directory.clips.get(name)
         start = row.clip.offset if row is not None else 0
         return [record for at, record in self._records.get(name, ()) if at > start]
 
     def metadata(self, row: ClipRow) -> dict[str, str]:
-        """What CLIP says of a clip, and META chunks behind it."""
+        """Metadata of a clip: those in CLIP, updated by META chunks behind it."""
         return applied(self._said.of(row, self.payload), self.said_of(row.name))
 
     def copies(self) -> list[Chunk]:
@@ -331,7 +331,7 @@ class Container:
         return table, got
 
     def in_part(self, row: SegmentRow) -> bool:
-        """Whether less than the whole segment may be read: not where one request gets it all."""
+        """Return True if parts of a segment are read alone: not if one request gets it all."""
         return self.reads_parts and row.packet != FRAME and row.size > self.source.gap
 
     def _all_streams(
@@ -383,7 +383,7 @@ class Container:
 
 
 def _reopened(source: ByteSource, options: Settings) -> Container:
-    """What a pickled Container becomes: the same file, opened anew, closed when it is let go."""
+    """Reopen the file of a pickled Container; it is closed when it is released."""
     try:
         container = Container(source, **options)
     except BaseException:

@@ -118,7 +118,7 @@ class Salvager(Scanner):
         raise fault.error
 
     def _is_repeated(self, event: ChunkEvent) -> bool:
-        """Whether it lies in a REPT whose own header is damaged: the clip that is open goes on."""
+        """Return True for a chunk in a REPT with a damaged header: the open clip goes on."""
         kind = event.chunk.type
         if kind not in REPEATED:
             return False

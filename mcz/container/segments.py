@@ -19,7 +19,7 @@ KNOWN_FLAGS = 15 | EXTENDED
 
 @dataclass(frozen=True, slots=True)
 class StreamCounts:
-    """What CLIP says about the streams of one signal."""
+    """Counts of one signal's streams, from CLIP."""
 
     n_groups: int
     n_resolutions: int
@@ -48,7 +48,7 @@ class SegmentHeader:
 
 @dataclass(frozen=True, slots=True)
 class StreamTable:
-    """Where each stream lies in the payload; an empty one has length 0.
+    """Places of streams in a payload; an empty one has length 0.
 
     ``size`` is the offset of the first stream.
     """

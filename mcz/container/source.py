@@ -140,7 +140,7 @@ class ByteSource:
             self._stream = _remote_stream(self.target)
 
     def grows(self) -> bool:
-        """Whether another process is appending to the file."""
+        """True while another process appends to the file."""
         return self._positioned and is_locked(self._stream)
 
     def size_now(self) -> int:
@@ -232,7 +232,7 @@ def path_of(target: Target) -> str | os.PathLike[str] | None:
 
 
 def _is_plain_file(stream: object) -> bool:
-    """Whether positions of ``stream`` are those of a file on disk, which can be read at any."""
+    """Return True for a stream over a file on disk, which can be read at any position."""
     raw = stream.raw if isinstance(stream, io.BufferedReader) else stream
     return isinstance(raw, io.FileIO) and hasattr(os, "pread")
 
@@ -261,7 +261,7 @@ def open_source(target: Target) -> ByteSource:
 
 
 def _remote_stream(target: str) -> Any:
-    """What reads ``target``, a URL; raises OptionError or AccessError."""
+    """Open ``target``, a URL; raises OptionError or AccessError."""
     if target.lower().startswith(("http://", "https://")):
         from mcz.container.http import HttpFile
 
@@ -289,13 +289,13 @@ def file_system(url: str) -> tuple[Any, str]:
 
 
 def _no_access(name: str, error: Exception) -> AccessError:
-    """That a file cannot be read, whatever its file system calls that."""
+    """Error of a file that cannot be read, whatever its file system raises."""
     text = "no such file" if isinstance(error, FileNotFoundError) else reason_of(error)
     return AccessError(text, path=name)
 
 
 def _is_remote(stream: object) -> bool:
-    """Whether every read of ``stream`` is a request, as of an fsspec file that holds none."""
+    """Return True if every read of ``stream`` is a request, as of an unbuffered fsspec file."""
     if isinstance(stream, io.RawIOBase) and getattr(stream, "is_remote", False):
         return True
     return hasattr(stream, "fs") and not isinstance(getattr(stream, "f", None), io.IOBase)

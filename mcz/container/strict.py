@@ -1,4 +1,4 @@
-"""What a strict walk checks within the chunks that it passes, beside their grammar.
+"""Checks of a strict pass within chunks, beside their grammar.
 
 What only decoding shows is checked where clips are decoded. SPEC.md, "Strict reading", "QUAL",
 "META" and "COPY", are normative.
@@ -25,7 +25,7 @@ OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset(range(2, 14))
 
 
 def is_plain_path(name: str) -> bool:
-    """Whether ``name`` is a relative path that stays below its folder, on every system."""
+    """Return True for a relative path that stays below its folder on every system."""
     parts = name.split("/")
     # PATH-01, PATH-02, PATH-03, PATH-04
     odd = any(part in ("", ".", "..") for part in parts) or "\\" in name or "\0" in name

@@ -34,7 +34,7 @@ class Cluster:
 
     @property
     def jobs(self) -> int:
-        """How many tasks it does at once; raises WorkerError where it has no worker."""
+        """Number of tasks at once; raises WorkerError for a cluster without workers."""
         n_threads = sum(self._client.nthreads().values())
         if not n_threads:
             raise WorkerError("the cluster has no worker", path=self._client.scheduler.address)
@@ -43,7 +43,7 @@ class Cluster:
     def in_order(
         self, function: Callable[[Any, Item], Result], items: Iterable[Item | None], state: object
     ) -> Generator[Answer[Result] | None, None, None]:
-        """What gives ``function(state, item)`` for each item, in order; for None, None."""
+        """Yield ``function(state, item)`` for each item, in order; for None, None."""
         import cloudpickle
 
         packed = cloudpickle.dumps((function, state))

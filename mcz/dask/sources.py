@@ -76,7 +76,7 @@ def _opened(url: str) -> tuple[Any, str]:
 
 
 def skeletons_beside(name: str, skeletons: list[str]) -> tuple[str, ...]:
-    """Of an AMC the ASFs that ``mcz.formats.find`` looks at: in its folder, a sibling ``asf``."""
+    """ASFs that ``mcz.formats.find`` tries for an AMC: in its folder, and in a sibling ``asf``."""
     path = PurePosixPath(name)
     if not wants_skeleton(name):
         return ()

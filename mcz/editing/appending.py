@@ -36,7 +36,7 @@ BLOCK = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """What lies behind the last FOOT of a file whose writing was cut short: names of whole things.
+    """Names of whole things behind the last FOOT of a file whose writing was cut short.
 
     ``kept`` is True where the file goes on behind them, False where it goes on in their place.
     """
@@ -56,7 +56,7 @@ class Growth:
 
 @contextmanager
 def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
-    """What the block writes lands behind the last valid FOOT, in place of what was cut short there.
+    """Append what the block writes behind the last valid FOOT, over anything cut short there.
 
     Where whole clips, skeletons or attachments lie behind that FOOT, ``salvage`` keeps them and
     ``force`` gives them up; otherwise that is a FormatError that names them. Where the end of the
@@ -146,7 +146,7 @@ def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tup
 
 
 def _names(container: Container | None) -> set[str]:
-    """What can be restored by name."""
+    """Names that can be restored."""
     if container is None:
         return set()
     rows = container.directory
@@ -154,7 +154,7 @@ def _names(container: Container | None) -> set[str]:
 
 
 def _whole_until(source: ByteSource, start: int) -> int:
-    """Where the last whole thing behind ``start`` ends; nothing counts behind the first fault."""
+    """End of the last whole thing behind ``start``; nothing counts behind the first fault."""
     end = at = start or len(SIGNATURE)
     inside = False
     found = scan(source, salvage=True)
@@ -171,7 +171,7 @@ def _whole_until(source: ByteSource, start: int) -> int:
 
 
 def _is_last_part(source: ByteSource, chunk: Chunk) -> bool:
-    """Whether ``chunk`` ends a thing: of an attachment only the last part does."""
+    """Return True if ``chunk`` ends a thing: of an attachment only the last part does."""
     if chunk.type != ChunkType.ATTA:
         return True
     fields = parse(payloads.Atta, read_payload(source, chunk, chunk.size), chunk.label)

@@ -1,4 +1,4 @@
-"""What became of the files of a command over many."""
+"""Reports of commands over many files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mcz.text_format import brief
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one file, and why where that is not plain.
+    """Outcome for one file, with a reason unless it is plain.
 
     ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
     "present" (the target has it already), "restored", or "cut" or "lossy" of a clip that is no

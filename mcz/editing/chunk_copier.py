@@ -31,7 +31,7 @@ BLOCK = 1 << 20  # bytes of an open DATA that are copied at once
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What is said otherwise of a clip that is carried over; None: as it was.
+    """Changes of a clip that is copied; None: unchanged.
 
     ``name`` of the clip, ``path`` of its source, ``rate`` in frames a second, ``metadata`` of CLIP.
     """
@@ -174,7 +174,7 @@ class Carrier:
             raise FormatError(f"{row.cend.label} is not where the index says", clip=row.name)
 
     def _body(self, row: ClipRow, new: PackedClipRow) -> None:
-        """What lies between CLIP and CEND, and CEND; ``new`` learns where."""
+        """Copy the chunks from behind CLIP up to CEND; ``new`` records their places."""
         packed = segment_rows(row)
         moved: list[tuple[int, int]] = []  # from where on how many bytes less lie before
         less = 0
@@ -197,7 +197,7 @@ class Carrier:
 
 
 def said_of(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
-    """What META chunks say of the file, and of clips by their old and new names."""
+    """META records of the file, and of clips by their old and new names."""
     pairs = [("", ""), *names]
     said = ((new, container.said_of(old)) for old, new in pairs)
     return [as_one(new, records) for new, records in said if records]

@@ -149,7 +149,7 @@ def join(part: Part, draft: Draft, clip: str) -> None:
 
 
 def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask | None]:
-    """What is to be coded ahead; None for what may turn out to be there already."""
+    """Yield the sources to encode ahead; None for one that may turn out to be there already."""
     sent: set[bytes] = set()
     for entry in entries:
         try:

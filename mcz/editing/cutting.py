@@ -1,4 +1,4 @@
-"""What is left of a clip when frames, joints or resolutions are cut from its stored bytes.
+"""Cuts of stored clips by frames, joints or resolutions.
 
 SPEC.md, "Cutting without re-encoding", is normative. ``extraction.py`` writes what is planned here.
 """
@@ -34,7 +34,7 @@ WITHOUT_CHANNELS = "the channels of other joints were cut"
 
 @dataclass(frozen=True, slots=True)
 class SignalCut:
-    """What is left of one signal: segments, groups, and all but ``dropped`` finest resolutions.
+    """A cut of one signal: segments, groups, and all but ``dropped`` finest resolutions.
 
     ``skip`` and ``spare`` are those of the cut signal.
     """
@@ -58,7 +58,7 @@ class SignalCut:
 
 @dataclass(frozen=True, slots=True)
 class ClipCut:
-    """What is left of one clip: frames start <= f < stop, these joints (None: all).
+    """A cut of one clip: frames start <= f < stop, these joints (None: all).
 
     ``signals`` are empty where it is coded ``anew``.
     """
@@ -81,7 +81,7 @@ class ClipCut:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is cut."""
+        """True if nothing is cut."""
         return self.has_all_frames and self.joints is None and not self.resolution
 
     @property
@@ -100,7 +100,7 @@ def plan_cut(
     resolution: int,
     anew: bool = False,
 ) -> ClipCut:
-    """What is left of ``clip``; raises OptionError or MotionError where it cannot be cut so.
+    """Plan a cut of ``clip``; raises OptionError or MotionError for an impossible one.
 
     With ``anew`` joints may be chosen that are coded in one group with others, and no frame is
     stored that is not shown.

@@ -60,7 +60,7 @@ from mcz.writing.tuning import write_motion
 
 @dataclass(frozen=True, slots=True)
 class ExtractedClip:
-    """What was cut: frames a <= f < b of a clip, joints (None: all), finest resolutions.
+    """An extracted clip: frames a <= f < b, joints (None: all), finest resolutions.
 
     ``stored_frames`` are those whose bytes were copied; the two sizes are of whole DATA payloads.
     ``recoded``: it was decoded and coded anew.
@@ -197,7 +197,7 @@ class Copier(Carrier):
             self.attachment(name)
 
     def is_same(self, cut: ClipCut) -> bool:
-        """Whether the clip stays what it was."""
+        """Return True if the clip is unchanged."""
         return cut.is_whole and not cut.anew
 
     def write(self, cut: ClipCut) -> None:
@@ -271,7 +271,7 @@ class Copier(Carrier):
         return self.container.clip(self.container.directory.clips[cut.clip.name])
 
     def name_of(self, cut: ClipCut) -> str:
-        """What the clip is called from now on."""
+        """New name of the clip."""
         return cut.clip.name
 
     def finish_record(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:

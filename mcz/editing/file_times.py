@@ -1,4 +1,4 @@
-"""When a file was last changed, as the metadata key ``mtime`` has it: ISO 8601 in UTC."""
+"""Times of last change, as the metadata key ``mtime`` has them: ISO 8601 in UTC."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def motion_files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
 
 
 def _is_motion(path: Path) -> bool:
-    """Whether a file has the suffix of a source format and, where others use that, looks like it.
+    """Return True for a suffix of a source format, with fitting content where others use it, too.
 
     One that cannot be read counts: whoever wants it is told so.
     """

@@ -1,4 +1,4 @@
-"""What is said of clips, and their frame rates, set later: nothing of their values is touched."""
+"""Edits of metadata and frame rates, without re-encoding."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _respelled(said: Said) -> Said:
 
 
 def _record(file: File, name: str, said: Said) -> Record:
-    """What changes; nothing where all is said already."""
+    """Record of the changes; empty if nothing changes."""
     clip = file.only_clip(name) if name else None
     before = file.metadata if clip is None else clip.metadata
     entries = {k: v for k, v in said.items() if v is not None and before.get(k) != v}

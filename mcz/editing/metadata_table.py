@@ -1,4 +1,4 @@
-"""What a table says of clips: a row each, a column a key of their metadata."""
+"""Tables of metadata: a row a clip, a column a key."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def from_table(
     take: Sequence[str] | None = None,
     skip_unknown: bool = False,
 ) -> tuple[dict[str, dict[str, str]], list[str]]:
-    """What a table (CSV or TSV, UTF-8, with a head) says of the clips of ``file``, by name.
+    """Read the metadata of the clips of ``file`` from a table (CSV or TSV, UTF-8, with a head).
 
     A row names its clip in a column ``clip``, ``name``, ``path`` or ``file``, or by ``match``, a
     text with columns in braces: "{subject:0>2}_{trial:0>2}". That is a name as ``File.only_clip``
@@ -105,7 +105,7 @@ def _fields(match: str) -> list[str]:
 def _namer(
     path: str | os.PathLike[str], head: Sequence[str], match: str | None
 ) -> Callable[[Mapping[str, str]], str]:
-    """What tells the name of a row's clip."""
+    """Return a function that names the clip of a row."""
     if match is not None:
         form = match
         for name in _fields(form):

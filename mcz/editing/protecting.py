@@ -33,7 +33,7 @@ TRIES = 16  # to find the size of an index that names the chunk whose size depen
 
 @dataclass(frozen=True, slots=True)
 class Protection:
-    """What recovery data can do: of ``n_blocks`` blocks any ``n_recovery`` may be bad.
+    """Strength of recovery data: of ``n_blocks`` blocks any ``n_recovery`` may be bad.
 
     So may ``burst`` bytes in a row, wherever they lie. ``start`` and ``stop``: the bytes of the
     file that it is about; ``cost`` those that it takes.
@@ -88,7 +88,7 @@ def protection_of(shape: Shape) -> Protection:
 
 
 def protections(container: Container) -> list[Key]:
-    """What the RECV chunks of a file say of themselves, in its order; nothing is checked."""
+    """Keys of the RECV chunks of a file, in its order, unchecked."""
     found = []
     for chunk in recovery_chunks(container):
         packet = read_packet(container.source, chunk.payload_offset)
@@ -99,7 +99,7 @@ def protections(container: Container) -> list[Key]:
 
 
 def redundancy_of(container: Container) -> float | None:
-    """What a file is protected with, from its greatest part; None where it is not."""
+    """Redundancy of a file's greatest protected part; None for an unprotected file."""
     shapes = [key.shape for key in protections(container)]
     if not shapes:
         return None

@@ -124,7 +124,7 @@ def _editable(clip: Clip, joint: int | str) -> int:
 
 
 def is_coded_with_others(clip: Clip, joint: int | str) -> bool:
-    """Whether a group of the joint's channels has channels of another one."""
+    """Return True if a group has channels of this joint and of another."""
     return groups_of(clip, (_editable(clip, joint),))[1] is not None
 
 
@@ -220,7 +220,7 @@ def _placed(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
 
 
 def _source_of(clip: Clip, info: SignalInfo, signal: Signal) -> MemorySource:
-    """What the codec reads: all stored frames, of which ``signal`` are those that are shown."""
+    """Source for the codec: all stored frames, of which ``signal`` has those shown."""
     if info.skip or info.spare:
         signal = _with_hidden(clip, info, signal)
     motion = Motion(clip.skeleton, (signal,), name=clip.name)

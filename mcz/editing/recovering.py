@@ -34,7 +34,7 @@ SLACK = BLOCK = 1 << 20
 
 @dataclass(slots=True)
 class Recovery:
-    """What recovery data found and did: bad blocks of all, and the bytes of the file they are.
+    """Result of a recovery: bad blocks of all, and the bytes of the file that they cover.
 
     ``possible``: no more blocks are bad than there are recovery blocks. ``behind``: bytes behind
     the last that is protected, taken as they are.
@@ -51,7 +51,7 @@ class Recovery:
     __repr__ = brief
 
     def told(self) -> list[str]:
-        """What was bad, a line each; nothing for a file that is as it was."""
+        """Lines on bad blocks; none for an intact file."""
         if not (self.bad_blocks or self.bad_recovery):
             return []
         of = f"{self.bad_blocks:,} of {self.n_blocks:,} blocks are bad"
@@ -254,7 +254,7 @@ class Restorer:
             at += len(data)
 
     def rest(self, last: _Set, size: int) -> None:
-        """What lies behind all that is protected, as it is."""
+        """Copy the bytes behind all protected ones."""
         stop = self.source.size
         self.out.seek(last.shape.stop)
         for at in range(stop - size, stop, BLOCK):
@@ -263,7 +263,7 @@ class Restorer:
 
 
 def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
-    """What is bad in a file, by its recovery data, and what of it is where."""
+    """Examine a file by its recovery data: bad blocks, and their places."""
     starts, chain, at = recovery_sets(source), list[Examined](), 0
     while at in starts:
         tried = map(partial(_examined, source), starts[at])
@@ -291,7 +291,7 @@ def _behind(source: ByteSource, last: Examined) -> int:
 
 
 def checked(target: Target) -> Recovery | None:
-    """What the recovery data of a file find bad in it; None where it has none.
+    """Check a file by its recovery data; None for a file without any.
 
     Raises AccessError where it cannot be read.
     """
@@ -331,7 +331,7 @@ def recover(
 
 
 class NotThatError(FormatError):
-    """What was put together is not what was protected."""
+    """The recovered bytes are not the protected ones."""
 
 
 def _steps(progress: Progress) -> Step:

@@ -77,7 +77,7 @@ def _on_binary_grids(signal: Signal) -> Signal:
 
 
 def joints_alone(cut: ClipCut) -> Motion:
-    """What is left of a clip, decoded: its other joints have no channels, its source is gone."""
+    """Decode the joints of a cut: other joints have no channels, and the source is gone."""
     motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
     if cut.joints is None:
         return motion

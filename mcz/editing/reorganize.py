@@ -110,7 +110,7 @@ def _named(file: File, name: str) -> Thing:
 
 
 def _without(file: File, gone: Collection[Thing]) -> Plan:
-    """What stays when ``gone`` goes, and what is there for the sake of that alone."""
+    """Plan a file without ``gone`` and without anything that only these need."""
     plan = whole(file)
     plan.things = {thing: SAME for thing in plan.things if thing not in gone}
     needed = used_by(file, plan.of(CLIP))
@@ -225,7 +225,7 @@ def in_order(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
 
 
 def natural(value: Value) -> tuple[object, ...]:
-    """What sorts numbers as numbers, also those within a text: "take2" before "take10"."""
+    """Sort key that takes numbers within texts as numbers: "take2" before "take10"."""
     if isinstance(value, str):
         parts = re.split(r"([0-9]+)", value)
         return 1, [(int(part), part) if part.isdigit() else (-1, part.casefold()) for part in parts]
@@ -303,7 +303,7 @@ def _check_outputs(outputs: Iterable[Path], force: bool) -> None:
 
 
 def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
-    """What goes into the file of these clips; ``with_rest``: and all that is no clip's."""
+    """Plan the file of these clips; ``with_rest``: with all that is no clip's."""
     needed = used_by(file, names)
     if with_rest:
         needed |= set(file.container.directory.shared) - used_by(file, file.clips)

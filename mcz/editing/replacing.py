@@ -39,7 +39,7 @@ RECODED = "edit-recoded"
 
 @dataclass(frozen=True, slots=True)
 class Replacement:
-    """What ``replace`` did.
+    """Result of ``replace``.
 
     The two numbers of bytes are those of the joint's streams, its masks and its exceptions: numbers
     off the grid, which are counted, too. ``max_error``: how far a decoded value is from the one

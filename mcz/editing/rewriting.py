@@ -1,4 +1,4 @@
-"""What of a file goes into a new one, and the writing of that: chunks are carried over, not coded.
+"""Rewriting of files: chunks are copied, not encoded.
 
 ``carrying.py`` carries, this module plans. The old file keeps its name until the new one is whole
 and was walked from end to end. ``protect``, which may rewrite a file, is here as well.

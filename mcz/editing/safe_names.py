@@ -26,7 +26,7 @@ LONGEST = 255  # bytes of UTF-8 that a part of a path may have
 
 
 def fault_of(part: str) -> str:
-    """Why not every system can hold a part of a path; "" where all can."""
+    """Name the fault of a path's part that not every system can hold; "" for none."""
     if odd := HIDDEN.search(part) or ODD.search(part):
         return f"it has {odd[0]!a}"
     if DEVICES.fullmatch(part):
@@ -39,14 +39,14 @@ def fault_of(part: str) -> str:
 
 
 def folded(name: str) -> str:
-    """What names have in common that one disk or another takes for the same."""
+    """Fold a name as disks that ignore case or accents do."""
     if name.isascii():
         return name.lower()
     return unicodedata.normalize("NFC", unicodedata.normalize("NFKC", name).casefold())
 
 
 def notes_on(names: Iterable[str], of: Collection[str] | None = None) -> dict[str, str]:
-    """Of each path that not every system can hold, or not beside another, why.
+    """Reasons by path, for each that not every system can hold, alone or beside another.
 
     ``of``: those that are asked about, None: all.
     """
@@ -135,7 +135,7 @@ class Folder:
         self._written: dict[tuple[int, int], str] = {}  # device and number of a file -> its path
 
     def place(self, path: str, *, force: bool) -> Path:
-        """Where to write the file ``path``; the folders above it are made.
+        """Return the place of the file ``path``, with the folders above it created.
 
         Raises AccessError where a link, or what is neither file nor folder, stands in the way, and
         ExistsError for a file that is there, which with ``force`` is one that was just written: the
@@ -184,7 +184,7 @@ class Folder:
 
 
 def _found(place: Path) -> os.stat_result | None:
-    """What is there itself, not what it leads to; None where there is nothing."""
+    """Stat a path without following links; None if nothing is there."""
     try:
         return place.lstat()
     except FileNotFoundError:
@@ -194,7 +194,7 @@ def _found(place: Path) -> os.stat_result | None:
 
 
 def _is_junction(place: Path) -> bool:
-    """Whether it is a folder of Windows that leads elsewhere."""
+    """Return True for a junction of Windows."""
     attributes = getattr(place.lstat(), "st_file_attributes", 0)
     return bool(attributes & getattr(stat, "FILE_ATTRIBUTE_REPARSE_POINT", 0))
 

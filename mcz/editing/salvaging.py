@@ -156,7 +156,7 @@ def _cuts(file: File, found: Repair) -> Iterator[ClipCut]:
 
 
 def _faults(problems: list[Problem]) -> list[Problem]:
-    """Those that are not this reader's, which lacks a codec."""
+    """Drop problems of this reader, which lacks a codec."""
     return [problem for problem in problems if problem.heading != "Codecs"]
 
 
@@ -212,7 +212,7 @@ def _lost(clip: Clip, runs: list[WholeRun], problems: list[Problem]) -> Iterator
 
 
 def _source_error(clip: Clip) -> str:
-    """Why the source of a clip cannot be put together, as far as its template is to blame."""
+    """Reason why a source cannot be restored, if its template is to blame; else ""."""
     row = clip.container.directory.clips[clip.name]
     try:
         source = clip.container.clip(row).source

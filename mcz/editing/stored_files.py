@@ -1,4 +1,4 @@
-"""Which files an MCZ file restores, and what is in them: read by hand, for there may be many."""
+"""Files that an MCZ file restores: read without records, for there may be many."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Content = dict[bytes, tuple[int, bytes]]  # SHA-256 of a file -> what ALIA says 
 
 
 def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
-    """What ``container`` restores under each path, its SHA-256 or what finds it; and by content.
+    """Index the restored files by path, with their SHA-256 or its getter, and by content.
 
     What is damaged cannot be restored, and is left out.
     """

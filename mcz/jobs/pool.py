@@ -66,7 +66,7 @@ class Pool:
     def in_order(
         self, function: Callable[[Any, Item], Result], items: Iterable[Item | None]
     ) -> Iterator[Answer[Result] | None]:
-        """What gives ``function(state, item)`` for each item, in order; for None, None.
+        """Yield ``function(state, item)`` for each item, in order; for None, None.
 
         ``function`` is one of a module. Items are taken as they are needed, few at a time.
         """

@@ -36,7 +36,7 @@ Shared = dict[tuple[bytes, bytes], bytes]  # kind and id -> chunk
 
 @dataclass(frozen=True, slots=True)
 class LiveClip:
-    """What a clip that is being read says of its motion; ``frame_rate`` None: unknown."""
+    """Head of a clip that is being read; ``frame_rate`` None: unknown."""
 
     name: str
     skeleton: Skeleton
@@ -65,7 +65,7 @@ def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
 
 
 def begin(head: bytes, shared: Shared, row: ClipRow, fields: payloads.Clip) -> ClipState | None:
-    """What decodes the frames of the clip that begins; None where its codec needs all of them.
+    """Return a decoder of the clip that begins; None for a codec that needs all frames.
 
     ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError where the clip needs
     one that is not there.

@@ -217,7 +217,7 @@ class LiveReader:
 
 
 def _rest(stage: PostFilter | None, waiting: deque[LiveFrame]) -> Iterator[LiveFrame]:
-    """What is still in the filter."""
+    """Yield the frames that are left in the filter."""
     if stage is not None:
         for row in stage.finish():
             yield _with_values(waiting.popleft(), row)

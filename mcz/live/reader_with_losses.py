@@ -41,7 +41,7 @@ MOST_REMARKS = 20
 
 @dataclass(slots=True)
 class StreamSummary:
-    """What came of a stream, in frames and bytes.
+    """Result of a stream, in frames and bytes.
 
     ``skipped`` frames did not come and were not made up either, since they were too many.
     ``payload_bytes`` are those of the codec's streams, the others of ``stream_bytes`` frame them.
@@ -131,7 +131,7 @@ class FramesWithLosses:
             raise FormatError(text)
 
     def _spend(self, count: int) -> bool:
-        """Whether so many frames may be made up; says so where not."""
+        """Return True if so many frames may be concealed; else note the limit."""
         if self._made_up + count <= MOST_MADE_UP + self.size:
             self._made_up += count
             return True

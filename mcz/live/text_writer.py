@@ -102,7 +102,7 @@ def _whole_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
 def _arriving(
     lines: Iterable[bytes], source_format: str, options: SourceOptions
 ) -> tuple[Arriving, Skeleton | None]:
-    """What comes line by line, and the skeleton that it needs beside it."""
+    """Open a source that arrives line by line, and the skeleton that it needs."""
     found = FORMATS.get(source_format)
     if found is None or found.arrive is None:
         able = ", ".join(f.name for f in FORMATS.values() if f.arrive is not None)
@@ -125,7 +125,7 @@ def _remark(arriving: Arriving, options: SourceOptions) -> tuple[str, ...]:
 
 
 def codes_live(codec: str, params: Params) -> bool:
-    """Whether the codec of that name, with these parameters, codes frame by frame.
+    """Return True if the codec of that name, with these parameters, codes frame by frame.
 
     Raises OptionError for a codec or a parameter that there is not.
     """

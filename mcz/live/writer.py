@@ -364,7 +364,7 @@ class _Outlet:
         return sum(map(len, self._parts))
 
     def chunks(self, kinds: Sequence[bytes]) -> bytes:
-        """Those of the chunks that were collected that are of these types, in order."""
+        """Join the collected chunks of these types, in order."""
         return b"".join(part for part in self._parts if part[:4] in kinds)
 
     def send(self) -> None:

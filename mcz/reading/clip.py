@@ -313,7 +313,7 @@ class Clip(StoredClip):
         return column_of(self.read(signal=index)[:, 0], info.grids[0], unit_of_times(info))
 
     def preview(self, joints: Joints = None) -> FrameValues:
-        """What can be read without decoding the rest: frames, counted from 0, and their values.
+        """Read the frames that need no decoding of the rest, counted from 0, and their values.
 
         The values, of shape (frames, channels of the joints), are those that ``read`` gives for
         these frames where the codec has some that it stores apart (qbc: its marks); otherwise
@@ -413,7 +413,7 @@ class Clip(StoredClip):
 
 
 def _reopened(container: Container, name: str) -> Clip:
-    """What a pickled Clip becomes; raises OptionError where the file has changed meanwhile."""
+    """Reopen a pickled Clip; raises OptionError if the file has changed meanwhile."""
     row = container.directory.clips.get(name)
     if row is None:
         raise OptionError(f"the clip {name!r} is no longer there", path=container.source.name)

@@ -236,7 +236,7 @@ def recovery_chunks(container: Container) -> list[Chunk]:
 
 
 def recovery_problems(container: Container) -> Iterator[tuple[str, list[Problem]]]:
-    """Of each RECV the bytes that it protects, and what is wrong with it."""
+    """Yield the protected bytes of each RECV, and its faults."""
     for chunk in recovery_chunks(container):
         try:
             yield _checked(container.source, chunk), []

@@ -1,4 +1,4 @@
-"""What a query may ask of a clip: its fields by name, and its metadata. See docs/queries.md.
+"""Fields and metadata of clips by name, as queries use them. See docs/queries.md.
 
 A field costs no more than it must: the first of the table are in the index of the file, the others
 read the CLIP or the skeleton of the clip.
@@ -41,7 +41,7 @@ METADATA = "metadata."  # before a key, where a field has the same name
 
 
 def taken(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> list[Clip]:
-    """Those of ``clips`` that ``where`` takes; ``of`` are all clips of their file.
+    """Filter ``clips`` by the query ``where``; ``of`` are all clips of their file.
 
     Raises OptionError for a text that is no query, and for a name in it that no clip knows.
     """
@@ -66,7 +66,7 @@ def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:
 
 
 def _getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
-    """What gives the value of a name in a query: the field, or the metadata key of any clip."""
+    """Return the getter of a name in a query: a field, or a metadata key of any clip."""
     found = _known(name, clips)
     if found is None:
         raise query.unknown(name, _names(name, clips))
@@ -74,7 +74,7 @@ def _getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
 
 
 def getter_of(name: str, clips: Collection[Clip]) -> Getter:
-    """What gives the value of a field, or of a metadata key that any of ``clips`` has.
+    """Return the getter of a field, or of a metadata key that any of ``clips`` has.
 
     Raises OptionError for a name that is neither.
     """
@@ -126,7 +126,7 @@ def _duration(clip: Clip) -> Value:
 
 
 def _lossless(clip: Clip) -> Value:
-    """Whether every signal's codec is; missing where one is not known."""
+    """True if the codecs of all signals are lossless; missing if one is unknown."""
     try:
         return all(
             codec_by_id(s.codec, s.codec_version, s.preset).lossless for s in _row(clip).signals

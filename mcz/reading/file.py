@@ -71,7 +71,7 @@ class StoredSkeleton(NamedTuple):
 
 
 class AliasTarget(NamedTuple):
-    """What an alias is another name of: "clip", "skeleton" or "attachment", and which."""
+    """Target of an alias: its kind, "clip", "skeleton" or "attachment", and its name."""
 
     kind: str
     name: str
@@ -132,7 +132,7 @@ class File:
         return self.clips[name]
 
     def __contains__(self, thing: object) -> bool:
-        """Whether ``thing`` is a clip of this file, or a name that means one."""
+        """Return True for a clip of this file, or the name or alias of one."""
         if isinstance(thing, Clip):
             return thing.name in self.clips.rows and self.clips[thing.name] is thing
         return thing in self.clips
@@ -161,7 +161,7 @@ class File:
         return self.container.directory.aliases
 
     def alias_of(self, name: str) -> AliasTarget:
-        """What ``name`` is another name of: "clip", "skeleton" or "attachment", and which.
+        """Resolve an alias to the kind, "clip", "skeleton" or "attachment", and name of its target.
 
         That is its name, of a skeleton its id in hex, for its own file is what the name restores.
         """
@@ -173,12 +173,12 @@ class File:
 
     @property
     def metadata(self) -> Mapping[str, str]:
-        """What is said of the file as a whole, see ``Clip.metadata``."""
+        """Metadata of the file as a whole, see ``Clip.metadata``."""
         return applied({}, self.container.said_of(""))
 
     @property
     def damage(self) -> list[str]:
-        """What salvage found wrong, in file order."""
+        """Faults that salvage found, in file order."""
         return self.container.damage
 
     @property

@@ -21,7 +21,7 @@ GroupNotes = tuple[list[tuple[int, Grid]], list[tuple[int, int, bytes]]]
 
 
 class Noted:
-    """What the notes of segments say of ``n_rows`` rows, whose grids in CLIP are ``baseline``."""
+    """Notes of segments on ``n_rows`` rows, whose grids in CLIP are ``baseline``."""
 
     def __init__(self, baseline: Sequence[Grid], n_rows: int) -> None:
         self._baseline, self._n_rows = baseline, n_rows

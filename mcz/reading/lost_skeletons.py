@@ -227,7 +227,7 @@ def _of_base(container: Container, base: bytes) -> Iterator[bytes]:
 
 
 def _names(container: Container, lost: set[bytes]) -> list[str]:
-    """What an ASF that does not say it may be called."""
+    """Possible names of an ASF that states none."""
     aliases = container.directory.aliases.items()
     paths = [name for name, (_, target) in aliases if target in lost]
     return list(dict.fromkeys([*(PurePosixPath(path).stem for path in paths), NAMELESS]))

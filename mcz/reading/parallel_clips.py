@@ -32,7 +32,7 @@ def shared_out(
     items: Sequence[Item],
     said: object = None,
 ) -> Iterator[Iterator[Answer[Result]]]:
-    """What gives ``function((file, said), item)`` for each item, in order.
+    """Yield an iterator over ``function((file, said), item)`` for each item, in order.
 
     As many processes work as there may be (``mcz.jobs``), where they are worth it and can open the
     file; otherwise each call is done here when its answer is asked for.
@@ -57,7 +57,7 @@ def _checked(
 
 
 def can_be_shared(file: File) -> bool:
-    """Whether another process would read the same in the file.
+    """Return True if another process would read the same in the file.
 
     Not in one that was opened as a stream, that grows or of which salvage found the clips.
     """
@@ -68,6 +68,6 @@ def can_be_shared(file: File) -> bool:
 
 
 def only_own() -> bool:
-    """Whether every codec and format is one that another process has, too."""
+    """Return True if every codec and format is built in, so that another process has it."""
     formats = all(source.read.__module__.startswith(PACKAGE) for source in FORMATS.values())
     return formats and set(CODECS) <= set(ENTRIES)

@@ -83,7 +83,7 @@ def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> Json
 
 
 def joint_facts(skeleton: Skeleton) -> JsonObject:
-    """What ``mcz info`` says of the joints of a skeleton, wherever it comes from."""
+    """Facts of ``mcz info`` on the joints of a skeleton."""
     return {
         "n_joints": skeleton.n_joints,
         "n_channels": skeleton.n_channels,
@@ -209,7 +209,7 @@ def _arrays(clip: Clip) -> list[JsonObject] | None:
 
 
 def exceptions_info(container: Container, clip: Clip) -> JsonObject:
-    """How many tokens are coded as exceptions, and their share."""
+    """Number and share of tokens that are coded as exceptions."""
     n_exceptions = n_tokens = 0
     for signal in clip.signals:
         n_tokens += (

@@ -1,4 +1,4 @@
-"""What CLIP says of a signal, checked: channels, grids, groups, and where its segments lie."""
+"""Facts of a signal from CLIP, checked: channels, grids, groups and places of segments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from mcz.numbers import Grid, GridKind
 
 @dataclass(frozen=True, slots=True)
 class SignalInfo:
-    """What CLIP says of one signal, and where its segments lie.
+    """Facts of one signal from CLIP, and the places of its segments.
 
     ``layout`` and ``rows`` count stored frames, of which the clip shows those from ``skip`` on.
     """
@@ -75,7 +75,7 @@ class SignalInfo:
 
     @property
     def spans(self) -> list[Span]:
-        """What a codec is told of the segments."""
+        """Spans of the segments, as codecs take them."""
         headers = [row.header for row in self.rows]
         return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
 

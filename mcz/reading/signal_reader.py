@@ -212,7 +212,7 @@ class SignalReader:
             yield start, stop
 
     def _decode(self, spans: Sequence[Span], start: int, stop: int) -> Values:
-        """What the codec decodes; of groups of ordinals beside values their values."""
+        """Decode frames; groups of ordinals beside values become values."""
         of_ordinals = self.info.exact
         exact = tuple(group for group in self.groups if group in of_ordinals)
         if not exact:

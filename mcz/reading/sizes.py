@@ -272,7 +272,7 @@ def _segment_tables(file: File) -> Iterator[tuple[int, _Segment]]:
 
 
 def group_names(clip: Clip, signal: SignalInfo) -> list[tuple[int, str]]:
-    """Of each group its number and its joints; of one channel, or of a signal that has no joints,
+    """Number and joints of each group; for one channel, or a signal that has no joints,
     its channels."""
     if signal.channels is not None:
         owners = channels = [c.label or f"channel-{n}" for n, c in enumerate(signal.channels)]

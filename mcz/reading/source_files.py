@@ -59,7 +59,7 @@ def read_source(
 
 
 def _named(path: Path, reader: Any, data: bytes, *arguments: object) -> Any:
-    """What ``reader`` makes of ``data``; its errors say which file."""
+    """Read ``data`` with ``reader``; its errors name the file."""
     if not data:
         raise SourceError("the file is empty", path=path)
     try:

@@ -30,7 +30,7 @@ ANALOG = "analog"  # the role of signals whose stored numbers a source may have 
 
 @dataclass(frozen=True, slots=True)
 class SourceInfo:
-    """What is known of a source file without restoring it."""
+    """Facts of a source file that need no restoring."""
 
     format: str
     path: str

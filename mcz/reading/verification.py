@@ -44,7 +44,7 @@ def bytes_facts(source: ByteSource) -> JsonObject:
 
 
 def contents(file: File) -> JsonObject:
-    """What a file says that it holds; nothing is decoded."""
+    """List the contents of a file without decoding."""
     clips = [_clip(clip) for clip in file]
     skeletons = [_skeleton(file, id_) for id_, _ in file.skeletons]
     attachments = [_attachment(file, held) for held in file.attachments.values()]

@@ -103,7 +103,7 @@ def _cauchy_inverse(x: Ints, y: Ints) -> Ints:
 
 
 def _log_differences(points: Ints) -> Ints:
-    """Of each point the logarithm of the product of its differences from the others."""
+    """Logarithm of the product of each point's differences from the others."""
     _, log = logarithms()
     found = np.zeros(len(points), np.int64)
     for at, point in enumerate(points):

@@ -24,7 +24,7 @@ Step = Callable[[int, int], object]
 
 
 def made(shape: Shape, read: READ, step: Step | None = None) -> tuple[Key, Iterator[bytes]]:
-    """What the packets have in common, and these, in the order of the file."""
+    """Encode packets: their common key, and the packets in the order of the file."""
     digest, hashes = hashlib.sha256(), bytearray()
     for block in range(shape.n_blocks):
         data = read(block)
@@ -100,7 +100,7 @@ def computed(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int,
 def _rows(
     shape: Shape, read: READ, start: int, stop: int, step: Step | None
 ) -> Callable[[int, int], Ints]:
-    """What reads some lanes of data blocks."""
+    """Return a reader of lanes of data blocks."""
 
     def rows(first: int, last: int) -> Ints:
         found = np.empty((last - first, stop - start), np.int64)

@@ -1,4 +1,4 @@
-"""What lies where: the blocks of what is protected, and the packets behind it.
+"""Layout of protected blocks, and of the packets behind them.
 
 A RECV protects the bytes before it, from ``start`` on, and the ``t_size`` bytes behind it; together
 they are the *stream*, cut into blocks.
@@ -80,7 +80,7 @@ class Shape:
 
     @property
     def stop(self) -> int:
-        """Where the file ends that is protected."""
+        """End of the protected file."""
         return self.chunk_offset + self.chunk_size + self.t_size
 
     @property

@@ -50,7 +50,7 @@ class RecvPacket(Record):
 
 
 class Key(NamedTuple):
-    """What the packets of one RECV have in common."""
+    """Common fields of the packets of one RECV."""
 
     set_id: bytes
     shape: Shape

@@ -100,7 +100,7 @@ def _remote(target: str, force: bool) -> Iterator[BinaryIO]:
 
 
 def _is_special(path: Path) -> bool:
-    """Whether ``path`` is a device, a pipe or the like, which a rename would replace."""
+    """Return True for a device, a pipe or the like, which a rename would replace."""
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):

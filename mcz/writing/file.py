@@ -37,7 +37,7 @@ SHORT = 65536  # bytes of a source file whose skeleton and texts are a large par
 
 @dataclass(frozen=True, slots=True)
 class WrittenClip:
-    """Of a clip its name, the shape of its motion, and of a lossy one its quality record."""
+    """A written clip: name, shape of the motion, and the quality record of a lossy one."""
 
     name: str
     n_frames: int

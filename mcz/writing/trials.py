@@ -56,7 +56,7 @@ MOST_WEIGHT = 2.0**24
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What was asked for; the figure of that name must not exceed ``limit``.
+    """A target: the figure of that name must not exceed ``limit``.
 
     ``falls``: the figure falls as the files get smaller (a size), instead of rising (an error).
     ``weights``, (n_channels,), multiply the errors of channels; None where it is none of those.

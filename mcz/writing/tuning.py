@@ -299,7 +299,7 @@ def _fitting(dial: Dial, setting: float) -> float:
 
 
 def _neighboring(dial: Dial, a: float, b: float) -> bool:
-    """Whether no setting that would tell more lies between two."""
+    """Return True if no setting between two would be more precise."""
     return _ratio(a, b) < CLOSE or (dial.whole and abs(a - b) <= 1)
 
 

@@ -71,7 +71,7 @@ class Draft:
 
     @contextmanager
     def step(self) -> Iterator[None]:
-        """What the block writes is kept when the block ends well."""
+        """Keep what the block writes, if the block ends without an error."""
         before, offset = _snapshot(self.writer.directory), self.writer.offset
         try:
             yield
@@ -82,7 +82,7 @@ class Draft:
         self.keep()
 
     def holds(self, path: str, digest: bytes) -> bool:
-        """Whether the file restores these bytes as ``path``; raises where it restores others."""
+        """Return True if the file restores these bytes as ``path``; raise if it restores others."""
         if path not in self.paths:
             return False
         there = self.paths[path]
