@@ -1,4 +1,4 @@
-"""What turns, along time: whole turns between neighboring rows taken out.
+"""Unwrapping of angles and rotations along time.
 
 SPEC.md, "Unwrapping", is normative. An ``Unwrapper`` goes through a signal block by block; the
 result does not depend on where the blocks end.

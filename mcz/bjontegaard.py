@@ -37,7 +37,7 @@ def bd_rate(reference: Curve, other: Curve) -> float | None:
 
 
 def bd_sqnr(reference: Curve, other: Curve) -> float | None:
-    """What ``other`` has more in dB at equal size; None where nothing is shared."""
+    """Gain of ``other`` in dB at equal size; None if the ranges do not overlap."""
     a, b = front(reference), front(other)
     return _mean_difference((np.log10(a[0]), a[1]), (np.log10(b[0]), b[1]))
 
@@ -53,7 +53,7 @@ def _mean_difference(a: tuple[Values, Values], b: tuple[Values, Values]) -> floa
 
 
 def _integral(x: Values, y: Values, low: float, high: float) -> float:
-    """Of the PCHIP through (x, y), x ascending, from ``low`` to ``high``."""
+    """Integrate the PCHIP through (x, y), x ascending, from ``low`` to ``high``."""
     h = np.diff(x)
     secants = np.diff(y) / h
     slopes = pchip_slopes(h, secants)

@@ -1,4 +1,4 @@
-"""How far joints of the same names are from each other, in skeletons that are otherwise different.
+"""Distances of joints of equal names in different skeletons.
 
 SPEC.md's metrics compare points in order, which says nothing of an AMC and a BVH: the points of one
 are the ends of bones, those of the other where joints are. Here the origins of joints count.

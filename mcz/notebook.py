@@ -1,4 +1,4 @@
-"""How a notebook shows a motion: the one place where what lies below calls what lies above.
+"""Display of motions in notebooks: the one call from a lower layer to a higher one.
 
 By its name, and only when somebody asks: a Motion knows nothing of pages.
 """

@@ -217,7 +217,7 @@ def _markers() -> Iterator[tuple[str, str, Vector]]:
 
 
 def _placed(walk: Motion) -> dict[str, tuple[Floats, Floats]]:
-    """Of every joint its origin (n_frames, 3) and its turn (n_frames, 3, 3) in the world."""
+    """Origin (n_frames, 3) and turn (n_frames, 3, 3) of every joint in the world."""
     tracks = iter(walk.values.T)
     joints = walk.skeleton.joints
     placed: dict[str, tuple[Floats, Floats]] = {}
@@ -336,7 +336,7 @@ def _wobble(n_channels: int) -> Floats:
 
 
 def _local_rotation(joint: Joint, angles: dict[str, Floats]) -> Floats:
-    """What an Acclaim joint's angles do along the axes of its parent, (n_frames, 3, 3)."""
+    """Rotation of an Acclaim joint along the axes of its parent, (n_frames, 3, 3)."""
     frame = _fixed(*(np.full(1, np.deg2rad(angle)) for angle in joint.axis))[0]
     zero = np.zeros(N_FRAMES)
     turn = _fixed(*(np.deg2rad(angles.get(kind, zero)) for kind in ("rx", "ry", "rz")))

@@ -226,7 +226,7 @@ class Skeleton:
 
     @property
     def children(self) -> tuple[tuple[int, ...], ...]:
-        """Of every joint the joints whose parent it is, in joint order."""
+        """Children of every joint, in joint order."""
         below: list[list[int]] = [[] for _ in self.joints]
         for index, joint in enumerate(self.joints):
             if joint.parent >= 0:

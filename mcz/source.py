@@ -1,4 +1,4 @@
-"""What is kept of a source file, so that it can be written again byte for byte."""
+"""Data of a source file from which it is restored byte for byte."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mcz.errors import MotionError
 
 
 class FrameNotes(Protocol):
-    """What a source says about each frame beside its values; a source format defines it."""
+    """Notes of a source on each frame beside its values; a source format defines them."""
 
     def cut(self, start: int, stop: int) -> bytes:
         """The notes of frames start <= f < stop as bytes of a segment, b"" where all is usual."""
@@ -33,7 +33,7 @@ SOURCE = {
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What is needed, beside the values, to restore a source file byte for byte.
+    """Data, beside the values, to restore a source file byte for byte.
 
     ``template`` is shared by clips that were printed alike; ``detail`` belongs to this clip;
     ``notes`` holds what is said frame by frame. All three are defined by the source format.

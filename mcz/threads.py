@@ -1,4 +1,4 @@
-"""How many threads work on a file, and work that they share.
+"""Numbers of threads that work on a file, and the work that they share.
 
 Compiled loops and hashes let other threads run, so segments that need nothing of each other are
 decoded and coded at once. What comes out does not depend on the number.
@@ -26,12 +26,12 @@ _LIMIT: ContextVar[int | None] = ContextVar("threads", default=None)
 
 
 def in_force() -> int:
-    """How many threads a call may use: by default one a processor that the process may use."""
+    """Number of threads that a call may use: by default one a processor."""
     return _LIMIT.get() or processors()
 
 
 def processors() -> int:
-    """How many processors the process may use."""
+    """Number of processors that the process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -122,7 +122,7 @@ def mirrored(found: TrainingSet) -> TrainingSet:
 
 
 def mirror_order(names: Sequence[str]) -> list[int]:
-    """Of each point the one on the other side, itself where there is none.
+    """Counterpart of each point on the other side, itself for none.
 
     >>> mirror_order(["root", "lfoot", "rfoot", "lowerback", "LeftHand", "RightHand"])
     [0, 2, 1, 3, 5, 4]
@@ -180,7 +180,7 @@ def window_coefficients(found: TrainingSet, n_frames: int, n_kept: int) -> Float
 
 
 def steps(found: TrainingSet, n_frames: int, every: int = 1) -> Floats:
-    """How far points move in ``n_frames``, from every frame or every so many, (N, J, 3)."""
+    """Displacements of points in ``n_frames``, from every frame or every so many, (N, J, 3)."""
     if n_frames < 1 or every < 1:
         raise OptionError(f"steps of {n_frames} frames from every {every} frames")
     return np.concatenate([(clip[n_frames:] - clip[:-n_frames])[::every] for clip in found.clips])
@@ -188,7 +188,7 @@ def steps(found: TrainingSet, n_frames: int, every: int = 1) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How bases are learned; ``learn_basis`` has the first four.
+    """Options of learning a basis; ``learn_basis`` has the first four.
 
     ``kind``, one of ``KINDS``, is what is to become sparse: "frames" as they are, "steps" from one
     to a later one, DCT coefficients of "windows". ``mirror`` and ``headings`` add mirrored and
@@ -209,7 +209,7 @@ class Recipe:
     every: int = 1
 
     def vectors(self, found: TrainingSet) -> Floats:
-        """What is learned from, (N, J, 3); raises OptionError where the clips are too short."""
+        """Training vectors, (N, J, 3); raises OptionError for too short clips."""
         if self.mirror:
             found = mirrored(found)
         found = turned(found, self.headings)
@@ -262,7 +262,7 @@ class Trained:
         return build_bases([found.basis for found in self.learned])
 
     def better(self, other: Trained) -> Trained:
-        """Of each coordinate the basis that leaves out less; raises OptionError where that is moot.
+        """Choose the better basis of each coordinate; raises OptionError if they do not compare.
 
         Minima differ, even with growth, by some percent, and once in a while by more; which one is
         reached hangs on the last digit of the start. So several are tried where it matters.
@@ -274,7 +274,7 @@ class Trained:
         return replace(self, learned=tuple(best))
 
     def left_out(self, found: Learned) -> Floats:
-        """What is left out with the start and after each iteration, rms of a point, in units."""
+        """Rms residual of a point with the start and after each iteration, in units."""
         size = max(1, self.n_vectors * len(self.source.names))
         rms: Floats = np.sqrt(found.objective / size)
         return rms

@@ -87,13 +87,13 @@ class SignKeeper:
 
 
 def nearest(vectors: Floats, wanted: Floats, full: float) -> Floats:
-    """Of the vectors (n, 3) that turn as these do, those nearest to ``wanted``."""
+    """Return the equivalent rotation vectors, (n, 3), nearest to ``wanted``."""
     counts, axes = _turns(vectors, wanted, full)
     return np.where(counts[:, None] == 0, vectors, vectors + (full * counts)[:, None] * axes)
 
 
 def _turns(vectors: Floats, wanted: Floats, full: float) -> tuple[Floats, Floats]:
-    """How many whole turns lead from each vector to the nearest one alike, and about which axes."""
+    """Whole turns from each vector to the nearest equivalent one, and their axes."""
     sizes = np.sqrt((vectors * vectors).sum(axis=1))
     others = np.sqrt((wanted * wanted).sum(axis=1))
     zero = sizes == 0  # any axis is as good: that of what is wanted

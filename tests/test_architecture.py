@@ -321,6 +321,20 @@ def test_modules_stay_short() -> None:
     assert not faults(too_long)
 
 
+# Words that open a clause where PEP 257 wants a noun or an imperative.
+CLAUSES = {"How", "Of", "That", "Those", "What", "When", "Where", "Whether", "Which", "Who", "Why"}
+
+
+def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
+    def clauses(path: Path) -> list[str]:
+        documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+        nodes = (node for node in ast.walk(tree_of(path)) if isinstance(node, documented))
+        texts = (ast.get_docstring(node) or "." for node in nodes)
+        return [text for text in texts if text.split()[0] in CLAUSES]
+
+    assert not faults(clauses)
+
+
 MOST_PARAMETERS = 8
 
 

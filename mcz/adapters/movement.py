@@ -134,7 +134,7 @@ def _grid_of(names: tuple[str, ...], name: str) -> tuple[list[str], list[str]]:
 
 
 def _confidence(motion: Motion, places: Reals) -> Floats:
-    """Of every point in every frame."""
+    """Confidence of every point in every frame."""
     for signal in motion.signals[1:]:
         if signal.role == CONFIDENCE and signal.n_channels == places.shape[1] * places.shape[2]:
             return np.asarray(signal.masked(), np.float64)

@@ -155,11 +155,11 @@ class _Tree:
         return [kind[1].upper() for kind in order], np.deg2rad(found) if self.to_radians else found
 
     def root_places(self) -> Floats:
-        """Where the root is, (n_frames, 3): in pybvh positions replace its offset."""
+        """Positions of the root, (n_frames, 3): in pybvh they replace its offset."""
         return self._places(0)
 
     def _places(self, joint: int) -> Floats:
-        """Where a joint is from its parent, (n_frames, 3)."""
+        """Positions of a joint relative to its parent, (n_frames, 3)."""
         found = np.tile(np.array(self.joints[joint].offset), (len(self.values), 1))
         for number, channel in enumerate(self.joints[joint].channels):
             if channel.kind in POSITION_KINDS:

@@ -60,7 +60,7 @@ def to_rerun(
 
 
 def view_of(moving: MotionLike, entity: str) -> Horizontal:
-    """How the viewer of rerun is to show what ``to_rerun`` logs: a figure, and curves beside it.
+    """Blueprint of the rerun viewer for ``to_rerun``: a figure, and curves beside it.
 
     Residuals are there, and not shown: there are as many as points.
     """
@@ -117,7 +117,7 @@ class _Log:
         self.rerun.send_columns(path, times, columns, recording=self.recording)
 
     def _still(self) -> None:
-        """What does not change: axes, names, colors, events."""
+        """Log what is constant: axes, names, colors, events."""
         rerun, log = self.rerun, self.recording.log
         skeleton = self.moving.skeleton
         if up := skeleton.up_axis:
@@ -198,7 +198,7 @@ class _Figure:
         self.bones = {s: self.body.bones[of_bones == s] for s in SIDES if (of_bones == s).any()}
 
     def places(self, moving: MotionLike, start: int, stop: int) -> Floats:
-        """Where the nodes are, (n_frames, n_nodes, 3), NaN where unknown."""
+        """Places of the nodes, (n_frames, n_nodes, 3), NaN where unknown."""
         values = values_of(moving, (start, stop), range(moving.skeleton.n_joints))
         return self.body.places(values) * self.scale
 
@@ -219,7 +219,7 @@ Columns = list[tuple[str, str, int]]  # names, units, columns
 
 
 def _series_of(moving: MotionLike) -> Iterator[tuple[str, int, Columns, int]]:
-    """Of every signal with scalars its name, its index, these, and how many samples a frame has."""
+    """Yield name, index, scalar columns and samples per frame of every signal with scalars."""
     for index, signal in enumerate(moving.signals):
         channels = signal.channels
         kinds = moving.skeleton.channels if channels is None else channels

@@ -33,7 +33,7 @@ def default_folder() -> Path:
 
 @cache
 def code_digest() -> str:
-    """Of every file of the package that a figure may depend on: more than its version says."""
+    """Digest of every file of the package that a figure may depend on."""
     folder = Path(mcz.__file__).parent
     digest = hashlib.sha256(mcz.__version__.encode())
     for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.json"), *folder.rglob("*.bin")]):
@@ -62,7 +62,7 @@ class Cache:
         return self.folder / name[:2] / f"{name}.json"
 
     def get(self, key: str) -> Any:
-        """What was kept under ``key``, None where nothing was or it cannot be read."""
+        """Return the entry of ``key``, None if absent or unreadable."""
         if self.folder is None:
             return None
         try:

@@ -1,4 +1,4 @@
-"""Which settings of a codec's dial to try, so that sizes are evenly spaced."""
+"""Settings of a codec's dial with evenly spaced sizes."""
 
 from __future__ import annotations
 

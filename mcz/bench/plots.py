@@ -33,7 +33,7 @@ def can_draw() -> bool:
 
 
 def drawn(figures: Iterable[Figures], folder: Path, theme: str) -> list[Path]:
-    """What all ``figures`` draw into a folder, in the colors of a theme, "light" or "dark"."""
+    """Draw all ``figures`` into a folder, in the colors of a theme, "light" or "dark"."""
     from matplotlib import rc_context
 
     with rc_context(_colors(theme_of(theme))):

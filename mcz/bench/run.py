@@ -19,7 +19,7 @@ from mcz.types import JsonObject
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a run found: clips that were swept, tables, plots, and what is to be said."""
+    """Outcome of a run: clips that were swept, tables, plots and remarks."""
 
     clips: list[ClipResult] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)

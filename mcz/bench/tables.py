@@ -53,7 +53,7 @@ class Table:
 
     @property
     def right(self) -> str:
-        """Which columns are numbers: ``r``, others ``l``."""
+        """Alignment of columns: ``r`` for numbers, else ``l``."""
         return "".join("r" if spec else "l" for _, spec in self.columns)
 
     def markdown(self) -> Iterator[str]:

@@ -63,7 +63,7 @@ def _peers(task: Task) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """How a task is done; ``alone``: with nothing else of ours running beside it.
+    """A kind of task; ``alone``: nothing else of ours runs beside it.
 
     ``work`` is a function of a module, for it travels to other processes by its name.
     """
@@ -91,7 +91,7 @@ def perform(task: Task, kind: Kind) -> Any:
 
 
 def key_of(task: Task) -> str:
-    """What the result depends on, the package itself apart."""
+    """Cache key: all that the result depends on, the package itself apart."""
     codec = codec_by_name(task.variant.codec) if task.variant.codec else None
     return json.dumps(
         [

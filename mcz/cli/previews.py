@@ -89,7 +89,7 @@ def bar(share: float, blocks: bool | None = None) -> str:
 
 
 def bars_of(payload: Sequence[JsonObject]) -> tuple[list[Bar], list[Bar]]:
-    """What the bars are of, and the rest: the joints that take most, or of one group its
+    """Bars and the rest: the joints that take most, or of one group its
     resolutions."""
     from mcz.reading.sizes import Share, by_group
 

@@ -118,7 +118,7 @@ class _Bones:
         return len(self.joints) - 1
 
     def _end(self, bone: int) -> Vector:
-        """Where a bone below this one has its origin."""
+        """Origin of the bones below this one."""
         return self.joints[bone].tails[0] if bone else ORIGIN
 
     def _name(self, name: str) -> str:
@@ -151,7 +151,7 @@ class _Bones:
 
 
 def _root_offset(joint: Joint) -> Vector:
-    """What position channels of the joint add to."""
+    """Offset that position channels of the joint add to."""
     x, y, z = (
         0.0 if not joint.adds_to_offset and Channel(kind) in joint.channels else part
         for kind, part in zip(POSITION_KINDS, joint.offset, strict=True)

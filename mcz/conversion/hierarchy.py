@@ -109,7 +109,7 @@ def _unmistakable(motion: Motion) -> Motion:
 
 
 def is_bvh(skeleton: Skeleton) -> bool:
-    """Whether BVH can say what the joints do as they are."""
+    """Return True if BVH can express the joints' motion unchanged."""
     turning = any(channel.kind in ROTATION_KINDS for channel in skeleton.channels)
     return (
         skeleton.intrinsic
@@ -137,14 +137,14 @@ def _check(motion: Motion) -> None:
 
 
 def moves(skeleton: Skeleton, index: int) -> bool:
-    """Whether the joint's position relative to its parent changes; a root's may always."""
+    """Return True if the joint's position relative to its parent may change; always for a root."""
     joint = skeleton.joints[index]
     own = any(channel.kind in POSITION_KINDS for channel in joint.channels)
     return joint.parent < 0 or own or stretches(skeleton.joints[joint.parent])
 
 
 def stretches(joint: Joint) -> bool:
-    """Whether channels of the joint change the lengths of what hangs on it."""
+    """Return True if channels of the joint scale its descendants."""
     return any(channel.kind in STRETCHING for channel in joint.channels)
 
 

@@ -1,4 +1,4 @@
-"""What a format has no place for: said in words, so that nothing is lost unnoticed."""
+"""Notes on facts that a format cannot hold, so that nothing is lost unnoticed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def held(motion: Motion, to: str) -> Motion:
 
 
 def left_out(motion: Motion, to: str) -> tuple[str, ...]:
-    """What ``motion`` says and a file of the format ``to`` will not, a text a thing.
+    """List the facts of ``motion`` that a file of the format ``to`` cannot hold, a text each.
 
     ``to`` is "csv", "npz", "glb", "usda" or a format of ``mcz.convert``. Metadata are left out of
     every format, and are not named. What makes a format impossible is an error of the conversion.
@@ -66,7 +66,7 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
 
 
 def first_gap(motion: Motion, columns: Sequence[int] | None = None) -> str | None:
-    """Which joint has no value in which frame, in words: the first such of ``columns``, or None."""
+    """Describe the first missing value of ``columns`` by joint and frame; None if all are there."""
     chosen = range(motion.skeleton.n_channels) if columns is None else columns
     bad = ~np.isfinite(np.asarray(motion.signals[0].masked(), np.float64)[:, chosen])
     if not bad.any():
@@ -95,7 +95,7 @@ def of_text(metadata: Mapping[str, str]) -> Iterator[str]:
 
 
 def of_recording(told: Recording | None) -> Iterator[str]:
-    """Of a C3D what it says beside its numbers: no other file has it, nor does a plain C3D."""
+    """Yield the facts of a C3D beside its numbers, which no other file, nor a plain C3D, has."""
     if told is None:
         return
     counts = ((len(told.events), "event"), (len(told.platforms), "force platform"))

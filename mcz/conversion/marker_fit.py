@@ -22,7 +22,7 @@ FARTHEST = 2.0**100  # length units
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How far the points of a solution lie from the positions that they were to meet.
+    """Distances of a solution's points from their target positions.
 
     Distances in length units of the skeleton, over points whose position is known, None where there
     is none; ``marker_`` ones are of virtual markers. ``frame`` (from 0) and ``point`` are where

@@ -1,4 +1,4 @@
-"""Where features are kept that were made once: in memory, or in a folder."""
+"""Caches of computed features: in memory, or in a folder."""
 
 from __future__ import annotations
 

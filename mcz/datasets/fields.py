@@ -1,4 +1,4 @@
-"""What a data set makes of each frame: a name, a shape, and how it follows from the poses."""
+"""Fields of data sets: a name, a shape, and the computation from poses."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ def subject_of(
 
 
 def names_of(field: Field, subject: Subject) -> tuple[str, ...]:
-    """What the first axis after the frames is of, () where it has no names."""
+    """Names along the first axis after the frames, () for none."""
     skeleton = subject.skeleton
     if field.names == "points":
         names = point_names(skeleton)

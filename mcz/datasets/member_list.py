@@ -184,7 +184,7 @@ def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> 
 
 
 class _Agreement:
-    """What all clips must have in common, as the first one has it."""
+    """Facts of the first clip that all others must share."""
 
     def __init__(self, recipe: Recipe) -> None:
         self._recipe = recipe

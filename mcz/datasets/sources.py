@@ -32,7 +32,7 @@ BLOCK = 128  # frames whose features are made and kept together
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What is made of every frame: the arguments of ``mcz.dataset`` that say it."""
+    """Recipe of a frame's features: the arguments of ``mcz.dataset`` that matter for it."""
 
     fields: tuple[Field, ...]
     rate: Fraction | None
@@ -54,7 +54,7 @@ class Recipe:
         return self.rate is None or (member.is_even and self.rate == member.source_rate)
 
     def step(self, member: Member) -> Fraction:
-        """How many frames of the clip one of the data set is."""
+        """Frames of the clip in one frame of the data set."""
         if self.rate is None or member.source_rate is None:
             return Fraction(1)
         return member.source_rate / self.rate

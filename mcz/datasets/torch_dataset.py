@@ -12,7 +12,7 @@ from mcz.types import JsonObject, Reals
 
 
 class Windows(Protocol):
-    """What a ``Dataset`` has that is needed here."""
+    """Protocol of the parts of a ``Dataset`` that are used here."""
 
     @property
     def whole_clips(self) -> bool: ...

@@ -46,7 +46,7 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How a data set is cut, and what it may keep."""
+    """Settings of windows and caches."""
 
     recipe: Recipe
     window: int | None
@@ -80,7 +80,7 @@ class Dataset:
         self._prepare()
 
     def _prepare(self) -> None:
-        """What is not pickled: open files and what is kept of them."""
+        """Create the parts that are not pickled: open files and caches of them."""
         targets = {member.target for member in self.members}
         self._sources = Sources(self._given, self._settings.cache_bytes // RUNS_SHARE, len(targets))
         self._keys: dict[Member, str] = {}
@@ -126,7 +126,7 @@ class Dataset:
 
     @property
     def whole_clips(self) -> bool:
-        """Whether an item is a whole clip, not a window."""
+        """True if an item is a whole clip, not a window."""
         return self._settings.window is None
 
     @property
@@ -142,13 +142,13 @@ class Dataset:
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
-        """Of each field the names along the axis after the frames, () where it has none."""
+        """Names of each field along the axis after the frames, () for none."""
         subject = self._first_subject()
         return {field.name: names_of(field, subject) for field in self._settings.recipe.fields}
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Of each field the shape of a frame."""
+        """Shape of a frame of each field."""
         subject = self._first_subject()
         return {field.name: field.shape(subject) for field in self._settings.recipe.fields}
 
@@ -249,7 +249,7 @@ class Dataset:
         return found
 
     def _key(self, member: Member) -> str:
-        """What the features of a clip follow from: in a folder, whatever the file is called."""
+        """Cache key of a clip's features: in a folder, independent of the file's name."""
         key = self._keys.get(member)
         if key is None:
             recipe = self._settings.recipe
@@ -307,7 +307,7 @@ class Dataset:
         return runs
 
     def _pool_frames(self) -> int:
-        """How many frames the cache holds, as features and as they were decoded."""
+        """Frames that the cache holds, as features and as they were decoded."""
         if self._settings.folder is not None or not self.members:
             return 2**62
         size = self._settings.recipe.dtype.itemsize

@@ -1,4 +1,4 @@
-"""How many processes work on the files of a command, and when they are worth their start.
+"""Numbers of processes that work on the files of a command, and when they pay.
 
 ``pool.py`` runs them, ``worker.py`` is what each of them does. Parsing is Python, which threads of
 one process share and processes do not: packing takes half the time with two. What comes out does
@@ -26,7 +26,7 @@ Answer = Callable[[], Result]  # gives a result, or raises what the function has
 
 
 class Engine(Protocol):
-    """What else can do the work of processes."""
+    """Another engine for the work of processes."""
 
     @property
     def jobs(self) -> int: ...
@@ -41,7 +41,7 @@ _LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)
 
 
 def in_force() -> int:
-    """How many processes a call may use: one, unless more are asked for."""
+    """Number of processes that a call may use: one, unless more are asked for."""
     return _LIMIT.get() or ONE
 
 
@@ -61,7 +61,7 @@ def limited(jobs: int | None) -> Iterator[None]:
 
 
 def engine() -> Engine | None:
-    """What does the work in place of processes of this machine."""
+    """Engine that works in place of processes of this machine, if any."""
     return _ENGINE.get()
 
 
@@ -76,7 +76,7 @@ def using(engine: Engine) -> Iterator[None]:
 
 
 def useful(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
-    """How many processes are worth it for so many files of so many bytes in all.
+    """Number of processes that pay for so many files of so many bytes in all.
 
     ``stored``: they are clips of an MCZ file of that size.
     """
@@ -89,5 +89,5 @@ def useful(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
 
 
 def threads_each(jobs: int) -> int:
-    """How many threads each of ``jobs`` processes may use: all together what one would."""
+    """Threads of each of ``jobs`` processes: all together as many as one would use."""
     return max(1, threads.in_force() // jobs)

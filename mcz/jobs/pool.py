@@ -59,7 +59,7 @@ class Pool:
 
     @property
     def pids(self) -> list[int]:
-        """Of the processes that have started."""
+        """Ids of the processes that have started."""
         with self._lock:
             return [worker.process.pid for worker in self._workers]
 
@@ -135,7 +135,7 @@ class Worker:
 
     @property
     def code(self) -> str:
-        """How it ended, in words."""
+        """Describe the exit code."""
         code = self.process.poll()
         if code is None:
             return "without a word"

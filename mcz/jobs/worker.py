@@ -1,4 +1,4 @@
-"""What a process of a pool does: a function of one item after the other, until its input ends.
+"""Work of a pool's process: call a function for one item after the other until the input ends.
 
 Messages are a length of 8 bytes and a pickle. The first is the number of threads and the pickled
 state, each further one a function and an item; each is answered with whether it went well, and
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 class State:
-    """What all calls have in common; unpickled on the first, whose error it may be."""
+    """State of all calls, unpickled on the first, whose error it may be."""
 
     def __init__(self, packed: bytes) -> None:
         self._packed: bytes | None = packed

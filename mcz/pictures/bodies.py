@@ -1,4 +1,4 @@
-"""What is drawn of a skeleton: nodes, the bones between them, how thick, and on which side."""
+"""Bodies for drawing: nodes, bones between them, their thickness and side."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Body:
         return np.unique(np.concatenate([self.bones.ravel(), self.lone]))
 
     def places(self, values: Floats) -> Floats:
-        """Where the nodes are, (n_frames, n_nodes, 3) in length units, NaN where unknown."""
+        """Places of the nodes, (n_frames, n_nodes, 3) in length units, NaN where unknown."""
         poses: FramePoses = frame_poses_of(self.skeleton)
         joints = list(range(self.skeleton.n_joints))
         with np.errstate(all="ignore"):
@@ -123,7 +123,7 @@ def fitted(body: Body, places: Floats) -> Body:
 
 
 def _quantile(values: Floats, q: float) -> Floats:
-    """That quantile of every column of what is known; NaN where nothing is."""
+    """Quantile of the known values of every column; NaN for none."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         found: Floats = np.nanquantile(values, q, axis=0)
@@ -131,7 +131,7 @@ def _quantile(values: Floats, q: float) -> Floats:
 
 
 def bone_lengths(body: Body, places: Floats) -> Floats:
-    """How long the bones are, (n_frames, n_bones), NaN where unknown."""
+    """Lengths of the bones, (n_frames, n_bones), NaN where unknown."""
     with np.errstate(all="ignore"):
         apart = places[:, body.bones[:, 1]] - places[:, body.bones[:, 0]]
         found: Floats = np.sqrt((apart**2).sum(axis=2))
@@ -153,7 +153,7 @@ def size_of(places: Floats) -> float:
 
 
 def near_others(nodes: Floats) -> Flags:
-    """Which nodes of a frame, (n, 3), are known and not far off all others."""
+    """Flags of the nodes of a frame, (n, 3), that are known and not far off all others."""
     known = known_places(nodes)
     if not known.any():
         return known
@@ -164,12 +164,12 @@ def near_others(nodes: Floats) -> Flags:
 
 
 def known_places(places: Floats) -> Flags:
-    """Which places, (..., 3), have all of their coordinates, bool (...)."""
+    """Flags of the places, (..., 3), with all coordinates known, bool (...)."""
     return np.asarray(np.isfinite(places).all(axis=-1))
 
 
 def radii(body: Body, places: Floats, size: float) -> Floats:
-    """How thick each bone is at its start and its end, (n_bones, 2), in the unit of ``places``.
+    """Radii of each bone at its start and end, (n_bones, 2), in the unit of ``places``.
 
     As branches of a tree are: by the root of how far it is to the farthest tip.
     """
@@ -187,13 +187,13 @@ def radii(body: Body, places: Floats, size: float) -> Floats:
 
 
 def _trunk(body: Body, ahead: Floats, size: float) -> Flags:
-    """Which bones are the trunk: between the sides, with arms or more still to come."""
+    """Flags of the trunk's bones: between the sides, with arms or more still to come."""
     sides = body.sides[body.bones[:, 1]]
     return np.asarray((sides == MIDDLE) & (ahead > 0.28 * size) & bool((sides == LEFT).any()))
 
 
 def _depths(body: Body) -> Ints:
-    """How many bones lead to the end of each bone."""
+    """Number of bones from the root to the end of each bone."""
     depth = np.zeros(len(body.joints), np.int64)
     n_joints = body.skeleton.n_joints
     for joint, parent in enumerate(body.skeleton.parents):

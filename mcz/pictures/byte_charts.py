@@ -118,7 +118,7 @@ def _ramp(theme: Theme, sorts: Sequence[Sort]) -> dict[Sort, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Point:
-    """What a codec made of the motion at a setting of its dial."""
+    """Result of a codec at a setting of its dial."""
 
     codec: str
     setting: str

@@ -1,4 +1,4 @@
-"""Where the camera stands, and where on the picture things are that it sees."""
+"""Cameras: their place, and projection to the picture."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class Word:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """What is on one picture, from the back: lines, shadows, figures, words."""
+    """Contents of one picture, from the back: lines, shadows, figures, words."""
 
     lines: tuple[Floats, Floats]
     shadows: tuple[Floats, Floats]

@@ -70,7 +70,7 @@ class Pieces:
 
 
 def pieces_of(track: Track, nodes: Floats, colors: Floats) -> Pieces:
-    """What is drawn of a frame, whose nodes are (n_nodes, 3) and have the colors (n_nodes, 3)."""
+    """Make the pieces to draw of a frame, whose nodes and their colors are (n_nodes, 3)."""
     body = track.body
     starts, ends = nodes[body.bones[:, 0]], nodes[body.bones[:, 1]]
     dots = nodes[body.lone]
@@ -152,7 +152,7 @@ def add_shadow(shapes: Shapes, camera: Camera, pieces: Pieces, floor: float, the
 
 
 def _drawable(camera: Camera, a: Floats, b: Floats) -> Ints:
-    """Which pieces are before the camera and not far off the picture."""
+    """Indices of pieces in front of the camera and not far off the picture."""
     view = camera.view
     middle = (view.left + view.width / 2, view.bottom + view.height / 2)
     most = MOST * max(view.width, view.height)

@@ -35,7 +35,7 @@ LEAST_POWER = 1e-290
 
 
 def unit_name(motion: Motion, kind: str) -> str:
-    """What the numbers of a channel of that kind are in."""
+    """Unit of the numbers of a channel of that kind."""
     if kind in ANGLE_KINDS:
         return {"deg": "degrees", "rad": "radians"}.get(motion.skeleton.angle_unit, "angle unit")
     if kind in POSITION_KINDS or kind == "length":

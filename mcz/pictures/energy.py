@@ -1,4 +1,4 @@
-"""How much a motion moves over time, in a few numbers, without decoding a long clip."""
+"""Energy of a motion over time, in a few numbers, without decoding a long clip."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CHEAP = 2**19  # numbers that are decoded without being asked
 
 
 def is_cheap(clip: Any) -> bool:
-    """Whether the energy of a clip is had in a moment."""
+    """Return True if the energy of a clip is quick to compute."""
     return bool(clip.n_frames * clip.n_channels <= CHEAP)
 
 

@@ -56,7 +56,7 @@ class Errors:
 
 
 def errors_between(original: Motion, other: Motion) -> Errors:
-    """How far ``other`` is from ``original``: the figures of ``mcz diff``, and those of each frame.
+    """Errors of ``other`` against ``original``: the figures of ``mcz diff``, and of each frame.
 
     Points in order where both have as many, otherwise joints of the same names. Raises MotionError
     where the two differ in frames, or have no position in common.

@@ -25,7 +25,7 @@ CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, unless othe
 
 @dataclass(frozen=True, slots=True)
 class Plotted:
-    """What was written: ``tables`` are the numbers of the chart, headings first, as text."""
+    """A written plot: ``tables`` are the numbers of the chart, headings first, as text."""
 
     path: str
     what: str

@@ -46,7 +46,7 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Rendered:
-    """What was written: ``n_pictures`` of ``width`` x ``height``, in ``n_bytes``.
+    """A written rendering: ``n_pictures`` of ``width`` x ``height``, in ``n_bytes``.
 
     ``fps`` is None of a still. ``notes`` say what was assumed.
     """
@@ -62,7 +62,7 @@ class Rendered:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How it is drawn; ``size`` None: the usual one, ``follow`` None: where that is needed."""
+    """Options of drawing; ``size`` None: the usual one, ``follow`` None: if needed."""
 
     view: str = "three-quarter"
     theme: Theme = field(default_factory=lambda: theme_of("light"))

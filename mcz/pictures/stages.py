@@ -23,7 +23,7 @@ ROOM = 0.10  # of its size, left free around the figure
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """How the frames of a track are looked at; ``targets`` (n_frames, 3), where, or None: one."""
+    """View of a track's frames; ``targets`` (n_frames, 3), points looked at, or None: one."""
 
     track: Track
     theme: Theme
@@ -61,7 +61,7 @@ def stage_of(
     rate: float,
     around: float = AROUND,
 ) -> Stage:
-    """How to look at a track, so that all of it is seen; ``rate`` its frames a second,
+    """Choose a view that shows all of a track; ``rate`` its frames a second,
     ``around`` how far the floor reaches, of the figure's size.
 
     With ``follow`` the camera goes along, with None only where the figure would be small otherwise.
@@ -86,7 +86,7 @@ def stage_of(
 
 
 def steadied(centers: Floats, rate: float) -> Floats:
-    """Where a camera looks that follows: ``centers`` (n, 3), gaps bridged and smoothed."""
+    """Targets of a following camera: ``centers`` (n, 3), gaps bridged and smoothed."""
     found = centers.copy()
     frames = np.arange(len(found))
     known = known_places(found)
@@ -102,7 +102,7 @@ def steadied(centers: Floats, rate: float) -> Floats:
 
 
 def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Floats]:
-    """What the camera has to see, along its axes: about ``targets``, or about the origin."""
+    """Extent that the camera must see, along its axes: about ``targets``, or about the origin."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     shown, done = track.body.shown, 0
     for frames, places in track.blocks():
@@ -122,7 +122,7 @@ def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Fl
 
 
 def words_around(stage: Stage, width: int, height: int, title: str, when: str) -> list[Word]:
-    """What is written around a picture."""
+    """Words around a picture."""
     theme, letter = stage.theme, max(9.0, min(15.0, height / 42))
     edge = 0.9 * letter
     top, bottom = height - edge - letter, edge

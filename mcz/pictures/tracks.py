@@ -185,7 +185,7 @@ def guessed_up(body: Body, places: Floats) -> str:
 
 
 def facing(body: Body, places: Floats) -> Floats:
-    """Where the figure faces, a horizontal unit vector: across its left and its right.
+    """Facing of the figure, a horizontal unit vector: across its left and its right.
 
     That of most frames, or where it turns much that of the first; x where no name tells sides.
     """

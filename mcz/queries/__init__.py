@@ -1,4 +1,4 @@
-"""Which clips are wanted, said in one line of text: ``subject == '05' and n_frames > 500``.
+"""Queries that select clips, a line of text: ``subject == '05' and n_frames > 500``.
 
 docs/queries.md is normative: grammar, and what a comparison of two values is. Nothing here knows
 clips or files; whoever asks gives a function that looks a name up.

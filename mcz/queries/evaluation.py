@@ -18,7 +18,7 @@ Test = Callable[[Lookup], bool | None]  # None: unknown
 
 
 def truth_of(node: Node) -> Test:
-    """What tells whether ``node`` holds of what a lookup says."""
+    """Compile ``node`` to a test of a lookup."""
     match node:
         case Compare(left, sign, right):
             return _comparison(_value_of(left), sign, _value_of(right))

@@ -123,7 +123,7 @@ class _Parser:
         return Compare(left, sign.raw, right)
 
     def chain(self, sign: Token) -> str:
-        """How to write a < b < c, of which a < b is behind us."""
+        """Suggest how to write a < b < c, of which a < b is already parsed."""
         left, right = (self.tokens[self.at - back].raw for back in (3, 1))
         last = self.tokens[self.at + 1].raw or "..."
         return f"{left} {sign.raw} {right} and {right} {self.token.raw} {last}"
@@ -172,5 +172,5 @@ def _is_truth(operand: Operand) -> bool:
 
 
 def _what_follows(left: Operand) -> str:
-    """What an error says of a value that stands alone."""
+    """Words of an error about a value that stands alone."""
     return f"a comparison such as {printed(left)} == {'true' if isinstance(left, Name) else '...'}"

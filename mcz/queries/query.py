@@ -40,7 +40,7 @@ class Query:
         return tuple(dict.fromkeys(names_in(self.tree)))
 
     def matches(self, lookup: Lookup) -> bool:
-        """Whether the query is true of what ``lookup`` says of its names, not false or unknown.
+        """Return True if the query is true, not false or unknown, of the values in ``lookup``.
 
         ``lookup(name)`` gives a text, a number, a truth, or None where the value is missing; a name
         is looked up only once its part of the query is reached.

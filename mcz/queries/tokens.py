@@ -97,7 +97,7 @@ def _token(kind: str, at: int, raw: str, text: str) -> Token:
 
 
 def _unescaped(at: int, raw: str, text: str) -> str:
-    r"""What a text in quotes means: \' \" and \\ are escapes, and nothing else is."""
+    r"""Unescape a quoted text: \' \" and \\ are the only escapes."""
     for match in _ESCAPE.finditer(raw):
         if match[1] not in "'\"\\":
             what = rf"{shown(match[0])} is no escape; these are: \' \" \\"

@@ -1,4 +1,4 @@
-"""What a query says, as a tree, and the tree as text again."""
+"""Trees of queries, and their text."""
 
 from __future__ import annotations
 

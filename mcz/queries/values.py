@@ -1,4 +1,4 @@
-"""What a query compares, and how: text, numbers and truths, of which any may be missing.
+"""Values of queries and their comparison: text, numbers and truths, any of them maybe missing.
 
 A comparison is true, false, or None where it is unknown.
 """
@@ -43,7 +43,7 @@ def as_number(text: str) -> int | float | None:
 
 
 def compared(left: Value, sign: str, right: Value) -> bool | None:
-    """Whether ``left`` is to ``right`` as a sign of ``COMPARISONS`` says; None: unknown.
+    """Compare ``left`` and ``right`` by a sign of ``COMPARISONS``; None: unknown.
 
     >>> compared("05", "==", 5), compared("05", "==", "5"), compared("a", "<", 5)
     (True, False, None)

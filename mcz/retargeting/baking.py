@@ -64,7 +64,7 @@ def _check(skeleton: Skeleton, parent: int) -> None:
 
 
 def _places(chain: Chain, values: Floats, above: Mapping[int, int]) -> dict[int, Floats]:
-    """Of each joint its origin from that of the one above, along that one's axes, (3, F)."""
+    """Origin of each joint from its parent's, along the parent's axes, (3, F)."""
     places = {joint: np.empty((3, len(values))) for joint in above}
     for rows, _, pose in chain.poses(values):
         for joint, parent in above.items():

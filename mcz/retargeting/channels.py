@@ -1,4 +1,4 @@
-"""What all tools here do alike: a motion whose channels are its joints' in, and another out."""
+"""Common steps of retargeting: a motion with its joints' channels in, another out."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ COMPUTED = Grid(GridKind.FIXED, 6)  # as of conversions: a millionth is far belo
 
 
 def turns(channels: tuple[Channel, ...]) -> bool:
-    """Whether one of the channels turns its joint."""
+    """Return True if one of the channels turns its joint."""
     return any(channel.kind in TURNING_KINDS for channel in channels)
 
 
 def moves(channels: tuple[Channel, ...]) -> bool:
-    """Whether one of the channels moves its joint."""
+    """Return True if one of the channels moves its joint."""
     return any(channel.kind in POSITION_KINDS for channel in channels)
 
 

@@ -1,4 +1,4 @@
-"""Which joint of one usual skeleton is which of another."""
+"""Maps of joints between usual skeletons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which joints of a motion stand for which of another skeleton."""
+"""Matching of joints between skeletons."""
 
 from __future__ import annotations
 

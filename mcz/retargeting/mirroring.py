@@ -128,7 +128,7 @@ def _turned_about(signal: Signal, skeleton: Skeleton, axis: str) -> Signal:
 
 
 def _flips(kind: str, axis: str) -> bool:
-    """Whether a channel of this kind changes its sign."""
+    """Return True if a channel of this kind changes its sign."""
     if kind in POSITION_KINDS:
         return kind[1] == axis
     return kind in TURNING_KINDS and kind != "qw" and kind[1] != axis

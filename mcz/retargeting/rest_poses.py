@@ -1,4 +1,4 @@
-"""How bones of one rest pose have to turn to point as those of another do."""
+"""Turns of bones from one rest pose to another."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_NAMED = 6
 def rest_turns(
     target: Skeleton, source: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]
 ) -> dict[int, Floats]:
-    """Of each joint of ``pairs``, and of -1, what turns its bone to the direction of the source's.
+    """Turns of each joint of ``pairs``, and of -1, that align its bone with the source's.
 
     Rotation matrices (3, 3, 1): for joints named in ``alike`` the least turn that does it, for
     others that of the joint above, for -1 none. The bone of a joint leads to the one joint of

@@ -72,7 +72,7 @@ def _kept(skeleton: Skeleton, joints: str | int | Iterable[str | int]) -> list[i
 
 
 def _parents(skeleton: Skeleton, kept: list[int]) -> dict[int, int]:
-    """Of each kept joint the nearest one above it that is kept, -1 where there is none."""
+    """Nearest kept ancestor of each kept joint, -1 for none."""
     among_kept, above = set(kept), {}
     for joint in kept:
         parent = skeleton.joints[joint].parent
@@ -104,7 +104,7 @@ def _obstacle(motion: Motion, joint: int, above: int) -> str:
 
 
 def _rests(motion: Motion, index: int) -> bool:
-    """Whether the joint has no channels that move it, or all are at rest in every frame."""
+    """Return True if no channel moves the joint in any frame."""
     joint, values = motion.skeleton.joints[index], motion.values
     for channel, column in zip(joint.channels, motion.skeleton.columns(index), strict=True):
         rest = 1.0 if channel.kind in (*SCALING, "qw") else 0.0

@@ -38,7 +38,7 @@ _OTHER = {
 
 
 def counterparts(names: Sequence[str], pairs: Mapping[str, str] | None = None) -> list[int]:
-    """Of every joint the one on the other side, by index; itself where it has no side.
+    """Counterpart of every joint on the other side, by index; itself for one without a side.
 
     ``names`` are those of all joints, each once. ``pairs`` maps names to names, in one direction
     or both, before names are looked at; to its own name what has no side. Raises OptionError for a
@@ -106,7 +106,7 @@ def _swapped(pattern: re.Pattern[str], name: str) -> Iterator[str]:
 
 
 def sides_of(names: Sequence[str]) -> list[str]:
-    """Of every joint "left" or "right" as its name says, "" where it does not.
+    """Side of every joint by its name: "left", "right" or "".
 
     A mere letter before or after a word says it where the name with the other letter is there, or
     the word is a part of the body. ``names`` are those of all joints.

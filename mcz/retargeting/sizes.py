@@ -1,4 +1,4 @@
-"""How large one skeleton is beside another, by bones that both have."""
+"""Relative sizes of skeletons, by bones that both have."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mcz.motion import Skeleton
 
 
 def size_ratio(ours: Skeleton, theirs: Skeleton, pairs: Mapping[int, int]) -> float:
-    """How high we stand for each length unit that they do, each in its own length units.
+    """Our size for each unit of theirs, each in its own length units.
 
     ``pairs`` has joints of theirs by joints of ours. Heights are from the feet up to the joint
     where the legs part, as ``_height`` says; a foot is the first joint of a leg that is a part of
@@ -76,5 +76,5 @@ def _line(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _lengths(skeleton: Skeleton) -> Floats:
-    """Of every joint the length of its offset, (n_joints,)."""
+    """Length of every joint's offset, (n_joints,)."""
     return np.asarray(np.sqrt((skeleton.offsets**2).sum(axis=1)))

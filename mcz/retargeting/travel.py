@@ -84,13 +84,13 @@ class Travel:
                 )
 
     def _way(self, joint: int, other: int) -> Floats:
-        """Where ``joint`` goes from where it is at rest, (3, F): all above it is at rest."""
+        """Shift of ``joint`` from its rest, (3, F): all above it is at rest."""
         rest = rest_positions(self.target)[joint]
         way: Floats = self.scale * self.origins[:, other].T - rest[:, None]
         return way
 
     def _step(self, other: int) -> Floats:
-        """What position channels of the source's joint add to its offset, (3, F)."""
+        """Shift that position channels of the source's joint add to its offset, (3, F)."""
         joint = self.source.joints[other]
         step = np.zeros((3, len(self.values)))
         for channel, column in zip(joint.channels, self.source.columns(other), strict=True):

@@ -50,7 +50,7 @@ def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -
 
 
 def finite(matrices: Floats) -> NDArray[np.bool_]:
-    """Which frames of matrices (3, 3, F) have numbers alone, (F,)."""
+    """Flags of the frames of matrices (3, 3, F) that are finite, (F,)."""
     known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(matrices), axis=(0, 1))
     return known
 

@@ -1,4 +1,4 @@
-"""What an NPZ says of a motion beside its channels, so that it can be used without MCZ."""
+"""Arrays of an NPZ beside a motion's channels, for use without MCZ."""
 
 from __future__ import annotations
 

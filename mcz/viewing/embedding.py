@@ -28,7 +28,7 @@ MOST_COMPARED = 32  # pairs of clips whose figures are put into the page; it fin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """What of the files is put into a page: these clips, coded anew where a codec is named."""
+    """Contents of a page: these clips, re-encoded if a codec is named."""
 
     clips: Sequence[str] = ()
     where: str | None = None
@@ -183,7 +183,7 @@ def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
 
 
 def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> Iterator[JsonObject]:
-    """Of every other file against the first what ``mcz diff --by-joint --json`` says."""
+    """Yield ``mcz diff --by-joint --json`` of every other file against the first."""
     first, *others = files
     for other, name in zip(others, names[1:], strict=True):
         pairs = [(one, one) for one in first.clips if one in other.clips.rows]

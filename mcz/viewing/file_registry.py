@@ -55,7 +55,7 @@ class Shelved(Protocol):
         ...
 
     def target(self) -> str:
-        """What ``mcz.open`` takes; it is made first. Raises MczError where that cannot be."""
+        """Target for ``mcz.open``, encoded on first use; raises MczError if that fails."""
         ...
 
     def open(self) -> Contents:
@@ -162,7 +162,7 @@ class Made:
 
 
 def _state(path: Path, skeleton: object = None) -> object:
-    """What changes when a file does, a motion file below a folder, or the ASF of an AMC.
+    """Stamp that changes with a file, a motion file below a folder, or the ASF of an AMC.
 
     ``skeleton``: the ASF that was named, or None. Raises AccessError where there is no ``path``.
     """
@@ -182,7 +182,7 @@ def _state(path: Path, skeleton: object = None) -> object:
 
 
 def _stamp(path: Path) -> tuple[int, int, int] | None:
-    """When a file was written, its size and number; None where it is gone."""
+    """Time of change, size and number of a file; None if it is gone."""
     try:
         found = path.stat()
     except (OSError, ValueError):

@@ -79,7 +79,7 @@ class Handler(BaseHTTPRequestHandler):
             self._fail(507, "MemoryError", "out of memory")
 
     def _route(self) -> str:
-        """What is asked for below the token; raises Refused where nobody may ask."""
+        """Path below the token; raises Refused for a request without it."""
         if self.request_version not in ("HTTP/1.0", "HTTP/1.1"):
             raise Refused(505, "HTTP/1.1 is spoken here")
         check_sender(self.headers, self._site.port)
@@ -160,7 +160,7 @@ class Handler(BaseHTTPRequestHandler):
                 pulses += 1
 
     def _is_gone(self) -> bool:
-        """Whether the other side has closed the connection."""
+        """Return True if the other side has closed the connection."""
         try:
             readable, _, _ = select.select([self.connection], [], [], 0)
             return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
@@ -232,7 +232,7 @@ class Handler(BaseHTTPRequestHandler):
         self._send(json.dumps({"error": error}).encode(), JSON, status, more)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """What the library refuses: requests that are none, and methods that are not answered."""
+        """Answer malformed requests and unknown methods, as the library reports them."""
         self.close_connection = True
         self._has_answered = False
         self._fail(int(code), "Refused", self.responses.get(int(code), ("refused",))[0])

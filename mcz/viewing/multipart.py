@@ -23,7 +23,7 @@ FILE_NAME = re.compile(rb'(?im)^content-disposition:[^\r\n]*?[;\s]filename="([^"
 
 
 def boundary_of(content_type: str) -> bytes:
-    """What stands between the parts of a form; raises Refused where it is no form."""
+    """Boundary between the parts of a form; raises Refused for any other content."""
     match = BOUNDARY.fullmatch(content_type)
     if match is None:
         raise Refused(415, "files are taken as multipart/form-data")
@@ -79,7 +79,7 @@ def path_of(name: bytes) -> str:
 
 
 class Readable(Protocol):
-    """What a request is read from."""
+    """Protocol of the stream of a request."""
 
     def read(self, size: int, /) -> bytes: ...
 

@@ -1,4 +1,4 @@
-"""How many pages are open, and when all of them have been closed for a while."""
+"""Count of open pages, and notice when all have been closed for a while."""
 
 from __future__ import annotations
 

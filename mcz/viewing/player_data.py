@@ -1,4 +1,4 @@
-"""What a small player draws of a motion: few frames, of few bytes, however long it is."""
+"""Data of a small player: few frames of few bytes, for a motion of any length."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Moving: TypeAlias = Motion | Clip
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """What stays over time: ``bones``, pairs of points; ``sides`` 0, 1 left, 2 right of points."""
+    """Constant parts: ``bones``, pairs of points; ``sides`` 0, 1 left, 2 right of points."""
 
     bones: list[tuple[int, int]]
     sides: list[int]
@@ -82,7 +82,7 @@ def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
 
 
 def frames_read(moving: Moving) -> int:
-    """How many frames are looked at: of a clip, which has to be decoded, the first of many."""
+    """Number of frames that are used: of a clip, which must be decoded, the first of many."""
     if isinstance(moving, Motion):
         return moving.n_frames
     return min(moving.n_frames, MOST_READ, MOST_NUMBERS // max(1, moving.n_channels) + 1)

@@ -1,4 +1,4 @@
-"""What a request asks for: whether it may, which bytes, and what it posts."""
+"""Requests: permission, ranges of bytes, and posted data."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def range_of(headers: Headers, size: int, tag: str) -> tuple[int, int] | None:
 
 
 def is_known(headers: Headers, tag: str) -> bool:
-    """Whether the sender has these bytes already (If-None-Match)."""
+    """Return True if the sender has these bytes already (If-None-Match)."""
     return tag in _tags(headers.get("If-None-Match", "")) or headers.get("If-None-Match") == "*"
 
 

@@ -107,6 +107,6 @@ class Server(ThreadingHTTPServer):
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Of who went away in the middle nothing is said; of a fault of ours all is."""
+        """Report faults of the server; ignore clients that went away."""
         if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)

@@ -1,4 +1,4 @@
-"""What the server does for the page: converts, codes anew, compares, exports."""
+"""Tasks of the server for the page: convert, re-encode, compare, export."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Work:
             self._waiting.release()
 
     def document(self) -> JsonObject:
-        """What the page is told first: ``api.json``."""
+        """First document of the page: ``api.json``."""
         return {
             "version": import_module("mcz").__version__,
             "files": self.files(),
@@ -145,7 +145,7 @@ class Work:
         }
 
     def diff(self, asked: Params) -> JsonObject:
-        """How far one clip is from another, as ``mcz diff --by-joint --json`` says it."""
+        """Compare two clips, as ``mcz diff --by-joint --json`` does."""
         from mcz.metrics.diff_document import diff_document
         from mcz.reading.differences import document_of
         from mcz.reading.sizes import clip_ratios
@@ -210,13 +210,13 @@ class Work:
 
 
 def url_of(number: int) -> str:
-    """Where the file of a number is, relative to the page."""
+    """URL of the file of a number, relative to the page."""
     return f"files/{number}"
 
 
 @cache
 def lossy_codecs() -> list[JsonObject]:
-    """What a slider needs to know: the lossy codecs, their parameters, and the range of the dial.
+    """Lossy codecs for a slider: their parameters, and the range of the dial.
 
     The keys are those of ``mcz codecs --json``, and ``dial``. The one that is called "lossy" is the
     first.
@@ -252,7 +252,7 @@ def refuse_files(params: Params) -> None:
 
 
 def glb_writer() -> Callable[..., Any] | None:
-    """What writes a motion as GLB; None where this version has no such thing."""
+    """Writer of GLB; None if this version has none."""
     try:
         writer: Callable[..., Any] = import_module("mcz.conversion.scenes").to_glb
     except ModuleNotFoundError:

@@ -1,4 +1,4 @@
-"""What a server has to give, as the answers to requests need it."""
+"""Contents of a server, as the answers to requests need them."""
 
 from __future__ import annotations
 

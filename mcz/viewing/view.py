@@ -23,7 +23,7 @@ _OPEN: set[View] = set()  # those that are served, whether anybody keeps them or
 
 
 class View:
-    """What ``view`` shows: players in a notebook, or a server, whose page is at ``url``.
+    """Result of ``view``: players in a notebook, or a server, whose page is at ``url``.
 
     ``url`` is None in a notebook. ``close`` ends the server, as leaving the context does, and as
     the end of the process does.
@@ -100,7 +100,7 @@ def view(
 
 
 def in_notebook() -> bool:
-    """Whether this process is the kernel of a notebook."""
+    """Return True in the kernel of a notebook."""
     module = sys.modules.get("IPython")
     shell = module.get_ipython() if module is not None else None
     return getattr(shell, "kernel", None) is not None

@@ -140,7 +140,7 @@ def to_usda(
 
 
 def _bound(scene: Scene, key_error_mm: float | None) -> float:
-    """How far keys may be off, in the lengths of the scene."""
+    """Greatest error of keys, in length units of the scene."""
     if key_error_mm is None:
         return KEY_ERROR_MM / MM_PER_M if scene.has_unit else KEY_ERROR_SIZE * scene.size
     if not 0 <= key_error_mm < np.inf:

@@ -56,7 +56,7 @@ def _fits(
     scratch: Floats,
     found: Floats,
 ) -> bool:
-    """Whether all between two keys is near enough, and the keys are in the same hemisphere."""
+    """Return True if all frames between two keys of one hemisphere are near enough."""
     width = exact.shape[1]
     angle = _angle(rounded[first], rounded[last], width)
     if angle < 0.0:
@@ -74,7 +74,7 @@ def _fits(
 
 
 def _angle(one: Floats, other: Floats, width: int) -> float:
-    """Of quaternions the angle between them, 0 where linear will do; -1 beyond 90 degrees."""
+    """Angle between quaternions, 0 where linear will do; -1 beyond 90 degrees."""
     if width == 3:
         return 0.0
     dot, square = 0.0, 0.0
@@ -145,7 +145,7 @@ def hang(
     out_turns: Floats2,
     out_places: Floats2,
 ) -> None:
-    """Where a node is in the world, from where its parent is and how it hangs there.
+    """Compute a node's turns and places in the world from its parent's.
 
     ``out_turns`` (n, 4) and ``out_places`` (n, 3); the others have n rows, or one for all frames.
     """

@@ -41,7 +41,7 @@ class Keys:
 
 @dataclass(frozen=True, slots=True)
 class Reached:
-    """What keys make of a scene.
+    """A scene as its keys show it.
 
     ``error`` is the greatest distance of a node from where it should be, over all frames, in
     meters, or in units where these are unknown; it is met in ``frame`` by ``point``. ``n_keys`` of
@@ -57,7 +57,7 @@ class Reached:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keyed:
-    """Of every node the keys of its turns and of its shifts; None where it stays at rest."""
+    """Keys of every node's turns and shifts; None for one that stays at rest."""
 
     turns: list[Keys | None]
     shifts: list[Keys | None]
@@ -96,7 +96,7 @@ class _Channel:
         self.keys = Keys(kept, self.rounded[kept].astype(np.float32))
 
     def fill(self, times: Floats, first: int, stop: int) -> Floats:
-        """What the keys make of the frames ``first <= f < stop``; one row where they are one."""
+        """Interpolate the frames ``first <= f < stop``; one row for a single key."""
         frames, values = self.keys.frames, self.keys.values.astype(np.float64)
         out = np.empty((stop - first if len(frames) > 1 else 1, values.shape[1]))
         fill(times, frames, values, first, int(np.searchsorted(frames, first, "right")) - 1, out)
@@ -175,7 +175,7 @@ class _Keyer:
                     channel.choose(self.scene.times)
 
     def errors(self) -> Floats:
-        """How far each node is from where it should be, (n_frames, n_nodes); 0 where unknown."""
+        """Position errors of each node, (n_frames, n_nodes); 0 where unknown."""
         n_frames = len(self.scene.times)
         errors = np.empty((n_frames, len(self.nodes)))
         for first in range(0, n_frames, BLOCK_FRAMES):
@@ -190,7 +190,7 @@ class _Keyer:
     def _place(
         self, number: int, node: Node, placed: list[tuple[Floats, Floats]], first: int, stop: int
     ) -> tuple[Floats, Floats]:
-        """How a node is turned in the world, (n, 4), and where it is, (n, 3)."""
+        """Turns of a node in the world, (n, 4), and its places, (n, 3)."""
         turn, shift, times = self.turns[number], self.shifts[number], self.scene.times
         turns = NO_TURN if turn is None else turn.fill(times, first, stop)
         rest = node.rest.astype(np.float32).astype(np.float64)[None]
@@ -219,7 +219,7 @@ def _channel(exact: Floats, limit: float, node: Node) -> _Channel:
 
 
 def _levers(scene: Scene) -> list[float]:
-    """How far below each node the farthest node can be, with bones as long as in some frames."""
+    """Greatest distance from each node to a descendant, with the longest bones of some frames."""
     step = max(1, len(scene.times) // SAMPLED_FRAMES)
     levers = [0.0] * len(scene.nodes)
     for number in range(len(levers) - 1, -1, -1):

@@ -82,7 +82,7 @@ class Scene:
 
     @property
     def rest_places(self) -> Floats:
-        """Where the nodes are at rest in the world, (n_nodes, 3)."""
+        """Places of the nodes at rest in the world, (n_nodes, 3)."""
         found = np.zeros((len(self.nodes), 3))
         for number, node in enumerate(self.nodes):
             found[number] = node.rest
@@ -92,7 +92,7 @@ class Scene:
 
     @property
     def children(self) -> list[list[int]]:
-        """Of every node the nodes that hang on it."""
+        """Children of every node."""
         below: list[list[int]] = [[] for _ in self.nodes]
         for number, node in enumerate(self.nodes):
             if node.parent >= 0:
@@ -218,7 +218,7 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
 
 
 class _Placed:
-    """Where joints (tail -1) and the loose ends of their bones are, (n_frames, 3) in meters.
+    """Places of joints (tail -1) and of the loose ends of their bones, (n_frames, 3) in meters.
 
     ``shifts`` has those that do not stay where they are on their parent, along its axes.
     """
@@ -260,7 +260,7 @@ class _Placed:
 
 
 def _turns(motion: Motion, values: Floats, index: int) -> Floats | None:
-    """How a joint is turned from its parent, x y z w; None where nothing turns it."""
+    """Turns of a joint from its parent, x y z w; None if nothing turns it."""
     if not any(channel.kind in TURNING_KINDS for channel in motion.skeleton.joints[index].channels):
         return None
     matrices = frame_poses_of(motion.skeleton).local(values, [index])

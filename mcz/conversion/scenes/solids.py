@@ -1,4 +1,4 @@
-"""What of a scene can be seen: an octahedron a bone, a small one where there is none.
+"""Meshes of a scene: an octahedron a bone, a small one for a node without.
 
 Each corner follows one node alone: the far end of a bone the node there where that one moves by
 itself, all others the node that the bone begins at.
@@ -72,7 +72,7 @@ def _bones(scene: Scene) -> Iterator[tuple[Floats, int, int]]:
 
 
 def _is_reached(scene: Scene, number: int) -> bool:
-    """Whether a bone ends at the node."""
+    """Return True if a bone ends at the node."""
     rest = scene.nodes[number].rest
     return scene.nodes[number].parent >= 0 and float(rest @ rest) > (LEAST_BONE * scene.size) ** 2
 
