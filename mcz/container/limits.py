@@ -29,7 +29,7 @@ class Profile:
     text_bytes: int
     signals: int
     rows: int
-    is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``plain.py``
+    is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``small_profile.py``
     coded_bytes: int = 2**53  # decoded, of a segment that writers make, so that its DATA is short
 
     @property

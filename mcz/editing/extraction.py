@@ -1,7 +1,7 @@
 """``extract``: frames, joints and coarser resolutions cut out of the stored bytes of a file.
 
 Streams are copied byte for byte, SPEC.md, "Cutting without re-encoding"; only where a caller allows
-it is what cannot be cut coded anew (``anew.py``).
+it is what cannot be cut coded anew (``reencode.py``).
 """
 
 from __future__ import annotations

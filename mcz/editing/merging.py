@@ -1,6 +1,6 @@
 """Several MCZ files in one: chunks are carried over as they are, what they share is written once.
 
-Nothing is coded anew (``carrying.py``). Two different things under one name are never mixed: that
+Nothing is coded anew (``chunk_copier.py``). Two different things under one name are never mixed: that
 is refused, or the later one is called otherwise.
 """
 

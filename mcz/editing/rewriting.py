@@ -1,6 +1,6 @@
 """Rewriting of files: chunks are copied, not encoded.
 
-``carrying.py`` carries, this module plans. The old file keeps its name until the new one is whole
+``chunk_copier.py`` copies chunks, this module plans. The old file keeps its name until the new one is whole
 and was walked from end to end. ``protect``, which may rewrite a file, is here as well.
 """
 
