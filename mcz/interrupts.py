@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def held() -> Iterator[None]:
+def defer_sigint() -> Iterator[None]:
     """Let an interrupt (Ctrl-C) wait for the end of the block; a second one does not wait.
 
     Only the main thread is ever interrupted, and only where Python handles the signal.

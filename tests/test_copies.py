@@ -24,7 +24,7 @@ from mcz.container.writer import Writer
 from mcz.formats import FORMATS
 from mcz.reading.report import info
 from mcz.sample import write_samples
-from mcz.writing.write_transaction import Draft
+from mcz.writing.write_transaction import WriteTransaction
 from tests.commands import run
 from tests.motions import smooth, written
 from tests.repair import use
@@ -343,13 +343,13 @@ def test_a_file_without_clips(folder: Path, tmp_path: Path) -> None:
 
 def test_a_step_that_failed_is_not_copied() -> None:
     out = io.BytesIO()
-    draft = Draft(out, BASE, copies=True)
-    with pytest.raises(MotionError), draft.step():
-        draft.writer.template(3, b"a template that nobody wants")
+    transaction = WriteTransaction(out, BASE, copies=True)
+    with pytest.raises(MotionError), transaction.step():
+        transaction.writer.template(3, b"a template that nobody wants")
         raise MotionError("no")
-    with draft.step():
-        draft.writer.template(3, b"another")
-    draft.finish()
+    with transaction.step():
+        transaction.writer.template(3, b"another")
+    transaction.finish()
     data = out.getvalue()
     (copy,) = chunks(data, ChunkType.COPY)
     copies = parse_copies(data[copy.payload_offset :][: copy.length], copy, len(data))

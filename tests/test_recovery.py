@@ -361,10 +361,10 @@ def test_large_blocks_are_worked_on_by_columns(monkeypatch: pytest.MonkeyPatch) 
     def read(block: int) -> bytes:
         return blocks[block].tobytes()
 
-    wanted = list(encoder.made(shape, read)[1])
+    wanted = list(encoder.encode_packets(shape, read)[1])
     monkeypatch.setattr(encoder, "AT_ONCE", 1 << 12)
     monkeypatch.setattr(encoder, "IN_MEMORY", 1 << 10)
-    assert list(encoder.made(shape, read)[1]) == wanted
+    assert list(encoder.encode_packets(shape, read)[1]) == wanted
 
 
 VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import ChecksumError, Signal
-from mcz.container.decoded_cache import MOST_BYTES, Run, Runs
+from mcz.container.decoded_cache import MOST_BYTES, DecodedCache, Run
 from mcz.container.segments import FRESH
 from tests.motions import smooth, written
 
@@ -46,7 +46,7 @@ def test_windows_are_those_of_the_whole(codec: str, data: st.DataObject) -> None
 
 
 def test_a_file_keeps_no_more_than_it_says() -> None:
-    runs = Runs()
+    runs = DecodedCache()
     for number in range(40):
         runs.put(number, Run(0, np.zeros(MOST_BYTES // 16), None))
         held = sum(run.n_bytes for run in map(runs.get, range(number + 1)) if run)

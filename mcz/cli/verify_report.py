@@ -41,11 +41,11 @@ class VerifyReport:
 
     def take_bytes(self, file: str) -> None:
         """Keep what can be said of a file that cannot be opened."""
-        from mcz.reading.file import reached
+        from mcz.reading.file import open_bytes
         from mcz.reading.verification import bytes_facts
 
         with about(file):
-            source = reached(given(file))
+            source = open_bytes(given(file))
             try:
                 self._facts = bytes_facts(source)
             finally:

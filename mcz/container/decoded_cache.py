@@ -28,7 +28,7 @@ class Run(NamedTuple):
         return self.values.nbytes + (0 if self.mask is None else self.mask.nbytes)
 
 
-class Runs:
+class DecodedCache:
     """Runs by key, those that were used last: at most ``most_bytes`` of a file."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
@@ -53,10 +53,10 @@ class Runs:
                 self._size -= self._runs.popitem(last=False)[1].n_bytes
 
 
-class SharedRuns(Runs):
+class SharedCache(DecodedCache):
     """The runs of one file in a store that several files share."""
 
-    def __init__(self, store: Runs, owner: Hashable) -> None:
+    def __init__(self, store: DecodedCache, owner: Hashable) -> None:
         self._store, self._owner = store, owner
 
     def get(self, key: Hashable) -> Run | None:

@@ -29,7 +29,7 @@ from mcz.container.chunks import (
     read_payload,
 )
 from mcz.container.copies import Copy, copy_chunks, uncopied
-from mcz.container.decoded_cache import Runs
+from mcz.container.decoded_cache import DecodedCache
 from mcz.container.dictionary_deflate import chunk_id, plain_id, plain_payload
 from mcz.container.directory import (
     AttachmentRow,
@@ -93,7 +93,7 @@ class Container:
         self.broken: list[tuple[int, Chunk | None]] = []
         self.feet: list[int] = []  # offsets of FOOTs, as far as salvage found them
         self.unverified = 0
-        self.runs = Runs()
+        self.runs = DecodedCache()
         self.index: Foot | None = None
         self._said = Remembered()
         self._told = 0, b""  # a segment in a packet, and its mask
@@ -181,7 +181,7 @@ class Container:
         chunks = self.directory.clips.ancillary(ChunkType.META)
         return records_in(chunks, self.payload, self.source.size, lenient=self.salvage)
 
-    def said_of(self, name: str) -> list[Record]:
+    def metadata_records(self, name: str) -> list[Record]:
         """META records of the clip ``name``; "": of the file as a whole."""
         row = self.directory.clips.get(name)
         start = row.clip.offset if row is not None else 0
@@ -189,7 +189,7 @@ class Container:
 
     def metadata(self, row: ClipRow) -> dict[str, str]:
         """Metadata of a clip: those in CLIP, updated by META chunks behind it."""
-        return applied(self._said.of(row, self.payload), self.said_of(row.name))
+        return applied(self._said.of(row, self.payload), self.metadata_records(row.name))
 
     def copies(self) -> list[Chunk]:
         """The COPY chunks of the file, in order."""

@@ -20,8 +20,8 @@ from mcz.jobs import Answer
 from mcz.reading.source_files import SourceOptions
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import replacing
-from mcz.writing.source_encoder import Entry, WritingOptions, encoding_options
-from mcz.writing.write_transaction import Draft
+from mcz.writing.source_encoder import SourceEncoder, WritingOptions, encoding_options
+from mcz.writing.write_transaction import WriteTransaction
 
 
 def pack(
@@ -71,20 +71,20 @@ def pack(
     inputs = (*paths, *encoding.params.values())
     report, writing = Report(), WritingOptions(force, profile_named(profile), copies)
     skeletons = [one.name for one in found if one.name.lower().endswith(".asf")]
-    entries = [Entry(Path(root, one.name), one.name, options, encoding) for one in taken]
+    entries = [SourceEncoder(Path(root, one.name), one.name, options, encoding) for one in taken]
     asks = (
         FarAsk(root, ask_of(entry, writing.profile), skeletons_beside(entry.name, skeletons))
         for entry in entries
     )
     with connected(client) as used, replacing(target, force=force, inputs=inputs) as stream:
-        draft = Draft(stream, writing.profile, copies=writing.copies)
+        transaction = WriteTransaction(stream, writing.profile, copies=writing.copies)
         with closing(Cluster(used).in_order(coded_there, asks, None)) as answers:
             given = cast(Iterator[Answer[Part]], answers)  # none is None
             made = zip(entries, given, taken, strict=True)
             parts = (Far(entry, answer, one.size) for entry, answer, one in made)
-            write_in_turn(draft, parts, len(taken), report, progress, {})
-        draft.finish()
-    report.size = draft.writer.offset
+            write_in_turn(transaction, parts, len(taken), report, progress, {})
+        transaction.finish()
+    report.size = transaction.writer.offset
     report.note(notes_on(one.name for one in taken))
     report.outcomes += sorted([*others, *left], key=lambda one: os.fsencode(one.path))
     return report

@@ -13,7 +13,7 @@ from weakref import finalize
 import numpy as np
 
 from mcz.clock import Timeline, known_timeline
-from mcz.container.decoded_cache import Runs, SharedRuns
+from mcz.container.decoded_cache import DecodedCache, SharedCache
 from mcz.datasets.caches import Arrays
 from mcz.datasets.fields import Field, Rows, Subject, features_of, subject_of
 from mcz.datasets.members import Member
@@ -68,7 +68,7 @@ class Sources:
 
     def __init__(self, given: Mapping[str, File], runs_bytes: int, n_targets: int) -> None:
         self._given = dict(given)
-        self._runs = Runs(runs_bytes)
+        self._runs = DecodedCache(runs_bytes)
         self._open: OrderedDict[str, File] = OrderedDict()
         self._subjects: OrderedDict[tuple[object, ...], Subject] = OrderedDict()
         self._lock = Lock()
@@ -78,7 +78,7 @@ class Sources:
         )
         finalize(self, _close, self._open)
         for target, file in self._given.items():
-            file.container.runs = SharedRuns(self._runs, target)
+            file.container.runs = SharedCache(self._runs, target)
 
     def clip(self, member: Member) -> Clip:
         """Raises as ``mcz.open`` does, and OptionError where the clip is gone."""
@@ -103,7 +103,7 @@ class Sources:
                 self._keep(target, file)
 
     def _keep(self, target: str, file: File) -> None:
-        file.container.runs = SharedRuns(self._runs, target)
+        file.container.runs = SharedCache(self._runs, target)
         self._open[target] = file
         while len(self._open) > MOST_OPEN:
             self._open.popitem(last=False)[1].close()

@@ -36,8 +36,8 @@ from mcz.reading.file import File
 from mcz.reading.source_files import SourceOptions
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import refuse_inputs, replacing
-from mcz.writing.source_encoder import Entry, WritingOptions, encoding_options
-from mcz.writing.write_transaction import Draft, check_name
+from mcz.writing.source_encoder import SourceEncoder, WritingOptions, encoding_options
+from mcz.writing.write_transaction import WriteTransaction, check_name
 
 
 def pack(
@@ -95,34 +95,34 @@ def pack(
     encoding = encoding_options(codec, effort, params)
     writing = WritingOptions(force, profile_named(profile), copies, threads, jobs)
     named = [(path, path.relative_to(root).as_posix()) for path in paths]
-    entries = [Entry(path, name, options, encoding) for path, name in named]
+    entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
     inputs = (*paths, *encoding.params.values())
     with writing.in_force(), replacing(target, force=force, inputs=inputs) as stream:
-        draft = Draft(stream, writing.profile, copies=writing.copies)
-        report = _write_entries(draft, entries, progress)
+        transaction = WriteTransaction(stream, writing.profile, copies=writing.copies)
+        report = _write_entries(transaction, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
         if mtimes:
-            _note_times(draft, entries)
-        draft.finish()
-    report.size = draft.writer.offset
+            _note_times(transaction, entries)
+        transaction.finish()
+    report.size = transaction.writer.offset
     report.left_out += not_kept(root, paths, with_times=mtimes)
     report.note(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
 
 
-def _note_times(draft: Draft, entries: Sequence[Entry]) -> None:
+def _note_times(transaction: WriteTransaction, entries: Sequence[SourceEncoder]) -> None:
     """Say of each clip that was written when its file was last changed."""
     records = []
     for entry in entries:
-        if entry.name in draft.clips:
+        if entry.name in transaction.clips:
             with suppress(OSError):
-                records.append(Record(draft.clips[entry.name], {"mtime": stamp(entry.path)}))
-    with draft.step():
-        draft.writer.metadata(records)
+                records.append(Record(transaction.clips[entry.name], {"mtime": stamp(entry.path)}))
+    with transaction.step():
+        transaction.writer.metadata(records)
 
 
-def _inputs_of(entries: Sequence[Entry]) -> Iterator[Path]:
+def _inputs_of(entries: Sequence[SourceEncoder]) -> Iterator[Path]:
     """The files that entries were made of, their skeletons among them."""
     return chain.from_iterable(entry.inputs for entry in entries)
 
@@ -190,7 +190,7 @@ def append(
     held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in held]
     named, others = sources_named(files, root, target)
-    entries = [Entry(path, name, options, encoding) for path, name in named]
+    entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
     with (
         writing.in_force(),
         superseding(Path(target), named if replace else ()) as grown,
@@ -199,7 +199,7 @@ def append(
         container = growth.container
         paths, seen = stored_files(container)
         wanted = bool(container.copies()) if copies is None else copies
-        draft = Draft(
+        transaction = WriteTransaction(
             growth.added,
             container.profile,
             container.directory,
@@ -208,23 +208,23 @@ def append(
             uncopied=container.uncopied() if wanted else (),
         )
         before = File(container) if held else None  # as it is before anything is added
-        report = _write_entries(draft, entries, progress, seen)
+        report = _write_entries(transaction, entries, progress, seen)
         if report.failures:
             words, hints = zip(*(split_hint(o.message) for o in report.failures), strict=True)
             raise SourceError("; ".join(words), hint=hints[0] if len(set(hints)) == 1 else None)
         refuse_inputs(target, _inputs_of(entries))
         if before is not None:
-            added = add_files(held, before, draft, rename, skip_identical, progress)
+            added = add_files(held, before, transaction, rename, skip_identical, progress)
             report.outcomes += added.outcomes
             report.left_out += added.left_out
         redundancy = None
         if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
             redundancy = redundancy_of(container)
-            draft.finish()
+            transaction.finish()
     if still_protect(target, redundancy):
         report.left_out = [text for text in report.left_out if not text.endswith(UNPROTECTED)]
     report.size = Path(target).stat().st_size
-    report.note(notes_on(draft.paths, {outcome.path for outcome in report.outcomes}))
+    report.note(notes_on(transaction.paths, {outcome.path for outcome in report.outcomes}))
     report.outcomes += others
     tail = growth.tail
     text = "it lay whole behind the last FOOT of a file whose writing was cut short"
@@ -234,22 +234,22 @@ def append(
 
 
 def _write_entries(
-    draft: Draft,
-    entries: Sequence[Entry],
+    transaction: WriteTransaction,
+    entries: Sequence[SourceEncoder],
     progress: Progress | None,
     seen: Content | None = None,
 ) -> Report:
     """Write the files; ``seen``: what the target holds already, by content."""
     report = Report()
     seen = {} if seen is None else seen
-    with ahead(entries, draft, seen) as in_turn:
-        write_in_turn(draft, in_turn, len(entries), report, progress, seen)
+    with ahead(entries, transaction, seen) as in_turn:
+        write_in_turn(transaction, in_turn, len(entries), report, progress, seen)
     return report
 
 
 def write_in_turn(
-    draft: Draft,
-    entries: Iterable[Entry],
+    transaction: WriteTransaction,
+    entries: Iterable[SourceEncoder],
     total: int,
     report: Report,
     progress: Progress | None,
@@ -259,7 +259,7 @@ def write_in_turn(
     for done, entry in enumerate(entries):
         size = entry.size if isinstance(entry, Far) else size_of(entry.path)
         try:
-            result = _write_entry(draft, entry, seen)
+            result = _write_entry(transaction, entry, seen)
             notes = tuple(filter(None, (entry.remark, *entry.notes)))
             report.outcomes.append(Outcome(entry.name, result, size, entry.reason, notes))
         except MczError as error:
@@ -270,23 +270,23 @@ def write_in_turn(
             progress(done + 1, total, entry.name)
 
 
-def _write_entry(draft: Draft, entry: Entry, seen: Content) -> str:
+def _write_entry(transaction: WriteTransaction, entry: SourceEncoder, seen: Content) -> str:
     """Write one file, or only its name where the same bytes are there already."""
     digest = entry.digest()
     depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
-    writer = draft.writer
-    if digest in seen and not depends and not draft.holds(entry.name, digest):
+    writer = transaction.writer
+    if digest in seen and not depends and not transaction.holds(entry.name, digest):
         check_name(entry.name)
-        with draft.step():
+        with transaction.step():
             writer.alias(entry.name, *seen[digest])
-        draft.paths[entry.name] = digest
+        transaction.paths[entry.name] = digest
         return "alias"
     clips, attachments = len(writer.directory.clips), len(writer.directory.attachments)
-    result = entry.write(draft)
+    result = entry.write(transaction)
     if len(writer.directory.clips) > clips:
         name = next(reversed(writer.directory.clips))
         seen[digest] = (payloads.OF_CLIP, name.encode())
-        draft.clips[entry.name] = name
+        transaction.clips[entry.name] = name
     elif len(writer.directory.attachments) > attachments:
         seen[digest] = (payloads.OF_ATTACHMENT, entry.name.encode())
     return result

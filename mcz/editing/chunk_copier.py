@@ -45,7 +45,7 @@ class Change:
 SAME = Change()
 
 
-class Carrier:
+class ChunkCopier:
     """Carries chunks of ``container`` over to ``writer``; ``left_out`` says which may not be.
 
     Every checksum is compared on the way; raises FormatError where one is wrong.
@@ -106,7 +106,7 @@ class Carrier:
     def ancillary(self, chunk: Chunk) -> bool:
         """Carry an ancillary chunk over where that is safe; return whether it was.
 
-        META is not: it may speak of other clips, see ``said_of``.
+        META is not: it may speak of other clips, see ``metadata_records``.
         """
         if chunk.type == ChunkType.META:
             return False
@@ -196,10 +196,10 @@ class Carrier:
             new.keep_packed(lambda: packed, parse_segments)
 
 
-def said_of(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
+def metadata_records(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
     """META records of the file, and of clips by their old and new names."""
     pairs = [("", ""), *names]
-    said = ((new, container.said_of(old)) for old, new in pairs)
+    said = ((new, container.metadata_records(old)) for old, new in pairs)
     return [as_one(new, records) for new, records in said if records]
 
 

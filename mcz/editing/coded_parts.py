@@ -27,15 +27,15 @@ from mcz.jobs.pool import answers
 from mcz.reading.file import open
 from mcz.reading.parallel_clips import only_own
 from mcz.reading.source_files import SourceOptions
-from mcz.writing.source_encoder import EncodingOptions, Entry
-from mcz.writing.write_transaction import Draft, check_name, clip_name
+from mcz.writing.source_encoder import EncodingOptions, SourceEncoder
+from mcz.writing.write_transaction import WriteTransaction, check_name, clip_name
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
     """One file, read and coded: ``data`` is an MCZ file of it alone.
 
-    ``digest`` is the SHA-256 of the file that was read, the rest what ``Entry`` says of it.
+    ``digest`` is the SHA-256 of the file that was read, the rest what ``SourceEncoder`` says of it.
     """
 
     digest: bytes
@@ -58,53 +58,55 @@ class Ask:
     profile: Profile
 
 
-def ask_of(entry: Entry, profile: Profile) -> Ask:
+def ask_of(entry: SourceEncoder, profile: Profile) -> Ask:
     """The request by which ``entry`` can be joined."""
     return Ask(entry.path, entry.name, entry.options, entry.encoding, profile)
 
 
 def coded(state: object, ask: Ask) -> Part:
-    """The part of a file; raises as ``Entry.write`` does."""
-    entry, sink = Entry(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
-    draft = Draft(sink, ask.profile)
-    result = entry.write(draft)
-    draft.finish()
-    digest = draft.paths[ask.name]
+    """The part of a file; raises as ``SourceEncoder.write`` does."""
+    entry, sink = SourceEncoder(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
+    transaction = WriteTransaction(sink, ask.profile)
+    result = entry.write(transaction)
+    transaction.finish()
+    digest = transaction.paths[ask.name]
     assert isinstance(digest, bytes)
     inputs = tuple(entry.inputs)
     return Part(digest, sink.getvalue(), result, entry.reason, entry.remark, entry.notes, inputs)
 
 
-class Joined(Entry):
-    """An Entry of which somebody has made the part: what can be taken from it is not done again."""
+class Joined(SourceEncoder):
+    """A SourceEncoder whose part another process has encoded; it takes the part over."""
 
     can_be_read = True  # here, too
 
-    def __init__(self, entry: Entry, answer: Answer[Part]) -> None:
+    def __init__(self, entry: SourceEncoder, answer: Answer[Part]) -> None:
         super().__init__(entry.path, entry.name, entry.options, entry.encoding)
         self.inputs = entry.inputs  # which its owner asks for
         self._answer = answer
 
-    def write(self, draft: Draft, progress: object = None) -> str:
-        """Write the file, as ``Entry.write`` does; raises WorkerError where a process has died."""
+    def write(self, transaction: WriteTransaction, progress: object = None) -> str:
+        """Write the file as ``SourceEncoder.write`` does; raises WorkerError if a process died."""
         part = self._part()
         if part is None or part.digest != self.digest():
-            return super().write(draft)  # it fails, or has changed: with the words of one process
-        name = clip_name(self.name, draft.writer.directory)
+            return super().write(
+                transaction
+            )  # it fails, or has changed: with the words of one process
+        name = clip_name(self.name, transaction.writer.directory)
         if (
             self.can_be_read
             and part.result == "verbatim"
             and name != clip_name(self.name, Directory())
         ):
-            return super().write(draft)  # the reason may name the clip
+            return super().write(transaction)  # the reason may name the clip
         check_name(self.name)
-        if draft.holds(self.name, part.digest):
+        if transaction.holds(self.name, part.digest):
             return "present"
-        with draft.step():
-            join(part, draft, name)
+        with transaction.step():
+            join(part, transaction, name)
         self.reason, self.remark, self.notes = part.reason, part.remark, part.notes
         self.inputs[:] = part.inputs
-        draft.paths[self.name] = part.digest
+        transaction.paths[self.name] = part.digest
         return part.result
 
     def _part(self) -> Part | None:
@@ -121,7 +123,7 @@ class Far(Joined):
 
     can_be_read = False
 
-    def __init__(self, entry: Entry, answer: Answer[Part], size: int) -> None:
+    def __init__(self, entry: SourceEncoder, answer: Answer[Part], size: int) -> None:
         super().__init__(entry, answer)
         self.size = size
         self._made: Part | None = None
@@ -135,9 +137,9 @@ class Far(Joined):
         return self._part().digest
 
 
-def join(part: Part, draft: Draft, clip: str) -> None:
+def join(part: Part, transaction: WriteTransaction, clip: str) -> None:
     """Carry the chunks of ``part`` over; its clip is called ``clip`` from now on."""
-    held = draft.writer.directory
+    held = transaction.writer.directory
     with open(part.data) as file:
         plan = whole(file)
         for kind, name in list(plan.things):
@@ -145,10 +147,12 @@ def join(part: Part, draft: Draft, clip: str) -> None:
                 plan.things[kind, name] = Change(clip)
             elif kind == ALIAS and name in held.aliases and file.alias_of(name).kind == SKELETON:
                 del plan.things[kind, name]
-        carry(file, draft.writer, plan, lambda name: None)
+        carry(file, transaction.writer, plan, lambda name: None)
 
 
-def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask | None]:
+def asks(
+    entries: Iterable[SourceEncoder], transaction: WriteTransaction, seen: Content
+) -> Iterator[Ask | None]:
     """Yield the sources to encode ahead; None for one that may turn out to be there already."""
     sent: set[bytes] = set()
     for entry in entries:
@@ -159,25 +163,29 @@ def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask 
             continue
         depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
         is_there = not depends and (digest in seen or digest in sent)
-        if is_there or entry.name in draft.paths:
+        if is_there or entry.name in transaction.paths:
             yield None
             continue
         sent.add(digest)
-        yield ask_of(entry, draft.writer.profile)
+        yield ask_of(entry, transaction.writer.profile)
 
 
 @contextmanager
-def ahead(entries: Sequence[Entry], draft: Draft, seen: Content) -> Iterator[Iterator[Entry]]:
+def ahead(
+    entries: Sequence[SourceEncoder], transaction: WriteTransaction, seen: Content
+) -> Iterator[Iterator[SourceEncoder]]:
     """The entries in order, those ahead in work by other processes where that is worth it."""
     jobs = useful(len(entries), sum(size_of(entry.path) for entry in entries))
     if jobs == ONE or not only_own():
         yield iter(entries)
         return
-    with answers(coded, asks(entries, draft, seen), jobs) as found:
+    with answers(coded, asks(entries, transaction, seen), jobs) as found:
         yield joined(entries, found)
 
 
-def joined(entries: Iterable[Entry], found: Iterable[Answer[Part] | None]) -> Iterator[Entry]:
+def joined(
+    entries: Iterable[SourceEncoder], found: Iterable[Answer[Part] | None]
+) -> Iterator[SourceEncoder]:
     """The entries, with the parts that were made of them."""
     for entry, answer in zip(entries, found, strict=True):
         yield entry if answer is None else Joined(entry, answer)

@@ -17,7 +17,7 @@ from mcz.container.chunks import ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.segments import SegmentHeader
 from mcz.container.value_hash import ValueDigest, value_hash
-from mcz.editing.chunk_copier import Carrier, said_of
+from mcz.editing.chunk_copier import ChunkCopier, metadata_records
 from mcz.editing.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
@@ -155,7 +155,7 @@ class Copying:
     copies: bool | None = None
 
 
-class Copier(Carrier):
+class Copier(ChunkCopier):
     """Copies what is left of a file."""
 
     def __init__(self, copying: Copying) -> None:
@@ -183,7 +183,7 @@ class Copier(Carrier):
         self.aliases({cut.clip.name: cut for cut in cuts}, alone)
         if cuts:
             names = ((cut.clip.name, self.name_of(cut)) for cut in cuts)
-            self.writer.metadata(said_of(self.container, names))
+            self.writer.metadata(metadata_records(self.container, names))
         self.writer.finish()
 
     def skeletons(self) -> None:

@@ -1,7 +1,7 @@
 """Several MCZ files in one: chunks are carried over as they are, what they share is written once.
 
-Nothing is coded anew (``chunk_copier.py``). Two different things under one name are never mixed: that
-is refused, or the later one is called otherwise.
+Nothing is re-encoded (``chunk_copier.py``). Two different things under one name are never mixed:
+that is refused, or the later one is renamed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from mcz.schema import parse
 from mcz.text_format import counted, shown
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing_file
-from mcz.writing.write_transaction import Draft
+from mcz.writing.write_transaction import WriteTransaction
 
 
 def merge(
@@ -91,30 +91,30 @@ def _share_of_all(files: Sequence[File]) -> float | None:
 def add_files(
     sources: Sequence[str | os.PathLike[str]],
     before: File,
-    draft: Draft,
+    transaction: WriteTransaction,
     rename: bool,
     skip_identical: bool,
     progress: Progress | None,
 ) -> Report:
-    """Carry what MCZ files hold over to ``draft``, which adds to the file ``before``.
+    """Carry what MCZ files hold over to ``transaction``, which adds to the file ``before``.
 
     Raises as ``merge`` does.
     """
     # Content that was written just now is like no other: it cannot be read yet.
     there: dict[Thing, Callable[[], object]] = dict.fromkeys(
-        things_in(draft.writer.directory), object
+        things_in(transaction.writer.directory), object
     )
     merging = Merging(rename, skip_identical, there)
     merging.things |= {thing: _content(before, thing) for thing in things_in(before)}
-    merging.paths.update(draft.paths)
+    merging.paths.update(transaction.paths)
 
     def kept(done: int, total: int, name: str) -> None:
-        draft.keep()
+        transaction.keep()
         if progress is not None:
             progress(done, total, name)
 
     with merging.plans(sources) as plans:
-        merging.carry(plans, draft.writer, kept)
+        merging.carry(plans, transaction.writer, kept)
     return merging.report
 
 

@@ -22,7 +22,7 @@ from mcz.container.source import ByteSource
 from mcz.editing.appending import IN_MEMORY, growing
 from mcz.errors import FormatError, OptionError
 from mcz.reading.faults import recovery_chunks
-from mcz.recovery.encoder import Step, made
+from mcz.recovery.encoder import Step, encode_packets
 from mcz.recovery.layout import Shape, shape_for
 from mcz.recovery.packets import Key, read_packet
 from mcz.text_format import brief
@@ -118,7 +118,7 @@ def write_recovery(
         behind = offset - shape.stop + len(tail)
         return container.source.read(offset, size) if behind < 0 else tail[behind : behind + size]
 
-    _, packets = made(shape, lambda block: shape.block(block, read), step)
+    _, packets = encode_packets(shape, lambda block: shape.block(block, read), step)
     for data in chunk_bytes(shape, packets):
         added.write(data)
     added.write(tail)

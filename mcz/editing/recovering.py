@@ -18,9 +18,9 @@ from mcz.container.source import ByteSource
 from mcz.editing.protecting import chunk_bytes
 from mcz.errors import FormatError
 from mcz.indexing import merged_ranges
-from mcz.reading.file import reached
+from mcz.reading.file import open_bytes
 from mcz.recovery.code import LANE, encoded, recovered
-from mcz.recovery.encoder import Step, computed, made
+from mcz.recovery.encoder import Step, computed, encode_packets
 from mcz.recovery.layout import HASH, Shape
 from mcz.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
 from mcz.text_format import brief
@@ -244,7 +244,7 @@ class Restorer:
             self.out.seek(offset)
             return self.out.read(size)
 
-        key, packets = made(shape, lambda block: shape.block(block, read), self.step)
+        key, packets = encode_packets(shape, lambda block: shape.block(block, read), self.step)
         if key != one.key:
             raise NotThatError("what recovery data give is not what they were made of")
         at = shape.chunk_offset
@@ -295,7 +295,7 @@ def checked(target: Target) -> Recovery | None:
 
     Raises AccessError where it cannot be read.
     """
-    source = reached(target)
+    source = open_bytes(target)
     try:
         found, sets = examine(source)
     finally:

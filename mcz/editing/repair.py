@@ -22,7 +22,7 @@ from mcz.editing.salvage_copier import Repair as Repair
 from mcz.editing.salvaging import write_whole
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.reading.faults import validate
-from mcz.reading.file import File, file_of, reached
+from mcz.reading.file import File, file_of, open_bytes
 from mcz.types import Progress, Target
 from mcz.writing.atomic import replacing, rereadable
 
@@ -47,7 +47,7 @@ def repair(
     A file with recovery data (``mcz.protect``) is first made what it was, byte for byte: what is
     above happens only where more of it is bad than they can restore, and to what was put behind it.
     """
-    data = reached(source)
+    data = open_bytes(source)
     try:
         _refuse_same(data, target)
         with replacing(target, force=force, inputs=(source,)) as stream, rereadable(stream) as own:

@@ -1,7 +1,7 @@
 """Rewriting of files: chunks are copied, not encoded.
 
-``chunk_copier.py`` copies chunks, this module plans. The old file keeps its name until the new one is whole
-and was walked from end to end. ``protect``, which may rewrite a file, is here as well.
+``chunk_copier.py`` copies chunks, this module plans. The old file keeps its name until the new one
+is whole and was walked from end to end. ``protect``, which may rewrite a file, is here as well.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mcz.container.reader import Container
 from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
 from mcz.editing.batch_report import Report
-from mcz.editing.chunk_copier import SAME, UNPROTECTED, Carrier, Change, said_of
+from mcz.editing.chunk_copier import SAME, UNPROTECTED, Change, ChunkCopier, metadata_records
 from mcz.editing.protecting import (
     DEFAULT,
     Protection,
@@ -127,7 +127,7 @@ def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
 
 def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
     """Write what ``plan`` says of ``file``; return what may not be carried over."""
-    carrier = Carrier(file.container, writer)
+    carrier = ChunkCopier(file.container, writer)
     carrier.before_clips()
     for kind, id_ in plan.shared:
         if kind == ChunkType.SKEL:
@@ -148,7 +148,7 @@ def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
         writer.metadata([Record("", file.metadata)])
     elif clips and not plan.purges:
         names = ((name, change.name or name) for name, change in clips.items())
-        writer.metadata(said_of(file.container, names))
+        writer.metadata(metadata_records(file.container, names))
     return carrier.left_out
 
 

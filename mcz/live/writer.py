@@ -22,7 +22,7 @@ from mcz.container.time_base import ComingGaps
 from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
-from mcz.interrupts import held
+from mcz.interrupts import defer_sigint
 from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.live.quality_figures import Figures
@@ -191,7 +191,7 @@ class LiveWriter:
                 f"frame {self.n_frames}: values of shape {row.shape}, "
                 f"the skeleton has {self._n_channels} channels"
             )
-        with held():
+        with defer_sigint():
             try:
                 return self._push(row)
             except KeyboardInterrupt:  # a second one: what was sent ends amid a frame
@@ -297,7 +297,7 @@ class LiveWriter:
         """
         if not self._is_open or self._is_stuck:
             return
-        with held():
+        with defer_sigint():
             if self._has_data:
                 self._writer.close_data()
                 self._has_data = False
@@ -312,7 +312,7 @@ class LiveWriter:
 
     def close(self) -> None:
         """Write what comes behind the frames: hash, quality record, index."""
-        with held():
+        with defer_sigint():
             if self._is_open:
                 self._is_open = False
                 self._end()

@@ -22,10 +22,10 @@ from mcz.errors import (
 from mcz.jobs import limited
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
-from mcz.reading.file import File, open, reached
+from mcz.reading.file import File, open, open_bytes
 from mcz.reading.parallel_clips import shared_out
 from mcz.reading.signal_info import read_segments
-from mcz.recovery.encoder import made
+from mcz.recovery.encoder import encode_packets
 from mcz.recovery.packets import read_packet
 from mcz.text_format import brief
 from mcz.types import Target
@@ -65,7 +65,7 @@ def quick_check(
     ``progress`` is called with the bytes that are done and those of the file.
     Raises UnsupportedError where it needs a newer reader, AccessError where it cannot be read.
     """
-    source = reached(target)
+    source = open_bytes(target)
     try:
         if source.grows():
             with open(target) as file:
@@ -254,7 +254,7 @@ def _checked(source: ByteSource, chunk: Chunk) -> str:
         raise FormatError(
             f"it is about {shape}, not what is around it", where=f"chunk {chunk.label}"
         )
-    _, packets = made(shape, lambda block: shape.block(block, source.read))
+    _, packets = encode_packets(shape, lambda block: shape.block(block, source.read))
     at = chunk.payload_offset
     for packet in packets:
         if source.read(at, len(packet)) != packet:

@@ -40,7 +40,7 @@ SHORT = {
 METADATA = "metadata."  # before a key, where a field has the same name
 
 
-def taken(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> list[Clip]:
+def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> list[Clip]:
     """Filter ``clips`` by the query ``where``; ``of`` are all clips of their file.
 
     Raises OptionError for a text that is no query, and for a name in it that no clip knows.
@@ -111,7 +111,7 @@ def _metadata(key: str, clip: Clip) -> Value:
 
 def _last_said(key: str, clip: Clip) -> Record | None:
     """The record that says last what the key is, or that it is not there any more."""
-    records = reversed(clip.container.said_of(clip.name))
+    records = reversed(clip.container.metadata_records(clip.name))
     return next((r for r in records if key in r.entries or key in r.removed), None)
 
 

@@ -32,7 +32,7 @@ from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.clips import Clips, listed
-from mcz.reading.fields import Where, taken
+from mcz.reading.fields import Where, filter_clips
 from mcz.reading.lost_skeletons import restore_skeletons
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
@@ -174,7 +174,7 @@ class File:
     @property
     def metadata(self) -> Mapping[str, str]:
         """Metadata of the file as a whole, see ``Clip.metadata``."""
-        return applied({}, self.container.said_of(""))
+        return applied({}, self.container.metadata_records(""))
 
     @property
     def damage(self) -> list[str]:
@@ -252,7 +252,7 @@ class File:
         of a Clip. Raises OptionError for a text that is no query, and for a name in it that is
         neither a field nor a metadata key of any clip.
         """
-        return taken(self, where, self.clips.values())
+        return filter_clips(self, where, self.clips.values())
 
     def chosen(self, names: Iterable[str] | None = None, where: Where | None = None) -> list[Clip]:
         """The clips of these names that ``where`` takes; None: all.
@@ -262,7 +262,7 @@ class File:
         clips = list(self) if names is None else self.clips_called(names)
         if where is None:
             return clips
-        found = taken(clips, where, self.clips.values())
+        found = filter_clips(clips, where, self.clips.values())
         if not found:
             said = shown(where) if isinstance(where, str) else "what is asked for"
             raise OptionError(
@@ -309,7 +309,7 @@ def open(
         "threads": checked(threads),
         "verify": verify,
     }
-    source = reached(target)
+    source = open_bytes(target)
     try:
         return _opened(source, options)
     except MczError as error:
@@ -321,7 +321,7 @@ def open(
         raise
 
 
-def reached(target: Target) -> ByteSource:
+def open_bytes(target: Target) -> ByteSource:
     """The bytes of ``target``, as ``open`` takes it; raises AccessError and OptionError."""
     try:
         return open_source(target)

@@ -23,7 +23,9 @@ IN_MEMORY = 1 << 28  # bytes of recovery blocks; more are in a temporary file
 Step = Callable[[int, int], object]
 
 
-def made(shape: Shape, read: READ, step: Step | None = None) -> tuple[Key, Iterator[bytes]]:
+def encode_packets(
+    shape: Shape, read: READ, step: Step | None = None
+) -> tuple[Key, Iterator[bytes]]:
     """Encode packets: their common key, and the packets in the order of the file."""
     digest, hashes = hashlib.sha256(), bytearray()
     for block in range(shape.n_blocks):

@@ -27,7 +27,7 @@ from mcz.formats import FORMATS, wants_skeleton
 from mcz.formats.find import skeletons_around
 from mcz.hints import PYTHON_HINTS, Words, worded
 from mcz.motion import Motion
-from mcz.reading.file import reached
+from mcz.reading.file import open_bytes
 from mcz.reading.source_files import SourceOptions
 from mcz.types import Params
 from mcz.viewing.contents import Contents, FarAway, OnDisk
@@ -104,7 +104,7 @@ class Remote:
     def open(self) -> Contents:
         with self._lock:
             if self._source is None:
-                self._source = reached(self.source)
+                self._source = open_bytes(self.source)
         return FarAway(self._source, self._tag)
 
 

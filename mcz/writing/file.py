@@ -28,9 +28,9 @@ from mcz.threads import limited
 from mcz.types import Params, Progress, Target
 from mcz.writing.atomic import refuse_inputs, replacing
 from mcz.writing.planning import prepare, under_its_path, with_true_sources
-from mcz.writing.source_encoder import Entry, encoding_options
+from mcz.writing.source_encoder import SourceEncoder, encoding_options
 from mcz.writing.tuning import write_motion
-from mcz.writing.write_transaction import Draft, check_metadata
+from mcz.writing.write_transaction import WriteTransaction, check_metadata
 
 SHORT = 65536  # bytes of a source file whose skeleton and texts are a large part of what is written
 
@@ -179,17 +179,19 @@ def encode(
         verbatim=verbatim,
         keep_skeleton=True,
     )
-    entry = Entry(path, path.name, options, encoding_options(codec, effort, params))
+    entry = SourceEncoder(path, path.name, options, encoding_options(codec, effort, params))
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
         short = is_table(path) or (path.exists() and path.stat().st_size <= SHORT)
-        draft = Draft(stream, profile_named(profile), hold=verbatim, copies=copies, short=short)
-        entry.write(draft, progress)
+        transaction = WriteTransaction(
+            stream, profile_named(profile), hold=verbatim, copies=copies, short=short
+        )
+        entry.write(transaction, progress)
         refuse_inputs(target, entry.inputs)
-        draft.finish()
+        transaction.finish()
     if entry.remark:
         warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
-    directory, size = draft.writer.directory, draft.writer.offset
+    directory, size = transaction.writer.directory, transaction.writer.offset
     found = written(directory, size, entry.quality, entry.notes, entry.source_bytes)
     return replace(found, inputs=tuple(map(str, entry.inputs)))
 

@@ -34,7 +34,7 @@ from mcz.units import in_unit
 from mcz.writing.clip_writer import write_skeletons
 from mcz.writing.planning import StoredSkeleton, prepare, read_with
 from mcz.writing.tuning import write_motion
-from mcz.writing.write_transaction import Draft, check_name, clip_name
+from mcz.writing.write_transaction import WriteTransaction, check_name, clip_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class WritingOptions:
             yield
 
 
-class Entry:
+class SourceEncoder:
     """One source file on its way into an MCZ file, under the relative path ``name``."""
 
     def __init__(
@@ -109,25 +109,25 @@ class Entry:
         kept = self.inputs[:1] if self.reason else dict.fromkeys(self.inputs)
         return sum(path.stat().st_size for path in kept)
 
-    def write(self, draft: Draft, progress: Progress | None = None) -> str:
+    def write(self, transaction: WriteTransaction, progress: Progress | None = None) -> str:
         """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
         check_name(self.name)
         data = read_bytes(self.path)
         digest = hashlib.sha256(data).digest()
-        if draft.holds(self.name, digest):
+        if transaction.holds(self.name, digest):
             return "present"
         given = self._given_skeleton(data)
         try:
-            with draft.step():
-                result = self._parsed(draft.writer, data, given, progress)
+            with transaction.step():
+                result = self._parsed(transaction.writer, data, given, progress)
         except (SourceError, MotionError, LimitError) as error:
             if not self.options.verbatim:
                 raise
             self.reason, self.remark, self.notes = remark_of(error), "", ()
-            with draft.step():
-                draft.writer.attachment(self.name, data)
+            with transaction.step():
+                transaction.writer.attachment(self.name, data)
             result = "verbatim"
-        draft.paths[self.name] = digest
+        transaction.paths[self.name] = digest
         return result
 
     def _given_skeleton(self, data: bytes) -> Given:

@@ -25,7 +25,7 @@ Digest = bytes | Callable[[], bytes]
 METADATA_KEYS = tuple(KEYS)
 
 
-class Draft:
+class WriteTransaction:
     """A file that is being written in steps: a step that fails leaves no trace.
 
     ``paths`` tells what the file restores under each path: the SHA-256 of those bytes, or a
