@@ -37,23 +37,25 @@ from mcz.types import Settings
     help="Store paths relative to DIR. Default: names without folders.",
 )
 @click.option(
-    "--salvage", is_flag=True, help="Of a file that was cut short keep what is whole at its end."
+    "--salvage", is_flag=True, help="Keep whole clips at the end of a file that was cut short."
 )
 @click.option(
-    "--force", is_flag=True, help="Of a file that was cut short drop what is whole at its end."
+    "--force", is_flag=True, help="Drop whole clips at the end of a file that was cut short."
 )
 @click.option(
-    "--rename", is_flag=True, help="Of an .mcz put what has a name that is taken below its own."
+    "--rename",
+    is_flag=True,
+    help="Put clips of an .mcz whose name is taken below the name of their file.",
 )
 @click.option(
     "--skip-identical",
     is_flag=True,
-    help="Of an .mcz leave out what is the same here under the same name.",
+    help="Skip clips of an .mcz that are here already, the same under the same name.",
 )
 @click.option(
     "--replace",
     is_flag=True,
-    help="Put a file in the place of another one of its path; rewrites FILE.mcz.",
+    help="Replace a file of the same path; rewrites FILE.mcz.",
 )
 @copies_option("where the file has some")
 @encoding_options

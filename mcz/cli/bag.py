@@ -8,7 +8,7 @@ from mcz.cli.common import Exit, Failure, about, echo, plural, print_json
 from mcz.cli.options import json_option
 
 
-@click.command(short_help="Archives in a bag (BagIt) with their checksums.")
+@click.command(short_help="Put archives into a bag (BagIt) with their checksums.")
 @click.argument(
     "files", metavar="FILE.mcz...", nargs=-1, required=True, type=click.Path(readable=False)
 )

@@ -29,13 +29,14 @@ PAPERS = "python -m tools.papers"
 @click.option(
     "--codecs",
     metavar="A,B",
-    help="Codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is that alone. Default: all.",
+    help=(
+        "Compare these codecs, each with its presets; qbc:khan2014 or qbc:delta=40 "
+        "is that alone. Default: all."
+    ),
 )
 @click.option("--tables", "paper", hidden=True)  # where the papers' tables are is said
-@click.option("--peers", is_flag=True, help="General compressors too, those that are installed.")
-@click.option(
-    "--speeds/--no-speeds", default=True, help="Measure speed and memory too. Default: do."
-)
+@click.option("--peers", is_flag=True, help="Add the general compressors that are installed.")
+@click.option("--speeds/--no-speeds", default=True, help="Measure speed and memory, too (default).")
 @unit_option("Length unit of files that say none.")
 @click.option(
     "--out",
@@ -44,9 +45,12 @@ PAPERS = "python -m tools.papers"
     help="Write index.html, results.json, report.md and plots into DIR, over earlier ones.",
 )
 @click.option(
-    "--jobs", metavar="N", type=click.IntRange(1), help="Processes. Default: one a processor."
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Work with N processes. Default: one a processor.",
 )
-@click.option("--cache/--no-cache", default=True, help="Reuse earlier results. Default: do.")
+@click.option("--cache/--no-cache", default=True, help="Reuse earlier results (default).")
 @json_option
 def command(
     clips: tuple[str, ...],

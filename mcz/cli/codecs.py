@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 WIDEST = 44  # characters of a line of the meaning
 
 
-@click.command(short_help="The codecs, and the parameters of each.")
+@click.command(short_help="List codecs and their parameters.")
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @json_option
 def command(names: tuple[str, ...], as_json: bool) -> Exit:

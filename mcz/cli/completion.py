@@ -9,7 +9,7 @@ from mcz.cli.common import Exit, Failure, echo
 SHELLS = ("bash", "zsh", "fish")
 
 
-@click.command(short_help="Completion for bash, zsh or fish.")
+@click.command(short_help="Print completion for bash, zsh or fish.")
 @click.argument("shell", metavar="|".join(SHELLS), type=click.Choice(SHELLS))
 def command(shell: str) -> Exit:
     """Print what a shell needs to complete mcz commands and options with the tab key.

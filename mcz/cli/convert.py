@@ -33,16 +33,21 @@ MCZ = ".mcz"
 OF_SOURCES = ("skeleton", "arrays", "model")
 
 
-@click.command(short_help="A motion file to one of another format, in one step.")
+@click.command(short_help="Convert a motion file to another format, in one step.")
 @click.argument("file", metavar="IN", type=click.Path(readable=False))
 @click.argument("output", metavar="OUT")
 @click.option(
-    "--to", "target", type=click.Choice(TARGETS), help="Default: what the suffix of OUT says."
+    "--to",
+    "target",
+    type=click.Choice(TARGETS),
+    help="Set the format. Default: by the suffix of OUT.",
 )
-@click.option("--clip", "names", metavar="NAME", multiple=True, help="Which clip of an .mcz.")
+@click.option("--clip", "names", metavar="NAME", multiple=True, help="Choose the clip of an .mcz.")
 @where_option
 @frames_option("Frames A <= f < B, counted from 0.")
-@click.option("--joints", metavar="a,b", help="Joints by name or index (to csv or npz).")
+@click.option(
+    "--joints", metavar="a,b", help="Write these joints alone, by name or index (to csv or npz)."
+)
 @skeleton_option("The ASF of an AMC, or none. Default: the one beside it, as in mcz encode.")
 @rate_option(ITS_RATE_HELP)
 @unit_option("Length unit of a file that says none.")
@@ -50,7 +55,7 @@ OF_SOURCES = ("skeleton", "arrays", "model")
 @arrays_option
 @model_option
 @key_error_option
-@click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
+@click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF), too.")
 @decoded_option
 @force_option
 @threads_option

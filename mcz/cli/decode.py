@@ -54,25 +54,29 @@ if TYPE_CHECKING:
     from mcz.reading.file import File
 
 
-@click.command(short_help="The original file again, or its numbers.")
+@click.command(short_help="Restore the original file, or write its numbers.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.option(
     "-o",
     "--output",
     metavar="OUT",
-    help="A file, whose suffix says what it becomes, a folder, or - for standard output. Default: "
-    "the source's name, beside FILE.mcz.",
+    help=(
+        "Write to a file, whose suffix sets the format, a folder, or - for standard "
+        "output. Default: the source's name, beside FILE.mcz."
+    ),
 )
 @click.option(
     "--clip",
     "names",
     metavar="NAME",
     multiple=True,
-    help="Which clip; needed where there are several, and may be repeated.",
+    help="Choose a clip (repeatable); needed if there are several.",
 )
 @where_option
 @frames_option("Frames A <= f < B, counted from 0.")
-@click.option("--joints", metavar="a,b", help="Joints by name or index (with --to).")
+@click.option(
+    "--joints", metavar="a,b", help="Write these joints alone, by name or index (with --to)."
+)
 @click.option(
     "--resolution",
     metavar="K",
@@ -87,7 +91,7 @@ if TYPE_CHECKING:
     "--preview",
     "preview",
     is_flag=True,
-    help="Only frames that can be read without decoding the rest (with --to).",
+    help="Write only frames that need no decoding of the rest (with --to).",
 )
 @click.option(
     "--post-filter",
@@ -99,17 +103,17 @@ if TYPE_CHECKING:
     "--to",
     "target",
     type=click.Choice(TARGETS),
-    help="Numbers, or the motion as another format, instead of the source file. Default: what the "
-    "suffix of OUT says.",
+    help=(
+        "Write numbers, or the motion in another format, instead of the source "
+        "file. Default: by the suffix of OUT."
+    ),
 )
 @click.option(
     "--signal",
     metavar="NAME",
-    help="Another signal, such as analog or outputs, or the events (with --to csv or npz).",
+    help=("Write another signal, such as analog or outputs, or the events (with --to csv or npz)."),
 )
-@click.option(
-    "--stored", is_flag=True, help="Its words as they are stored, not in units (with --signal)."
-)
+@click.option("--stored", is_flag=True, help="Write words as stored, not in units (with --signal).")
 @up_option("Axis that points up, where the clip does not know it (with --to c3d, glb or usda).")
 @unit_option("Length unit, where the clip does not know it (with --to another format).")
 @key_error_option
@@ -120,12 +124,12 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Fit the skeleton of a clip of positions to them (--to amc, bvh, glb or usda).",
 )
-@click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
+@click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF), too.")
 @salvage_option
 @click.option(
     "--unverified",
     is_flag=True,
-    help="Read no more than the part that is wanted: fewer bytes, but no checksum covers them.",
+    help="Read only the bytes that are needed; no checksum covers them.",
 )
 @decoded_option
 @force_option

@@ -15,7 +15,7 @@ from mcz.cli.progress import Progress
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @where_option
 @click.option(
-    "--aliases", is_flag=True, help="Delete further names of the same content, too, not refuse."
+    "--aliases", is_flag=True, help="Also delete further names of the same content, else refused."
 )
 @output_option
 @force_option

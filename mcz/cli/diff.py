@@ -56,7 +56,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     return () if value is None else tuple(name.strip() for name in value.split(",") if name.strip())
 
 
-@click.command(short_help="How far one motion is from another.", epilog=EXIT_CODES)
+@click.command(short_help="Measure how far one motion is from another.", epilog=EXIT_CODES)
 @click.argument("a", metavar="A", type=click.Path(readable=False))
 @click.argument("b", metavar="B", type=click.Path(readable=False))
 @click.option(
@@ -64,7 +64,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     "names",
     metavar="NAME",
     multiple=True,
-    help="Which clip of an .mcz; may be repeated. Default: the only one, or all that both have.",
+    help=("Choose a clip of an .mcz (repeatable). Default: the only one, or all that both have."),
 )
 @where_option
 @frames_option("Frames A <= f < B of both, from 0.")
@@ -81,15 +81,17 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     type=float,
     default=3.0,
     callback=_to_radius,
-    help="Radius of the shell around where joints start. Default: 3.",
+    help="Set the radius of the shell around joints. Default: 3.",
 )
-@click.option("--by-joint", is_flag=True, help="The distances of every joint, too.")
-@click.option("--contacts", is_flag=True, help="Every contact of a foot with the floor, too.")
+@click.option("--by-joint", is_flag=True, help="Print the distances of every joint.")
+@click.option("--contacts", is_flag=True, help="Print every contact of a foot with the floor.")
 @click.option(
     "--feet",
     metavar="NAME,...",
     callback=_to_names,
-    help="Joints that stand on the floor. Default: those called foot, toe, ankle or heel.",
+    help=(
+        "Name the joints that stand on the floor. Default: those called foot, toe, ankle or heel."
+    ),
 )
 @decoded_option
 @json_option

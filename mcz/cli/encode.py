@@ -42,14 +42,16 @@ if TYPE_CHECKING:
     from mcz.writing.file import Written
 
 
-@click.command(short_help="A .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv or .npz file to .mcz.")
+@click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv or .npz file.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.argument("more", metavar="", nargs=-1, type=click.Path(readable=False))
 @click.option(
     "-o",
     "--output",
     metavar="OUT.mcz",
-    help="A file, a folder, or - for standard output. Default: SRC with the suffix .mcz.",
+    help=(
+        "Write to a file, a folder, or - for standard output. Default: SRC with the suffix .mcz."
+    ),
 )
 @skeleton_option(
     "The ASF of an AMC, or none. Default: one beside it or in a sibling folder asf/ that has "
@@ -59,7 +61,10 @@ if TYPE_CHECKING:
     "--format",
     "format_name",
     type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "npy", "npz")),
-    help="What standard input is. Default: what it looks like; live BVH, or AMC with --skeleton.",
+    help=(
+        "Set the format of standard input. Default: by its content; live BVH, or "
+        "AMC with --skeleton."
+    ),
 )
 @copies_option("no")
 @encoding_options

@@ -24,10 +24,10 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import TARGETS
 
 
-@click.command(short_help="Every clip as another format: NPZ, CSV, BVH, AMC, C3D, GLB, USD.")
+@click.command(short_help="Write every clip in another format: NPZ, CSV, BVH, AMC, C3D, GLB, USD.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
-@click.option("--to", "target", type=click.Choice(TARGETS), required=True, help="The format.")
+@click.option("--to", "target", type=click.Choice(TARGETS), required=True, help="Set the format.")
 @clips_option
 @where_option
 @rate_option()

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from mcz.editing.extraction import ExtractedClip, Extraction
 
 
-@click.command(short_help="A part of an .mcz, cut out of its stored bytes.")
+@click.command(short_help="Cut a part out of an .mcz, without re-encoding.")
 @click.argument("file", metavar="IN.mcz", type=click.Path(readable=False))
 @click.argument("output", metavar="OUT.mcz", type=click.Path(readable=False))
 @click.option(

@@ -78,8 +78,10 @@ RATIOS = (  # of the bytes that a codec wrote, which restore no source alone
 @click.option(
     "--preview/--no-preview",
     default=None,
-    help="How much it moves over time, as a line, and which joints take which bytes, as bars. "
-    "Default: on a terminal, of clips that are quickly decoded.",
+    help=(
+        "Draw the energy over time as a line, and the bytes of joints as bars. "
+        "Default: on a terminal, for clips that are quickly decoded."
+    ),
 )
 @decoded_option
 def command(

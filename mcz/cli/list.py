@@ -33,17 +33,20 @@ USUAL = ("name", "codec", "n_frames", "n_channels", "frame_rate", "duration")
 HEADS = {"name": "clip", "n_frames": "frames", "n_channels": "channels", "frame_rate": "rate"}
 
 
-@click.command(short_help="Names of clips, from the index alone.")
+@click.command(short_help="List clips, from the index alone.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @where_option
 @click.option(
     "--columns",
     metavar="a,b",
-    help="Fields and metadata keys, such as name,subject,duration,description; see "
-    "docs/queries.md. Default: what the index has.",
+    help=(
+        "Print these fields and metadata keys, such as "
+        "name,subject,duration,description; see docs/queries.md. Default: those of "
+        "the index."
+    ),
 )
 @click.option("--sort", metavar="KEY", help="Sort by a field or metadata key; -KEY: descending.")
-@click.option("--csv", "as_csv", is_flag=True, help="Print a table with commas, clips alone.")
+@click.option("--csv", "as_csv", is_flag=True, help="Print a CSV table of the clips alone.")
 @salvage_option
 @json_option
 def command(

@@ -14,14 +14,14 @@ from mcz.cli.progress import Progress
 @click.argument(
     "sources", metavar="IN.mcz...", nargs=-1, required=True, type=click.Path(readable=False)
 )
-@click.option("-o", "--output", metavar="OUT.mcz", required=True, help="The file to write.")
+@click.option("-o", "--output", metavar="OUT.mcz", required=True, help="Write to this file.")
 @click.option(
     "--rename",
     is_flag=True,
-    help="Put what has a name that is taken below the name of its file: day2/walk.",
+    help="Put clips whose name is taken below the name of their file: day2/walk.",
 )
 @click.option(
-    "--skip-identical", is_flag=True, help="Take what is the same under one name in two files once."
+    "--skip-identical", is_flag=True, help="Take content that two files share under one name once."
 )
 @force_option
 @json_option

@@ -66,29 +66,38 @@ def _to_pairs(
 )
 @click.option(
     "--from", "table", metavar="TABLE.csv", type=click.Path(readable=False),
-    help="What a table says: a row a clip, a column a key; CSV or TSV with a head.",
+    help=(
+"Set the metadata of a table: a row a clip, a column a key; CSV or TSV with "
+"a head."
+),
 )  # fmt: skip
 @click.option(
     "--match",
     metavar="TEXT",
-    help="How columns of the table name clips: {subject:0>2}_{trial:0>2}. Default: a column clip, "
-    "name, path or file.",
+    help=(
+        "Name clips by columns of the table: {subject:0>2}_{trial:0>2}. Default: a "
+        "column clip, name, path or file."
+    ),
 )
 @click.option(
     "--take", metavar="a,b",
-    help="The columns of the table to take, as KEY=COLUMN where they are called otherwise. "
-    "Default: all.",
+    help=(
+"Take these columns of the table, as KEY=COLUMN if the names differ. "
+"Default: all."
+),
 )  # fmt: skip
 @click.option("--skip-unknown", is_flag=True, help="Ignore rows that match no clip.")
 @click.option(
     "--rate", metavar="R", callback=to_rate,
-    help="Frames a second of clips whose source does not say it (AMC): rewrites the file. Default: "
-    "of all whose rate is unknown.",
+    help=(
+"Set the frame rate of clips whose source states none (AMC); rewrites the "
+"file. Default: of all clips of unknown rate."
+),
 )  # fmt: skip
-@click.option("--force", is_flag=True, help="Change a rate that is known.")
+@click.option("--force", is_flag=True, help="Change a known rate.")
 @click.option(
     "--purge", is_flag=True,
-    help="Rewrite the file so that nothing of what was set or removed before is left in it.",
+    help="Rewrite the file without any earlier metadata.",
 )  # fmt: skip
 @json_option
 def command(

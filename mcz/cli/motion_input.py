@@ -31,7 +31,10 @@ def moving_options(function: Function) -> Function:
     """``--clip --frames --rate --unit --up --skeleton --arrays --model --max-decoded``."""
     options = (
         click.option(
-            "--clip", "name", metavar="NAME", help="Which clip of an .mcz. Default: the only one."
+            "--clip",
+            "name",
+            metavar="NAME",
+            help="Choose the clip of an .mcz. Default: the only one.",
         ),
         frames_option("Frames A <= f < B, from 0."),
         rate_option(),

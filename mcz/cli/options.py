@@ -44,7 +44,7 @@ version_option = click.option(
     is_eager=True,
     expose_value=False,
     callback=_print_version,
-    help="Print the version and leave.",
+    help="Print the version and exit.",
 )
 
 
@@ -108,7 +108,7 @@ def threads_option(function: Function) -> Function:
         "--threads",
         metavar="N",
         type=click.IntRange(1),
-        help="Decode and code with N threads. Default: one a processor.",
+        help="Decode and encode with N threads. Default: one a processor.",
     )(command)
 
 
@@ -127,7 +127,7 @@ def jobs_option(function: Function) -> Function:
         "--jobs",
         metavar="N",
         type=click.IntRange(1),
-        help="Work with N processes where there is much to do. Default: one a processor.",
+        help="Work with N processes if it pays. Default: one a processor.",
     )(command)
 
 
@@ -146,7 +146,7 @@ clips_option = click.option(
     "clips",
     metavar="NAME",
     multiple=True,
-    help="Only this clip; may be repeated. Default: all.",
+    help="Choose a clip (repeatable). Default: all.",
 )
 
 
@@ -171,8 +171,10 @@ token_option = click.option(
     "--token",
     metavar="TEXT",
     envvar="MCZ_TOKEN",
-    help="What a client sends before it gets anything; MCZ_TOKEN in the environment keeps it out "
-    "of the list of processes. It encrypts nothing.",
+    help=(
+        "Require this token from clients; MCZ_TOKEN in the environment keeps it out "
+        "of the list of processes. It encrypts nothing."
+    ),
 )
 
 param_option = click.option(
@@ -221,7 +223,7 @@ def arrays_option(function: Function) -> Function:
     return click.option(
         "--arrays",
         type=click.Choice(ARRAYS),
-        help="Set what the numbers of a plain .npy or .npz are.",
+        help="Set the meaning of the numbers of a plain .npy or .npz.",
     )(function)
 
 
@@ -230,8 +232,11 @@ def model_option(function: Function) -> Function:
     return click.option(
         "--model",
         metavar="NPZ",
-        help="Your own model file of SMPL and its kin: how long the bones of bodies in an .npz "
-        "are. {gender} in it stands for that of the take, {body} for smpl, smplh or smplx.",
+        help=(
+            "Take the bone lengths of bodies in an .npz from your model file of SMPL "
+            "and its kin. {gender} stands for that of the take, {body} for smpl, smplh "
+            "or smplx."
+        ),
     )(function)
 
 
@@ -241,8 +246,11 @@ def key_error_option(function: Function) -> Function:
         "--key-error",
         metavar="MM",
         type=click.FloatRange(min=0),
-        help="Keys of an animation are left out where all stays within MM (with --to glb). 0: a "
-        "key in every frame. Default: 0.1, or 1/20,000 of the figure where its unit is unknown.",
+        help=(
+            "Leave out keys of an animation as long as all stays within MM (with --to "
+            "glb). 0: a key in every frame. Default: 0.1, or 1/20,000 of the figure if "
+            "its unit is unknown."
+        ),
     )(function)
 
 
@@ -265,7 +273,7 @@ def rate_option(help_text: str = RATE_HELP) -> Callable[[Function], Function]:
 def force_rate_option(function: Function) -> Function:
     """``--force-rate``, as the argument ``force_rate``."""
     return click.option(
-        "--force-rate", is_flag=True, help="Use --rate also where a file states another."
+        "--force-rate", is_flag=True, help="Use --rate even for files that state another."
     )(function)
 
 
@@ -294,30 +302,37 @@ def check_force_rate(options: Settings) -> None:
 def encoding_options(function: Function) -> Function:
     """``--codec --effort --param --unit --up ...``, as the arguments of those names."""
     options = (
-        click.option("--codec", metavar="NAME", help="Default: fast, which is lossless."),
+        click.option(
+            "--codec", metavar="NAME", help="Set the codec. Default: fast, which is lossless."
+        ),
         click.option(
             "--effort",
             type=click.Choice(EFFORTS),
-            help="A lossless codec: read fastest, or smallest.",
+            help="Choose a lossless codec: read fastest, or smallest.",
         ),
         click.option(
             "--quality",
             metavar="Q",
             callback=_to_quality,
-            help="Lossy, no point off by more than a length (0.5mm), or than mm (1 mm), visible "
-            "(5 mm) or preview (3 cm) say. Default of --codec with it: lossy.",
+            help=(
+                "Encode lossy, with no point off by more than a length (0.5mm), or than mm "
+                "(1 mm), visible (5 mm) or preview (3 cm). Sets --codec to lossy by "
+                "default."
+            ),
         ),
         param_option,
         unit_option("Length unit of the source."),
         up_option("Axis of the source that points up. BVH and AMC do not say theirs."),
         arrays_option,
         model_option,
-        click.option("--verbatim", is_flag=True, help="Keep what cannot be parsed as attachment."),
+        click.option(
+            "--verbatim", is_flag=True, help="Keep files that cannot be parsed as attachments."
+        ),
         click.option(
             "--profile",
             type=click.Choice(("small", "base", "large")),
             default="base",
-            help="Limits of the file; small is for embedded readers.",
+            help="Set the limits of the file; small is for embedded readers.",
         ),
     )
 

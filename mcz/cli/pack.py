@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from mcz.editing.batch_report import Report
 
 
-@click.command(short_help="A folder of motion files to one .mcz.")
+@click.command(short_help="Pack a folder of motion files into one .mcz.")
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
 @encoding_options
@@ -40,10 +40,12 @@ if TYPE_CHECKING:
 @click.option(
     "--scheduler",
     metavar="tcp://HOST:PORT",
-    help="Read and code on the machines of this Dask scheduler; DIR and OUT.mcz may be URLs.",
+    help=("Read and encode on the machines of this Dask scheduler; DIR and OUT.mcz may be URLs."),
 )
 @click.option(
-    "--mtimes", is_flag=True, help="Keep when each file was last changed; unpack --mtimes sets it."
+    "--mtimes",
+    is_flag=True,
+    help="Keep the time of last change of each file; unpack --mtimes sets it.",
 )
 @copies_option("yes")
 @force_option

@@ -32,7 +32,7 @@ MOST_ROWS = 24  # of a table that is printed
 
 
 @click.command(
-    short_help="Channels, errors, spectra, bytes as PNG, SVG or a page.", epilog=EXIT_CODES
+    short_help="Plot channels, errors, spectra or bytes as PNG, SVG or a page.", epilog=EXIT_CODES
 )
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @click.argument("other", metavar="[FILE2]", required=False, type=click.Path(readable=False))
@@ -41,28 +41,40 @@ MOST_ROWS = 24  # of a table that is printed
     "--output",
     metavar="OUT",
     type=click.Path(readable=False),
-    help="A .png, a .svg, or a .html with the tables. Default: FILE as .png.",
+    help="Write a .png, a .svg, or a .html with the tables. Default: FILE as .png.",
 )
 @click.option(
     "--what",
     type=click.Choice(WHAT),
-    help="Default: channels, of two files the error of FILE2 against FILE.",
+    help=("Choose the plot. Default: channels; of two files the error of FILE2 against FILE."),
 )
-@click.option("--joint", metavar="NAME", help="Whose channels or spectrum. Default: the first.")
-@click.option("--signal", metavar="NAME", help="Another signal than the motion, such as analog.")
+@click.option(
+    "--joint",
+    metavar="NAME",
+    help="Plot the channels or the spectrum of this joint. Default: the first.",
+)
+@click.option(
+    "--signal", metavar="NAME", help="Plot another signal than the motion, such as analog."
+)
 @click.option(
     "--channel",
     "channels",
     metavar="A,B",
     callback=lambda context, parameter, value: value and tuple(value.split(",")),
-    help="Channels of a signal, by name. Default: the first 8.",
+    help="Plot these channels of a signal, by name. Default: the first 8.",
 )
 @click.option(
-    "--codecs", metavar="A,B", help="Lossy codecs of rate-distortion. Default: posewave,mrdwt."
+    "--codecs",
+    metavar="A,B",
+    help="Set the lossy codecs of rate-distortion. Default: posewave,mrdwt.",
 )
 @moving_options
-@click.option("--size", metavar="WxH", callback=to_size, help="Pixels. Default: what suits it.")
-@click.option("--theme", type=click.Choice(("light", "dark")), default="light", help="Colors.")
+@click.option(
+    "--size", metavar="WxH", callback=to_size, help="Set the size in pixels. Default: by the plot."
+)
+@click.option(
+    "--theme", type=click.Choice(("light", "dark")), default="light", help="Set the colors."
+)
 @force_option
 @json_option
 def command(

@@ -26,7 +26,7 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
     return share
 
 
-@click.command(short_help="Recovery data: what repair makes a damaged .mcz whole with.")
+@click.command(short_help="Add recovery data, with which repair restores a damaged .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.option(
     "--redundancy",
@@ -34,14 +34,16 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
     default="5%",
     show_default=True,
     callback=_to_share,
-    help="Of its bytes, how many to add; a small file gets more, so that it can take something.",
+    help=(
+        "Set the share of bytes to add; a small file gets more, so that it survives some damage."
+    ),
 )
 @click.option(
     "--anew",
     is_flag=True,
-    help="Rewrite the file, and make recovery data for all of it together.",
+    help="Rewrite the file, with recovery data for all of it together.",
 )
-@click.option("--check", is_flag=True, help="Say how the file is, and change nothing.")
+@click.option("--check", is_flag=True, help="Report the state of the file, and change nothing.")
 @json_option
 def command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool) -> Exit:
     """Append recovery data to FILE.mcz: mcz repair then restores every byte of it.

@@ -41,33 +41,37 @@ def to_size(
     return int(match[1]), int(match[2] or match[1])
 
 
-@click.command(short_help="A motion as GIF, MP4, WebM, PNG or SVG.", epilog=EXIT_CODES)
+@click.command(short_help="Render a motion as GIF, MP4, WebM, PNG or SVG.", epilog=EXIT_CODES)
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @click.option(
     "-o",
     "--output",
     metavar="OUT",
     type=click.Path(readable=False),
-    help="A .gif, .mp4, .webm, .png or .svg. Default: FILE as .gif, of a sheet as .png.",
+    help=("Write a .gif, .mp4, .webm, .png or .svg. Default: FILE as .gif, a sheet as .png."),
 )
 @moving_options
-@click.option("--sheet", metavar="N", type=int, help="N poses on one .png or .svg.")
-@click.option("--fps", metavar="R", type=float, help="Pictures a second. Default: GIF 25, else 30.")
+@click.option("--sheet", metavar="N", type=int, help="Draw N poses on one .png or .svg.")
 @click.option(
-    "--speed", metavar="X", type=float, default=1.0, help="How fast it plays. Default: 1."
+    "--fps", metavar="R", type=float, help="Set the pictures a second. Default: GIF 25, else 30."
 )
-@click.option("--size", metavar="WxH", callback=to_size, help="Pixels. Default: 640x640.")
+@click.option("--speed", metavar="X", type=float, default=1.0, help="Set the speed. Default: 1.")
+@click.option(
+    "--size", metavar="WxH", callback=to_size, help="Set the size in pixels. Default: 640x640."
+)
 @click.option(
     "--view",
     type=click.Choice(VIEWS),
     default="three-quarter",
-    help="From where the figure faces first. Default: three-quarter.",
+    help=("Set the view, relative to the figure's first facing. Default: three-quarter."),
 )
-@click.option("--theme", type=click.Choice(("light", "dark")), default="light", help="Colors.")
+@click.option(
+    "--theme", type=click.Choice(("light", "dark")), default="light", help="Set the colors."
+)
 @click.option(
     "--follow/--no-follow",
     default=None,
-    help="Let the camera go along. Default: where the figure would be small otherwise.",
+    help="Move the camera along. Default: if the figure would be small otherwise.",
 )
 @force_option
 @json_option

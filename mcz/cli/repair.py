@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from mcz.editing.repair import Repair
 
 
-@click.command(short_help="A sound file of what is whole in a damaged one.")
+@click.command(short_help="Write the intact parts of a damaged .mcz to a sound one.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
-@click.option("-o", "--output", metavar="OUT.mcz", required=True, help="The file to write.")
+@click.option("-o", "--output", metavar="OUT.mcz", required=True, help="Write to this file.")
 @decoded_option
 @force_option
 @json_option

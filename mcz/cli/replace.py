@@ -36,25 +36,29 @@ if TYPE_CHECKING:
 @click.command(short_help="Replace the values of one joint.")
 @click.argument("file", metavar="IN.mcz", type=click.Path(readable=False))
 @click.argument("output", metavar="[OUT.mcz]", required=False, type=click.Path(readable=False))
-@click.option("--joint", metavar="J", required=True, help="The joint, by name or index.")
+@click.option("--joint", metavar="J", required=True, help="Name the joint, or give its index.")
 @click.option(
     "--values",
     "table",
     metavar="FILE",
     required=True,
     type=click.Path(readable=False),
-    help="Its new values, a .csv or .npz as decode --to writes them.",
+    help="Read the new values from a .csv or .npz as decode --to writes them.",
 )
-@click.option("--clip", "name", metavar="NAME", help="Which clip; needed where there are several.")
-@click.option("--in-place", is_flag=True, help="Write to IN.mcz itself; there is no OUT.mcz then.")
 @click.option(
-    "--on-grid", is_flag=True, help="Round to what the source prints. Default: every digit is kept."
+    "--clip", "name", metavar="NAME", help="Choose the clip; needed if there are several."
+)
+@click.option("--in-place", is_flag=True, help="Write to IN.mcz itself, without OUT.mcz.")
+@click.option(
+    "--on-grid", is_flag=True, help="Round to the digits of the source. Default: keep every digit."
 )
 @click.option(
     "--recode",
     is_flag=True,
-    help="Where all joints are coded in one, decode the clip and code it anew, so that others "
-    "change a little. Default: such a clip is refused.",
+    help=(
+        "Re-encode a clip whose joints are coded in one, so that others change a "
+        "little. Default: refuse such a clip."
+    ),
 )
 @copies_option("where IN.mcz has some")
 @force_option

@@ -18,12 +18,14 @@ from mcz.cli.progress import Progress
     metavar="KEY",
     default="folder",
     show_default=True,
-    help="A field or metadata key, such as subject; folder is the first part of the names.",
+    help=(
+        "Split by a field or metadata key, such as subject; folder is the first part of the names."
+    ),
 )
 @click.option(
     "--rest",
     metavar="NAME",
-    help="The file for attachments and for clips without KEY. Default: they are refused.",
+    help=("Put attachments and clips without KEY into this file. Default: refuse them."),
 )
 @force_option
 @json_option

@@ -11,7 +11,7 @@ from mcz.cli.lazy import lazy_group
 @click.command(
     cls=lazy_group("mcz.cli.stream_", ("encode", "decode")),
     name="stream",
-    short_help="Frames as they come: rows of numbers to a live stream, and back.",
+    short_help="Encode frames as they come: rows of numbers to a live stream, and back.",
     epilog=EXIT_CODES,
 )
 def command() -> None:

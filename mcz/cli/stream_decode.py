@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from mcz.live.generators import LiveReader
 
 
-@click.command(short_help="A live stream to rows of numbers.")
+@click.command(short_help="Decode a live stream to rows of numbers.")
 @click.argument("file", metavar="[FILE.mcz]", type=click.Path(readable=False), default="-")
 @click.option(
-    "--connect", metavar="HOST:PORT", help="Read from there over TCP; --join goes with it."
+    "--connect", metavar="HOST:PORT", help="Read from this address over TCP; implies --join."
 )
 @token_option
 @click.option(
@@ -54,13 +54,14 @@ if TYPE_CHECKING:
     help="Of frames that did not come: stop, print empty fields, the last frame that came, or "
     "what lies between that and the next one.",
 )
-@click.option("--join", is_flag=True, help="The stream may begin anywhere.")
+@click.option("--join", is_flag=True, help="Join a stream anywhere.")
 @click.option(
     "--timeout",
     metavar="SECONDS",
     type=click.FloatRange(min=0),
-    help="End where nothing comes for so long; 0: wait for ever.  [default: 30 with --connect, "
-    "else 0]",
+    help=(
+        "Stop after so long without data; 0: wait for ever.  [default: 30 with --connect, else 0]"
+    ),
 )
 @click.option(
     "--post-filter",

@@ -38,9 +38,12 @@ HEARTBEAT = 5.0  # seconds
 WARN_AFTER = 5.0  # seconds of frames
 
 
-@click.command(short_help="Rows of numbers to a live stream.")
+@click.command(short_help="Encode rows of numbers to a live stream.")
 @click.option(
-    "-o", "--output", metavar="OUT.mcz", help="Default: standard output, which - is, too."
+    "-o",
+    "--output",
+    metavar="OUT.mcz",
+    help="Write to a file, or - for standard output. Default: standard output.",
 )
 @click.option(
     "--listen",
@@ -60,14 +63,14 @@ WARN_AFTER = 5.0  # seconds of frames
 @rate_option("Frames a second (120, 29.97, 30000/1001).")
 @unit_option("Length unit of the numbers.")
 @up_option("Axis of the numbers that points up.")
-@click.option("--name", metavar="NAME", default="live", help="Of the clip.  [default: live]")
+@click.option("--name", metavar="NAME", default="live", help="Name the clip.  [default: live]")
 @click.option(
     "--skeleton",
     metavar="FILE",
     type=click.Path(readable=False),
-    help="Rows are the channels of the skeleton in a .bvh, .asf or .mcz file.",
+    help="Take rows as the channels of the skeleton in a .bvh, .asf or .mcz file.",
 )
-@click.option("--float32", "binary", is_flag=True, help="Rows are little-endian binary32.")
+@click.option("--float32", "binary", is_flag=True, help="Read little-endian binary32 rows.")
 @click.option(
     "--repeat",
     metavar="N",

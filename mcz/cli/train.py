@@ -38,7 +38,7 @@ AXES = "xyz"
     metavar="OUT",
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
-    help="The file of bases, for --param basis=OUT of mcz encode.",
+    help="Write the bases to a file, for --param basis=OUT of mcz encode.",
 )
 @click.option(
     "--P",
@@ -46,43 +46,52 @@ AXES = "xyz"
     metavar="N",
     type=click.IntRange(1),
     default=8,
-    help="Coefficients that may stay of each frame while learning. Default: 8.",
+    help="Keep so many coefficients of each frame while learning. Default: 8.",
 )
 @click.option(
     "--iterations",
     metavar="N",
     type=click.IntRange(0, 100_000),
     default=300,
-    help="At most so many, fewer where they gain nothing. Default: 300.",
+    help="Iterate at most so often, less if nothing is gained. Default: 300.",
 )
 @click.option(
     "--growth",
     metavar="N",
     type=click.IntRange(0, 10_000),
     default=40,
-    help="Iterations with each smaller P before them; 0 is the published algorithm. Default: 40.",
+    help=(
+        "Iterate so often with each smaller P before; 0 is the published algorithm. Default: 40."
+    ),
 )
-@click.option("--start", type=click.Choice(("dct", "haar")), default="dct", help="Default: dct.")
+@click.option(
+    "--start",
+    type=click.Choice(("dct", "haar")),
+    default="dct",
+    help="Set the first basis. Default: dct.",
+)
 @click.option(
     "--of",
     "kind",
     type=click.Choice(("frames", "steps", "windows")),
     default="steps",
-    help="What is to become sparse: steps between frames, frames themselves as published, or DCT "
-    "coefficients of windows. Default: steps.",
+    help=(
+        "Make sparse: steps between frames, frames themselves as published, or DCT "
+        "coefficients of windows. Default: steps."
+    ),
 )
 @click.option(
-    "--mirror/--no-mirror", default=False, help="Mirror images too, left points for right ones."
+    "--mirror/--no-mirror", default=False, help="Add mirror images, left points for right ones."
 )
 @click.option(
     "--headings",
     metavar="N",
     type=click.IntRange(1, 360),
     default=1,
-    help="Turned copies about the up axis, 180 / N degrees apart. Default: 1, none.",
+    help=("Add copies turned about the up axis, 180 / N degrees apart. Default: 1, none."),
 )
 @click.option(
-    "--every", metavar="N", type=click.IntRange(1), default=1, help="Every N-th frame alone."
+    "--every", metavar="N", type=click.IntRange(1), default=1, help="Take every N-th frame alone."
 )
 @unit_option("Length unit of files that say none.")
 @force_option

@@ -20,7 +20,7 @@ from mcz.cli.options import (
 from mcz.cli.progress import Progress
 
 
-@click.command(short_help="Every source file out of an .mcz.")
+@click.command(short_help="Restore every source file of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @clips_option
@@ -31,10 +31,13 @@ from mcz.cli.progress import Progress
     type=click.Choice(("stored", "portable", "strict")),
     default="stored",
     show_default=True,
-    help="Of names that some systems cannot hold, or not beside another: write them as stored "
-    "where this system can, write portable ones instead, or refuse them.",
+    help=(
+        "Treat names that some systems cannot hold, or not beside another: write "
+        "them as stored if this system can, write portable ones instead, or refuse "
+        "them."
+    ),
 )
-@click.option("--mtimes", is_flag=True, help="Give files the time that their clips' metadata have.")
+@click.option("--mtimes", is_flag=True, help="Set files to the time in their clips' metadata.")
 @decoded_option
 @force_option
 @threads_option

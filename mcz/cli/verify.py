@@ -46,15 +46,17 @@ if TYPE_CHECKING:
     type=click.Path(readable=False),
     help="Compare with this source file, too.",
 )
-@click.option("--quick", is_flag=True, help="Checksums and index alone: at the speed of the disk.")
+@click.option(
+    "--quick", is_flag=True, help="Check checksums and index alone, at the speed of the disk."
+)
 @click.option(
     "--report",
     metavar="REPORT",
     type=click.Path(readable=False),
-    help="Also write a report file: REPORT.txt or REPORT.json.",
+    help="Write a report file, too: REPORT.txt or REPORT.json.",
 )
 @click.option(
-    "--date", metavar="DATE", help="The date of the report. Default: now; 'none' leaves it out."
+    "--date", metavar="DATE", help="Set the date of the report. Default: now; 'none' leaves it out."
 )
 @where_option
 @decoded_option

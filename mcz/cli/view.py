@@ -53,7 +53,9 @@ OF_SERVER = ("no_browser", "keep", "host", "port")
 LOOPBACK = "127.0.0.1"
 
 
-@click.command(short_help="Motions in the browser, or in a page to mail.", epilog=EXIT_CODES)
+@click.command(
+    short_help="Show motions in the browser, or write a page to mail.", epilog=EXIT_CODES
+)
 @click.argument(
     "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(readable=False)
 )
@@ -63,17 +65,23 @@ LOOPBACK = "127.0.0.1"
     metavar="OUT.html",
     help="Write one page that holds the files and the player; OUT.rrd: a file for rerun.",
 )
-@click.option("--rerun", is_flag=True, help="In the viewer of rerun, which is started.")
+@click.option(
+    "--rerun", is_flag=True, help="Show the motion in the viewer of rerun, which is started."
+)
 @click.option("--no-browser", is_flag=True, help="Print the address, and open nothing.")
 @click.option("--keep", is_flag=True, help="Stay when the last page is closed, until Ctrl-C.")
 @click.option(
     "--host",
     metavar="NAME",
     default=LOOPBACK,
-    help="A name of this machine's own: 127.0.0.1, localhost or ::1.",
+    help="Listen on a name of this machine's own: 127.0.0.1, localhost or ::1.",
 )
 @click.option(
-    "--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Default: any free one."
+    "--port",
+    metavar="N",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Listen on this port. Default: any free one.",
 )
 @skeleton_option("The ASF of an AMC, or none. Default: found as mcz encode finds it.")
 @rate_option()
@@ -84,15 +92,19 @@ LOOPBACK = "127.0.0.1"
 @salvage_option
 @clips_option
 @where_option
-@click.option("--codec", metavar="NAME", help="With -o: code the clips so. Default: as they are.")
-@click.option("--effort", type=click.Choice(EFFORTS), help="With -o: a lossless codec.")
+@click.option(
+    "--codec",
+    metavar="NAME",
+    help="Encode the clips with this codec (with -o). Default: as they are.",
+)
+@click.option("--effort", type=click.Choice(EFFORTS), help="Choose a lossless codec (with -o).")
 @param_option
 @click.option(
     "--max-size",
     "most",
     metavar="BYTES",
     callback=to_bytes,
-    help="With -o: the most that the page may have (80M, 2G). Default: 50M.",
+    help="Set the greatest size of the page, 80M or 2G (with -o). Default: 50M.",
 )
 @decoded_option
 @force_option
