@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import struct
+import subprocess
+import sys
 from decimal import Decimal
 from fractions import Fraction
 
@@ -536,3 +539,12 @@ def test_a_matrix_is_printed_as_number_by_number(
             likely = -100 < values[row, column] < 100 and digits < 13 and grid.is_text
             easy = values[row, column] == 0 or _rounds_plainly(values[row, column], digits)
             assert found or not (likely and easy and grid.kind != GridKind.TEXT64)
+
+
+def test_no_tokens_have_a_grid() -> None:
+    """In a process of its own, where kernels are plain Python and no remainder by zero is 0."""
+    code = "from mcz.numbers import scan; from mcz.numbers.choose import choose_grid; "
+    code += "print(choose_grid(scan(b'', [], [])).kind.name)"
+    plain = dict(os.environ, MCZ_LOOPS="interpreted")
+    ran = subprocess.run([sys.executable, "-c", code], env=plain, capture_output=True, check=True)
+    assert ran.stdout.split() == [b"FIXED"]

@@ -227,9 +227,10 @@ def likely_formats(data: bytes) -> tuple[str, ...]:
     if re.match(rb"PATHFILETYPE[ \t]", start):
         return ("trc",)
     small = head.lower()
-    if _has_any(small, b"endheader") and re.search(rb"(?m)^[ \t]*endheader[ \t]*\r?$", small):
+    # words first: an expression anchored to lines is far slower
+    if b"endheader" in small and re.search(rb"(?m)^[ \t]*endheader[ \t]*\r?$", small):
         return ("sto", "mot")
-    if _has_any(small, b":bonedata", b":hierarchy") and re.search(_ASF_SECTION, small):
+    if (b":bonedata" in small or b":hierarchy" in small) and re.search(_ASF_SECTION, small):
         return ("asf",)
     vendor: str | None = _of("csv_files", "vendor_of")(head)
     if vendor is not None:
@@ -237,11 +238,6 @@ def likely_formats(data: bytes) -> tuple[str, ...]:
     if _of("amc", "is_amc")(head):
         return ("amc",)
     return () if _of("csv_files", "kind_of")(head) is None else ("csv",)
-
-
-def _has_any(text: bytes, *words: bytes) -> bool:
-    """Look for words, far quicker than an expression anchored to lines."""
-    return any(word in text for word in words)
 
 
 def recording_of(source: Source | None) -> Any:

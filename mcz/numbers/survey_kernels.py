@@ -48,7 +48,7 @@ class Survey(NamedTuple):
 def count(fields: Ints2, step: int, n_counted: int, survey: Survey) -> None:
     """Count so many of the tokens, a step apart and again from the first ones on."""
     decimals, significant, styles = survey
-    step %= len(fields)
+    step %= max(1, len(fields))
     token = -step
     for _ in range(n_counted):
         token += step
