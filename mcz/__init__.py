@@ -12,28 +12,6 @@ from typing import TYPE_CHECKING, Any
 from mcz import version as _version
 
 if TYPE_CHECKING:
-    from mcz.adapters.c3d import from_c3d, to_c3d
-    from mcz.adapters.ezc3d import from_ezc3d, to_ezc3d
-    from mcz.adapters.movement import from_movement, to_movement
-    from mcz.adapters.pybvh import from_pybvh, to_pybvh
-    from mcz.adapters.rerun import to_rerun
-    from mcz.bags import BagCheck, bag, check_bag
-    from mcz.conversion import Fit, convert, from_positions, left_out
-    from mcz.conversion.scenes import SceneFile, to_glb, to_usda
-    from mcz.datasets import Dataset, Window, dataset
-    from mcz.editing.archive import append, pack
-    from mcz.editing.batch_report import Outcome, Report
-    from mcz.editing.exporting import export
-    from mcz.editing.extraction import ExtractedClip, Extraction, extract
-    from mcz.editing.merging import merge
-    from mcz.editing.metadata_edit import set_metadata, set_rate
-    from mcz.editing.protecting import Protection
-    from mcz.editing.recovering import Recovery
-    from mcz.editing.reorganize import delete_clips, rename_clips, reorder_clips, split
-    from mcz.editing.repair import Repair, repair
-    from mcz.editing.replacing import Replacement, replace
-    from mcz.editing.rewriting import protect
-    from mcz.editing.unpacking import unpack
     from mcz.errors import (
         AccessError,
         ChecksumError,
@@ -53,24 +31,46 @@ if TYPE_CHECKING:
         UnsupportedError,
         WorkerError,
     )
-    from mcz.formats.body_models import offsets_from_positions, offsets_of_model
-    from mcz.formats.body_trees import body_skeleton
-    from mcz.formats.c3d_events import Event
-    from mcz.formats.c3d_recording import ForcePlatform, Recording
+    from mcz.exchange.adapters.c3d import from_c3d, to_c3d
+    from mcz.exchange.adapters.ezc3d import from_ezc3d, to_ezc3d
+    from mcz.exchange.adapters.movement import from_movement, to_movement
+    from mcz.exchange.adapters.pybvh import from_pybvh, to_pybvh
+    from mcz.exchange.conversion import Fit, convert, from_positions, left_out
+    from mcz.exchange.conversion.scenes import SceneFile, to_glb, to_usda
+    from mcz.exchange.datasets import Dataset, Window, dataset
+    from mcz.exchange.exporting import export
+    from mcz.files.bags import BagCheck, bag, check_bag
+    from mcz.files.editing.archive import append, pack
+    from mcz.files.editing.batch_report import Outcome, Report
+    from mcz.files.editing.extraction import ExtractedClip, Extraction, extract
+    from mcz.files.editing.merging import merge
+    from mcz.files.editing.metadata_edit import set_metadata, set_rate
+    from mcz.files.editing.protecting import Protection
+    from mcz.files.editing.recovering import Recovery
+    from mcz.files.editing.reorganize import delete_clips, rename_clips, reorder_clips, split
+    from mcz.files.editing.repair import Repair, repair
+    from mcz.files.editing.replacing import Replacement, replace
+    from mcz.files.editing.rewriting import protect
+    from mcz.files.editing.unpacking import unpack
+    from mcz.files.live.concealment import LiveFrame
+    from mcz.files.live.generators import LiveReader, stream_decode, stream_encode
+    from mcz.files.live.reader_with_losses import StreamSummary
+    from mcz.files.live.strict_reader import live_frames
+    from mcz.files.live.writer import LiveWriter
+    from mcz.files.reading.clip import Clip
+    from mcz.files.reading.faults import Problem, verify
+    from mcz.files.reading.file import Attachment, File, open
+    from mcz.files.reading.post_filtering import post_filter
+    from mcz.files.reading.read import read
+    from mcz.files.reading.source_files import read_skeleton
+    from mcz.files.reading.source_info import recording
+    from mcz.files.tables import to_pandas, to_xarray
+    from mcz.files.writing.file import encode, to_npz, write
     from mcz.hints import Hint
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
-    from mcz.kinematics.rest_pose import rest_positions
-    from mcz.live.concealment import LiveFrame
-    from mcz.live.generators import LiveReader, stream_decode, stream_encode
-    from mcz.live.reader_with_losses import StreamSummary
-    from mcz.live.strict_reader import live_frames
-    from mcz.live.writer import LiveWriter
-    from mcz.metrics import Comparison, compare
-    from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
-    from mcz.pictures.plotting import Plotted, plot
-    from mcz.pictures.rendering import Rendered, render
-    from mcz.poses import (
+    from mcz.kinematics.metrics import Comparison, compare
+    from mcz.kinematics.poses import (
         Root,
         accelerations,
         point_names,
@@ -81,50 +81,50 @@ if TYPE_CHECKING:
         times,
         velocities,
     )
-    from mcz.reading.clip import Clip
-    from mcz.reading.faults import Problem, verify
-    from mcz.reading.file import Attachment, File, open
-    from mcz.reading.post_filtering import post_filter
-    from mcz.reading.read import read
-    from mcz.reading.source_files import read_skeleton
-    from mcz.reading.source_info import recording
-    from mcz.retargeting.joint_maps import joint_map
-    from mcz.retargeting.mirroring import mirror
-    from mcz.retargeting.offsets import with_offsets
-    from mcz.retargeting.renaming import rename
-    from mcz.retargeting.retargeting import retarget
-    from mcz.retargeting.selection import select
-    from mcz.tables import to_pandas, to_xarray
-    from mcz.viewing.view import View, view
-    from mcz.writing.file import encode, to_npz, write
+    from mcz.kinematics.rest_pose import rest_positions
+    from mcz.kinematics.retargeting.joint_maps import joint_map
+    from mcz.kinematics.retargeting.mirroring import mirror
+    from mcz.kinematics.retargeting.offsets import with_offsets
+    from mcz.kinematics.retargeting.renaming import rename
+    from mcz.kinematics.retargeting.retargeting import retarget
+    from mcz.kinematics.retargeting.selection import select
+    from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+    from mcz.show.pictures.plotting import Plotted, plot
+    from mcz.show.pictures.rendering import Rendered, render
+    from mcz.show.rerun import to_rerun
+    from mcz.show.viewing.view import View, view
+    from mcz.sources.arrays.body_models import offsets_from_positions, offsets_of_model
+    from mcz.sources.arrays.body_trees import body_skeleton
+    from mcz.sources.c3d.events import Event
+    from mcz.sources.c3d.recording import ForcePlatform, Recording
 
 __version__ = _version.VERSION
 
 _HOMES = {
-    "mcz.adapters.c3d": ("from_c3d", "to_c3d"),
-    "mcz.adapters.ezc3d": ("from_ezc3d", "to_ezc3d"),
-    "mcz.adapters.movement": ("from_movement", "to_movement"),
-    "mcz.adapters.pybvh": ("from_pybvh", "to_pybvh"),
-    "mcz.adapters.rerun": ("to_rerun",),
-    "mcz.bags": ("BagCheck", "bag", "check_bag"),
-    "mcz.editing.metadata_edit": ("set_metadata", "set_rate"),
-    "mcz.editing.exporting": ("export",),
-    "mcz.tables": ("to_pandas", "to_xarray"),
-    "mcz.datasets": ("Dataset", "Window", "dataset"),
-    "mcz.editing.archive": ("append", "pack"),
-    "mcz.editing.unpacking": ("unpack",),
-    "mcz.editing.reorganize": ("delete_clips", "rename_clips", "reorder_clips", "split"),
-    "mcz.editing.merging": ("merge",),
-    "mcz.editing.batch_report": ("Outcome", "Report"),
-    "mcz.reading.clip": ("Clip",),
-    "mcz.live.concealment": ("LiveFrame",),
-    "mcz.conversion": ("Fit", "convert", "from_positions", "left_out"),
-    "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
-    "mcz.editing.rewriting": ("protect",),
-    "mcz.editing.protecting": ("Protection",),
-    "mcz.editing.recovering": ("Recovery",),
-    "mcz.editing.repair": ("Repair", "repair"),
-    "mcz.editing.replacing": ("Replacement", "replace"),
+    "mcz.exchange.adapters.c3d": ("from_c3d", "to_c3d"),
+    "mcz.exchange.adapters.ezc3d": ("from_ezc3d", "to_ezc3d"),
+    "mcz.exchange.adapters.movement": ("from_movement", "to_movement"),
+    "mcz.exchange.adapters.pybvh": ("from_pybvh", "to_pybvh"),
+    "mcz.show.rerun": ("to_rerun",),
+    "mcz.files.bags": ("BagCheck", "bag", "check_bag"),
+    "mcz.files.editing.metadata_edit": ("set_metadata", "set_rate"),
+    "mcz.exchange.exporting": ("export",),
+    "mcz.files.tables": ("to_pandas", "to_xarray"),
+    "mcz.exchange.datasets": ("Dataset", "Window", "dataset"),
+    "mcz.files.editing.archive": ("append", "pack"),
+    "mcz.files.editing.unpacking": ("unpack",),
+    "mcz.files.editing.reorganize": ("delete_clips", "rename_clips", "reorder_clips", "split"),
+    "mcz.files.editing.merging": ("merge",),
+    "mcz.files.editing.batch_report": ("Outcome", "Report"),
+    "mcz.files.reading.clip": ("Clip",),
+    "mcz.files.live.concealment": ("LiveFrame",),
+    "mcz.exchange.conversion": ("Fit", "convert", "from_positions", "left_out"),
+    "mcz.exchange.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
+    "mcz.files.editing.rewriting": ("protect",),
+    "mcz.files.editing.protecting": ("Protection",),
+    "mcz.files.editing.recovering": ("Recovery",),
+    "mcz.files.editing.repair": ("Repair", "repair"),
+    "mcz.files.editing.replacing": ("Replacement", "replace"),
     "mcz.hints": ("Hint",),
     "mcz.errors": (
         "AccessError",
@@ -145,16 +145,16 @@ _HOMES = {
         "UnsupportedError",
         "WorkerError",
     ),
-    "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
-    "mcz.reading.file": ("Attachment", "File", "open"),
-    "mcz.reading.read": ("read",),
-    "mcz.reading.source_info": ("recording",),
-    "mcz.writing.file": ("encode", "to_npz", "write"),
-    "mcz.reading.post_filtering": ("post_filter",),
+    "mcz.files.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
+    "mcz.files.reading.file": ("Attachment", "File", "open"),
+    "mcz.files.reading.read": ("read",),
+    "mcz.files.reading.source_info": ("recording",),
+    "mcz.files.writing.file": ("encode", "to_npz", "write"),
+    "mcz.files.reading.post_filtering": ("post_filter",),
     "mcz.kinematics.marker_motion": ("in_positions",),
-    "mcz.live.strict_reader": ("live_frames",),
-    "mcz.live.writer": ("LiveWriter",),
-    "mcz.poses": (
+    "mcz.files.live.strict_reader": ("live_frames",),
+    "mcz.files.live.writer": ("LiveWriter",),
+    "mcz.kinematics.poses": (
         "Root",
         "accelerations",
         "point_names",
@@ -165,27 +165,35 @@ _HOMES = {
         "times",
         "velocities",
     ),
-    "mcz.pictures.plotting": ("Plotted", "plot"),
-    "mcz.pictures.rendering": ("Rendered", "render"),
+    "mcz.show.pictures.plotting": ("Plotted", "plot"),
+    "mcz.show.pictures.rendering": ("Rendered", "render"),
     "mcz.kinematics.contacts": ("Contact", "Contacts", "contacts"),
-    "mcz.reading.faults": ("Problem", "verify"),
-    "mcz.metrics": ("Comparison", "compare"),
-    "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
-    "mcz.reading.source_files": ("read_skeleton",),
+    "mcz.files.reading.faults": ("Problem", "verify"),
+    "mcz.kinematics.metrics": ("Comparison", "compare"),
+    "mcz.model.motion": (
+        "Channel",
+        "Exceptions",
+        "Joint",
+        "Motion",
+        "Signal",
+        "Skeleton",
+        "Source",
+    ),
+    "mcz.files.reading.source_files": ("read_skeleton",),
     "mcz.kinematics.rest_pose": ("rest_positions",),
-    "mcz.formats.body_models": ("offsets_from_positions", "offsets_of_model"),
-    "mcz.formats.body_trees": ("body_skeleton",),
-    "mcz.formats.c3d_events": ("Event",),
-    "mcz.formats.c3d_recording": ("ForcePlatform", "Recording"),
-    "mcz.retargeting.joint_maps": ("joint_map",),
-    "mcz.retargeting.mirroring": ("mirror",),
-    "mcz.retargeting.offsets": ("with_offsets",),
-    "mcz.retargeting.renaming": ("rename",),
-    "mcz.retargeting.retargeting": ("retarget",),
-    "mcz.retargeting.selection": ("select",),
-    "mcz.live.generators": ("LiveReader", "stream_decode", "stream_encode"),
-    "mcz.live.reader_with_losses": ("StreamSummary",),
-    "mcz.viewing.view": ("View", "view"),
+    "mcz.sources.arrays.body_models": ("offsets_from_positions", "offsets_of_model"),
+    "mcz.sources.arrays.body_trees": ("body_skeleton",),
+    "mcz.sources.c3d.events": ("Event",),
+    "mcz.sources.c3d.recording": ("ForcePlatform", "Recording"),
+    "mcz.kinematics.retargeting.joint_maps": ("joint_map",),
+    "mcz.kinematics.retargeting.mirroring": ("mirror",),
+    "mcz.kinematics.retargeting.offsets": ("with_offsets",),
+    "mcz.kinematics.retargeting.renaming": ("rename",),
+    "mcz.kinematics.retargeting.retargeting": ("retarget",),
+    "mcz.kinematics.retargeting.selection": ("select",),
+    "mcz.files.live.generators": ("LiveReader", "stream_decode", "stream_encode"),
+    "mcz.files.live.reader_with_losses": ("StreamSummary",),
+    "mcz.show.viewing.view": ("View", "view"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

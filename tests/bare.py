@@ -67,7 +67,7 @@ def use(path: Path) -> None:
     import numpy as np
 
     import mcz
-    from mcz.reading.report import info
+    from mcz.files.reading.report import info
 
     data = path.read_bytes()
     with mcz.open(path) as file:

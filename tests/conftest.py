@@ -64,7 +64,7 @@ def data() -> Path:
 @pytest.fixture(scope="session")
 def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with walk.asf, .amc, .bvh and .c3d; tests read it and never write into it."""
-    from mcz.sample import write_samples
+    from mcz.sources.sample import write_samples
 
     folder = tmp_path_factory.mktemp("samples")
     write_samples(folder)

@@ -25,12 +25,12 @@ import numpy as np
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton, kernels
 from mcz.codecs import CODECS
-from mcz.coding.forms.counts import Law
-from mcz.coding.forms.ids import BINARY32
-from mcz.coding.forms.products import DEGREE, of_products
-from mcz.formats import bvh
-from mcz.numbers import Grid, GridKind
-from mcz.sample import bvh_walk
+from mcz.codecs.coding.forms.counts import Law
+from mcz.codecs.coding.forms.ids import BINARY32
+from mcz.codecs.coding.forms.products import DEGREE, of_products
+from mcz.model.numbers import Grid, GridKind
+from mcz.sources.sample import bvh_walk
+from mcz.sources.text import bvh
 from tests.codecs.lossy import markers, rough, saved
 from tests.motions import smooth
 

@@ -12,7 +12,7 @@ import mcz
 from mcz.container.chunks import FOOT, HEADER
 from mcz.container.scan import scan
 from mcz.container.source import open_source
-from mcz.sample import write_samples
+from mcz.sources.sample import write_samples
 
 Values = dict[str, dict[str, np.ndarray]]  # by clip and signal
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Exceptions, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
 
 ROTATIONS = (Channel("rz"), Channel("ry"), Channel("rx"))
 POSITIONS = (Channel("tx"), Channel("ty"), Channel("tz"))

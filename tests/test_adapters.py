@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
-from mcz.motion import POSITION_KINDS
-from mcz.numbers import GridKind
+from mcz.model.motion import POSITION_KINDS
+from mcz.model.numbers import GridKind
 from tests.commands import run
 
 POSITION = tuple(map(Channel, POSITION_KINDS))
@@ -412,7 +412,7 @@ def escaped(name: str) -> str:
 def test_rerun_has_samples_between_frames(take: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import rerun
 
-    from mcz.adapters import rerun as adapter
+    from mcz.show import rerun as adapter
 
     motion = replace(markers(3), frame_numbers=np.arange(5, 14))
     samples = np.random.default_rng(3).normal(size=(36, 2))

@@ -18,93 +18,52 @@ import mcz
 PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-# What a part may import; a part is the first name after ``mcz.``. Each may import itself.
-GROUND = {
-    "arguments",
-    "text_format",
-    "checks",
-    "notebook",
-    "errors",
-    "hints",
-    "extras",
-    "indexing",
-    "schema",
-    "numbers",
-    "threads",
+# Rooms, and what each may import beside itself.
+BASE = {"errors", "hints"}
+MODEL = BASE | {"model"}
+MOTION = MODEL | {"kinematics"}
+FILES = MOTION | {"codecs", "container", "sources", "files"}
+PUBLIC = ""  # mcz/__init__.py
+ROOMS = {
+    "model": BASE,
+    "kinematics": MODEL,
+    "codecs": MOTION,
+    "container": MODEL,
+    "sources": MOTION,
+    "files": FILES,
+    "exchange": FILES | {"version"},
+    "show": FILES,
+    "bench": FILES | {"show", PUBLIC},
+    "cli": FILES | {"exchange", "show", "bench", PUBLIC},
 }
-MODEL = GROUND | {"clock", "motion", "skeleton", "source"}
-# Where motion, codec and container meet: what each of the doors below needs of the layers.
-JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
-DOORS = {"reading", "writing", "editing", "live", "conversion"}
-ALLOWED = {
-    "kernels": set(),
-    "interrupts": set(),
-    "types": set(),
-    "text_format": set(),
-    "notebook": set(),
+ALLOWED = ROOMS | {
     "hints": set(),
     "errors": {"hints"},
-    "arguments": {"errors"},
-    "checks": {"errors"},
-    "extras": {"errors"},
-    "indexing": {"errors"},
-    "schema": {"errors"},
-    "numbers": {"text_format", "checks", "errors", "schema"},
-    "source": GROUND,
-    "skeleton": GROUND | {"source"},
-    "signal": GROUND | {"skeleton", "source"},
-    "clock": GROUND | {"skeleton", "source"},
-    "motion": GROUND | {"clock", "signal", "skeleton", "source"},
-    "kinematics": MODEL,
-    "angles": MODEL | {"whole_turns"},
-    "whole_turns": MODEL,
-    "metrics": MODEL | {"angles", "joint_errors", "kinematics", "whole_turns"},
-    "poses": MODEL | {"kinematics", "units"},
-    "bjontegaard": GROUND,
-    "joint_errors": MODEL | {"kinematics"},
-    "units": MODEL,
-    "threads": {"errors"},
-    "jobs": {"errors", "hints", "threads"},
-    "annexes": set(),
     "version": set(),
-    "queries": {"text_format", "errors"},
-    "coding": GROUND | {"annexes"},
-    "transforms": GROUND,
-    "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms", "units"},
-    "container": MODEL | {"annexes"},
-    "recovery": GROUND | {"container"},
-    "formats": MODEL | {"annexes", "kinematics"},
-    "sample": MODEL | {"formats"},
-    "tables": MODEL | {"kinematics", "poses"},
-    "reading": JOINT | {"jobs", "recovery", "poses", "queries", "tables"},
-    "bags": GROUND | {"reading"},
-    "datasets": JOINT | {"poses", "reading"},
-    "writing": JOINT | {"jobs", "metrics", "reading", "tables"},
-    # What other libraries hold: with the names, tables and drawings that the public has.
-    "adapters": MODEL
-    | {"conversion", "formats", "kinematics", "pictures", "poses", "reading", "tables", "units"},
-    "conversion": MODEL | {"kinematics", "formats", "poses", "reading", "retargeting", "version"},
-    "retargeting": MODEL | {"kinematics"},
-    "editing": JOINT
-    | {"recovery", "jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
-    "live": JOINT | {"interrupts", "reading", "writing"},
-    "dask": JOINT | {"jobs", "reading", "writing", "editing"},
-    "viewing": JOINT | {"annexes", "metrics", "editing", "reading", "retargeting", "writing"},
-    # Pictures draw what the layers know, with the names that the public has for it.
-    "pictures": JOINT
-    | {"angles", "joint_errors", "metrics", "poses", "reading", "retargeting", "writing"},
-    "training": MODEL | {"kinematics", "transforms", "codecs"},
-    "cli": MODEL
-    | {"adapters"}
-    | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
-    | {"bags", "jobs", "dask", "pictures", "poses", "viewing"}
-    | DOORS,
-    # On top of all: it measures every part by itself.
-    "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
-    "": MODEL
-    | {"adapters", "bags", "formats", "kinematics", "metrics", "pictures", "poses", "datasets"}
-    | {"retargeting", "tables", "version", "viewing"}
-    | DOORS,  # mcz/__init__.py
+    "kernels": set(),
+    "dask": {"files"},
+    PUBLIC: FILES | {"exchange", "show", "version"},
+}
+# Parts of a room from below: none imports a part of a later line.
+LAYERS = {
+    "model": (
+        "annexes arguments checks extras indexing notebook text_format threads types",
+        "schema",
+        "numbers",
+        "source",
+        "skeleton",
+        "signal",
+        "clock",
+        "motion",
+        "units whole_turns",
+    ),
+    "codecs": ("coding transforms", "*", "training"),
+    "container": ("*", "recovery"),
+    "kinematics": ("*", "metrics poses retargeting"),
+    "sources": ("*", "sample"),
+    "files": ("queries jobs tables", "reading", "bags writing", "editing live", "dask"),
+    "exchange": ("conversion", "*"),
+    "show": ("pictures viewing", "rerun"),
 }
 KERNELS = {"kernels"}  # their decorator and types: any layer's kernels may use them
 
@@ -169,20 +128,29 @@ def longest_module(parts: list[str]) -> str:
     return ".".join(parts)
 
 
+def layer_of(name: str) -> int:
+    """Line of ``LAYERS`` that has the part of a room that ``name`` is in."""
+    room, _, rest = name.partition(".")
+    layers = [set(line.split()) for line in LAYERS.get(room, ())]
+    at = [i for i, parts in enumerate(layers) if part_of(rest) in parts]
+    others = [i for i, parts in enumerate(layers) if "*" in parts]
+    return (at + others)[0] if rest and layers else 0
+
+
 def against_the_arrows(path: Path) -> set[str]:
-    part = part_of(name_of(path))
-    allowed = ALLOWED[part] | {part, "types"} | KERNELS
-    if part == "cli":
-        allowed |= {""}  # the command line uses the public names
-    if name_of(path) == "cli.bench":
-        allowed |= {"bench"}
-    if name_of(path) == "cli.codecs":
-        allowed |= {"codecs"}  # it lists them
-    if name_of(path) == "cli.encode":
-        allowed |= {"container"}  # the limit that a reader has by default
-    if name_of(path) == "cli.conformance":
-        allowed |= {"container"}  # a decoder under test looks at every chunk, too
-    return {name for name in imports(path) if part_of(name) not in allowed}
+    here = name_of(path)
+    room = part_of(here)
+    allowed = ALLOWED[room] | {room} | KERNELS
+    own = {name for name in imports(path) if part_of(name) == room != ""}
+    above = {name for name in own if layer_of(name) > layer_of(here)} if "." in here else set()
+    return {name for name in imports(path) if part_of(name) not in allowed} | above
+
+
+def test_every_room_has_a_page() -> None:
+    rooms = {path.parent.name: path for path in PACKAGE.glob("*/__init__.py")}
+    assert rooms.keys() == ROOMS.keys() | KERNELS
+    pages = {room: ast.get_docstring(tree_of(path)) or "" for room, path in rooms.items()}
+    assert not [room for room in ROOMS if len(pages[room].splitlines()) < 5]
 
 
 def test_imports_follow_the_arrows() -> None:
@@ -195,11 +163,12 @@ CODEC_MODULES = {
     if "\nCODEC = Codec(" in path.read_text("utf-8")
 }
 FAMILIES = {path.name for path in (PACKAGE / "codecs").iterdir() if (path / "__init__.py").exists()}
+FAMILIES -= {"coding", "transforms"}
 
 
 def other_families(path: Path) -> set[str]:
     names = name_of(path).split(".")
-    if names[0] != "codecs" or len(names) == 1:
+    if names[0] != "codecs" or len(names) == 1 or names[1] == "training":
         return set()  # mcz/codecs/__init__.py holds the table, which names them all
     return {n.split(".")[1] for n in imports(path) if n.startswith("codecs.")} & FAMILIES - {
         names[1]
@@ -240,13 +209,13 @@ def others(path: Path) -> Iterator[str]:
 
 
 def test_one_door_to_construct() -> None:
-    """Records are parsed and built by ``mcz.schema`` alone, which turns errors into ours."""
+    """Records are parsed and built by ``mcz.model.schema`` alone, which turns errors into ours."""
 
     def opens_it(path: Path) -> set[str]:
         names = {"construct_type", "compiled_type", "_parsereport"}
         return {func.attr for _, func in calls(path) if func.attr in names}
 
-    assert faults(opens_it).keys() == {"schema.records", "schema.types"}
+    assert faults(opens_it).keys() == {"model.schema.records", "model.schema.types"}
 
 
 def test_what_is_optional_is_imported_on_use() -> None:
@@ -263,7 +232,7 @@ def test_what_is_optional_is_imported_on_use() -> None:
 
     assert not faults(at_once)
     pywt = faults(lambda path: "pywt" in set(others(path)))
-    assert pywt.keys() == {"transforms.wavelets"}
+    assert pywt.keys() == {"codecs.transforms.wavelets"}
 
 
 def banned_constructs(path: Path) -> set[str]:
@@ -341,8 +310,8 @@ MOST_PARAMETERS = 8
 def test_functions_have_few_parameters() -> None:
     """But for public functions with keywords, commands of click, and kernels."""
     public = {(home.replace(".", "/"), name) for name, home in mcz._HOME_OF.items()}
-    public |= {("mcz/dask/packing", "pack"), ("mcz/datasets/member_list", "dataset")}
-    public.add(("mcz/live/writer", "__init__"))
+    public |= {("mcz/files/dask/packing", "pack"), ("mcz/exchange/datasets/member_list", "dataset")}
+    public.add(("mcz/files/live/writer", "__init__"))
 
     def crowded(path: Path) -> list[str]:
         if path.stem.endswith("kernels"):

@@ -18,9 +18,9 @@ import conformance
 import mcz
 from mcz.container import payloads
 from mcz.container.writer import Writer
-from mcz.editing.stored_files import stored_files
-from mcz.editing.unpacking import safe_path
-from mcz.motion import joint_columns
+from mcz.files.editing.stored_files import stored_files
+from mcz.files.editing.unpacking import safe_path
+from mcz.model.motion import joint_columns
 from tests.clocked_files import bvh
 from tests.web_server import Server, served
 
@@ -183,7 +183,7 @@ def test_remote_archive_costs_few_requests(samples: Path) -> None:
 
     from mcz.codecs import codec_by_name
     from mcz.container.writer import Writer
-    from mcz.writing.clip_writer import write_clip
+    from mcz.files.writing.clip_writer import write_clip
 
     out = io.BytesIO()
     writer = Writer(out)

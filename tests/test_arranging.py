@@ -18,8 +18,8 @@ from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.scan import scan
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.editing.reorganize import natural
-from mcz.sample import write_samples
+from mcz.files.editing.reorganize import natural
+from mcz.sources.sample import write_samples
 from tests import live_codec
 from tests.motions import skeleton
 
@@ -48,7 +48,7 @@ def files(takes: Path, tmp_path: Path) -> tuple[Path, Path]:
 
 def contents(path: Path) -> dict[str, bytes]:
     """Every file that an archive restores."""
-    from mcz.editing.unpacking import named_files
+    from mcz.files.editing.unpacking import named_files
 
     with mcz.open(path) as file:
         return {name: restore() for name, restore in named_files(file)}
@@ -230,9 +230,9 @@ def test_names_swap_and_sources_follow(files: tuple[Path, Path]) -> None:
 def test_a_rate_that_is_set_later(files: tuple[Path, Path], takes: Path, tmp_path: Path) -> None:
     from fractions import Fraction
 
-    from mcz.editing.batch_report import Report
-    from mcz.editing.chunk_copier import Change
-    from mcz.editing.rewriting import rewriting, whole
+    from mcz.files.editing.batch_report import Report
+    from mcz.files.editing.chunk_copier import Change
+    from mcz.files.editing.rewriting import rewriting, whole
 
     path = tmp_path / "one.mcz"
     mcz.encode(takes / "a" / "walk.amc", path)
@@ -264,7 +264,7 @@ def test_numbers_in_names_count_as_numbers() -> None:
 
 
 def test_a_file_that_somebody_grows_is_left_alone(files: tuple[Path, Path]) -> None:
-    from mcz.editing.appending import growing
+    from mcz.files.editing.appending import growing
 
     with (
         growing(files[0], salvage=False, force=False),

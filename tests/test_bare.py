@@ -9,7 +9,7 @@ from pathlib import Path
 
 import mcz
 from mcz.codecs import CODECS, bitstream_name
-from mcz.sample import write_samples
+from mcz.sources.sample import write_samples
 from tests import bare
 
 

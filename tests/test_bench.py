@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 
 import mcz
-from mcz import Motion, OptionError, bjontegaard
-from mcz.bench import cache, ladder, peers, plots, tasks
+from mcz import Motion, OptionError
+from mcz.bench import bjontegaard, cache, ladder, peers, plots, tasks
+from mcz.bench.bjontegaard import bd_rate, bd_sqnr
 from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants_of
 from mcz.bench.measure import cpu_seconds, peak_bytes, point, speeds
 from mcz.bench.run import bench
 from mcz.bench.tables import Table
 from mcz.bench.tasks import KINDS, Runner, Task, perform
-from mcz.bjontegaard import bd_rate, bd_sqnr
 from mcz.cli.common import run as run_command
 from mcz.codecs.parameters import Dial
 from tests.commands import run

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Motion
 from mcz.kinematics import positions_of
-from mcz.metrics import comparison
-from mcz.sample import bvh_walk
+from mcz.kinematics.metrics import comparison
+from mcz.sources.sample import bvh_walk
 from tests.motions import motions
 
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
-from mcz.clock import Timeline
-from mcz.tables.events import EVENT_EXPORTS
+from mcz.files.tables.events import EVENT_EXPORTS
+from mcz.model.clock import Timeline
 from tests.clocked_files import motive, npz, sto, trc, vicon
 from tests.commands import run
 from tests.formats.c3d_files import Made

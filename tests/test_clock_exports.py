@@ -16,8 +16,8 @@ import pytest
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton, left_out
-from mcz.formats import FORMATS
-from mcz.sample import bvh_walk
+from mcz.sources import FORMATS
+from mcz.sources.sample import bvh_walk
 from tests.clocked_files import motive, trc
 from tests.commands import Call
 from tests.glb import Glb

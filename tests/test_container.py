@@ -13,7 +13,7 @@ from mcz.container.chunks import FOOT, HEADER
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
 from mcz.errors import FormatError, MotionError, TruncatedError, UnsupportedError
-from mcz.writing.clip_writer import write_clip
+from mcz.files.writing.clip_writer import write_clip
 from tests.motions import smooth
 from tests.repair import joined, parts_of
 

@@ -15,11 +15,11 @@ from scipy.spatial.transform import Rotation
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
-from mcz.conversion import converted_files
-from mcz.formats import FORMATS
+from mcz.exchange.conversion import converted_files
 from mcz.kinematics import point_names, positions, reach
 from mcz.kinematics.euler import ORDERS, euler_angles, euler_order
-from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.sources import FORMATS
+from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import skeletons, values_for
 
 POSITION = tuple(map(Channel, ("tx", "ty", "tz")))

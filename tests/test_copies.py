@@ -21,10 +21,10 @@ from mcz.container.limits import BASE
 from mcz.container.scan import scan
 from mcz.container.source import Overlay, open_source
 from mcz.container.writer import Writer
-from mcz.formats import FORMATS
-from mcz.reading.report import info
-from mcz.sample import write_samples
-from mcz.writing.write_transaction import WriteTransaction
+from mcz.files.reading.report import info
+from mcz.files.writing.write_transaction import WriteTransaction
+from mcz.sources import FORMATS
+from mcz.sources.sample import write_samples
 from tests.commands import run
 from tests.motions import smooth, written
 from tests.repair import use

@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 import mcz
-from mcz.datasets.caches import FolderCache, MemoryCache, to_size
-from mcz.datasets.fields import FIELDS
-from mcz.datasets.splitting import split
+from mcz.exchange.datasets.caches import FolderCache, MemoryCache, to_size
+from mcz.exchange.datasets.fields import FIELDS
+from mcz.exchange.datasets.splitting import split
 from tests.motions import smooth
 
 LENGTHS = (300, 90, 40, 513)

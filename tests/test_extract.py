@@ -23,10 +23,10 @@ from mcz.container.segments import FRESH
 from mcz.container.source import open_source
 from mcz.container.value_hash import canonical
 from mcz.container.writer import Writer
-from mcz.motion import Signal
-from mcz.reading.faults import validate
-from mcz.schema import EXTENDED, parse
-from mcz.writing.clip_writer import write_clip
+from mcz.files.reading.faults import validate
+from mcz.files.writing.clip_writer import write_clip
+from mcz.model.motion import Signal
+from mcz.model.schema import EXTENDED, parse
 from tests import overlap_codec
 from tests.commands import run
 from tests.motions import rich, smooth
@@ -426,7 +426,7 @@ def test_sources_of_cut_joints(samples: Path, tmp_path: Path) -> None:
 def test_a_source_that_cannot_be_cut_is_left_out(
     samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mcz.formats import FORMATS
+    from mcz.sources import FORMATS
 
     def refuse(motion: mcz.Motion) -> bytes:
         raise mcz.MotionError("only whole clips can be written")

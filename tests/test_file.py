@@ -14,13 +14,13 @@ from hypothesis import given
 
 import mcz
 from mcz import Signal
-from mcz.annexes import annex_bytes
 from mcz.container.scan import scan
 from mcz.container.value_hash import canonical
-from mcz.numbers import Grid, GridKind
-from mcz.reading.faults import validate
-from mcz.reading.report import info
-from mcz.writing.write_transaction import METADATA_KEYS
+from mcz.files.reading.faults import validate
+from mcz.files.reading.report import info
+from mcz.files.writing.write_transaction import METADATA_KEYS
+from mcz.model.annexes import annex_bytes
+from mcz.model.numbers import Grid, GridKind
 from tests.motions import motions, skeleton, smooth, written
 
 
@@ -217,8 +217,8 @@ def test_clips_that_nobody_has_are_let_go() -> None:
 
     from mcz.codecs import codec_by_name
     from mcz.container.writer import Writer
-    from mcz.reading.clips import KEPT
-    from mcz.writing.clip_writer import write_clip
+    from mcz.files.reading.clips import KEPT
+    from mcz.files.writing.clip_writer import write_clip
 
     out, motion = io.BytesIO(), smooth(3)
     writer = Writer(out)

@@ -10,7 +10,7 @@ import pytest
 import mcz
 from mcz.container.chunks import read_payload
 from mcz.container.scan import scan
-from mcz.reading.report import info
+from mcz.files.reading.report import info
 from tests.commands import run
 
 VECTORS = sorted((Path(mcz.__file__).parents[1] / "conformance/vectors/valid").rglob("*.mcz"))

@@ -14,12 +14,12 @@ import mcz
 from mcz import File, FormatError, OptionError
 from mcz.codecs import CODECS, codec_by_name
 from mcz.container.writer import Writer
-from mcz.queries import Query
-from mcz.reading.faults import part_problems
-from mcz.reading.fields import FIELDS
-from mcz.reading.report import info
-from mcz.schema import parse_until
-from mcz.writing.clip_writer import write_clip
+from mcz.files.queries import Query
+from mcz.files.reading.faults import part_problems
+from mcz.files.reading.fields import FIELDS
+from mcz.files.reading.report import info
+from mcz.files.writing.clip_writer import write_clip
+from mcz.model.schema import parse_until
 from tests import live_codec
 from tests.commands import Call
 from tests.motions import skeleton, smooth

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 import mcz
-from mcz.editing.appending import growing
-from mcz.sample import write_samples
+from mcz.files.editing.appending import growing
+from mcz.sources.sample import write_samples
 from tests.clocked_files import bvh
 
 

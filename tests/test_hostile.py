@@ -64,7 +64,7 @@ def test_every_cut_is_truncated(data: bytes) -> None:
 
 
 def test_verify_finds_every_flipped_bit(data: bytes) -> None:
-    from mcz.reading.faults import validate
+    from mcz.files.reading.faults import validate
 
     for byte, bit in flips(len(data), POSITIONS, seed=2):
         try:

@@ -19,10 +19,10 @@ from mcz.container.index import build_index
 from mcz.container.scan import scan
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.schema import Table, build, columns, field, parse
-from mcz.schema.records import Record
-from mcz.schema.types import SIZED, TEXT, UVARINT, Exactly
-from mcz.writing.clip_writer import write_clip
+from mcz.files.writing.clip_writer import write_clip
+from mcz.model.schema import Table, build, columns, field, parse
+from mcz.model.schema.records import Record
+from mcz.model.schema.types import SIZED, TEXT, UVARINT, Exactly
 from tests.motions import smooth
 from tests.web_server import Server, served
 
@@ -55,7 +55,7 @@ ITEMS = st.builds(
 
 @given(st.lists(ITEMS, max_size=5), NUMBERS)
 def test_a_table_is_its_columns(items: list[Item], last: int) -> None:
-    from mcz.schema.varints import varint
+    from mcz.model.schema.varints import varint
 
     made = build(Items(items=items, last=last), "items")
     plain = varint(len(items))

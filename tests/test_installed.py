@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.pictures.libraries import EXTRAS
+from mcz.show.pictures.libraries import EXTRAS
 from tests.installed import PYPROJECT, required
 
 ROOT = PYPROJECT.parent
@@ -20,7 +20,7 @@ ROOT = PYPROJECT.parent
 # What users do with motions beyond README: rotations, other rates, an encoder's own wavelets.
 MORE = """
 import numpy as np
-from mcz.poses.conversions import FORMS, to_matrices
+from mcz.kinematics.poses.conversions import FORMS, to_matrices
 
 matrices = mcz.rotations(motion, "matrix")
 for form in FORMS:

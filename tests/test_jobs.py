@@ -18,12 +18,12 @@ from typing import Any
 import pytest
 
 import mcz
-from mcz import jobs
-from mcz.editing import coded_parts
-from mcz.jobs.pool import Pool
-from mcz.reading import parallel_clips
-from mcz.reading.faults import validate
-from mcz.sample import write_samples
+from mcz.files import jobs
+from mcz.files.editing import coded_parts
+from mcz.files.jobs.pool import Pool
+from mcz.files.reading import parallel_clips
+from mcz.files.reading.faults import validate
+from mcz.sources.sample import write_samples
 from tests.commands import run
 from tests.worker_functions import dies, dies_once, fails, joined
 
@@ -39,7 +39,7 @@ def worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
 def here(
     function: Callable[[Any, Any], Any], items: Iterable[Any], jobs: int, state: Any = None
 ) -> Iterator[Iterator[Any]]:
-    """As ``mcz.jobs.pool.answers``, without its processes: all goes through pickle."""
+    """As ``mcz.files.jobs.pool.answers``, without its processes: all goes through pickle."""
 
     def answer(item: Any) -> Callable[[], Any] | None:
         if item is None:
@@ -269,8 +269,8 @@ def test_full_disk_leaves_nothing(
 
 SLOW = """
 import operator, time
-from mcz.jobs.pool import Pool
-from mcz.reading import parallel_clips
+from mcz.files.jobs.pool import Pool
+from mcz.files.reading import parallel_clips
 with Pool(2) as pool:
     for answer in pool.in_order(operator.eq, [1, 2]):
         answer()

@@ -11,8 +11,8 @@ import pytest
 
 import mcz
 from mcz import MotionError
-from mcz.joint_errors import joint_errors
 from mcz.kinematics import origins_of
+from mcz.kinematics.metrics.joint_errors import joint_errors
 from tests.commands import run
 
 

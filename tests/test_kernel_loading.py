@@ -25,7 +25,7 @@ import json, warnings
 import numpy as np
 with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
-    from mcz.coding import mixing
+    from mcz.codecs.coding import mixing
     state = np.array([0, 0xFFFFFFFF, 0, 10, 0])
     sizes = [mixing.coded_size(state) for _ in range(3)]
     try:
@@ -74,12 +74,8 @@ class Installation:
 def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("original")
     build(home / "mcz" / "kernels" / MODE, MODE, {UNIT: UNITS[UNIT]})
-    for name in ("__init__.py", "version.py", "kernels", "coding"):
-        if (PACKAGE / name).is_file():
-            shutil.copy(PACKAGE / name, home / "mcz")
-        else:
-            ignored = shutil.ignore_patterns("compiled", "checked", "sanitized", "__pycache__")
-            shutil.copytree(PACKAGE / name, home / "mcz" / name, ignore=ignored, dirs_exist_ok=True)
+    ignored = shutil.ignore_patterns("compiled", "checked", "sanitized", "annex", "__pycache__")
+    shutil.copytree(PACKAGE, home / "mcz", ignore=ignored, dirs_exist_ok=True)
     return home
 
 
@@ -92,19 +88,19 @@ def installation(original: Path, tmp_path: Path) -> Installation:
 
 def test_compiled_kernels_run_silently(installation: Installation) -> None:
     assert installation.run() == (False, SIZES, [])
-    os.utime(installation.home / "mcz" / "coding" / "mixing.py", (2e9, 2e9))
+    os.utime(installation.home / "mcz" / "codecs" / "coding" / "mixing.py", (2e9, 2e9))
     assert installation.run() == (False, SIZES, [])
     assert installation.run(MCZ_LOOPS="interpreted") == (True, SIZES, [])
 
 
 def test_an_edited_kernel_is_never_run_stale(installation: Installation) -> None:
-    path = "coding/mixing.py"
+    path = "codecs/coding/mixing.py"
     old = "return int(state[POSITION] - 4 + last_bytes(state))"
     installation.edit(path, old, old[:-1] + " + 1000)")
     is_plain, sizes, (warned,) = installation.run()
     assert is_plain
     assert sizes == [1006, 1006, 1006]
-    assert "50 to 500 times slower: mcz/coding/mixing.py is newer" in warned
+    assert "50 to 500 times slower: mcz/codecs/coding/mixing.py is newer" in warned
     installation.edit(path, old[:-1] + " + 1000)", old)
     assert installation.run() == (False, SIZES, [])
 
@@ -112,10 +108,10 @@ def test_an_edited_kernel_is_never_run_stale(installation: Installation) -> None
 def test_an_edited_constant_of_another_module_is_never_run_stale(
     installation: Installation,
 ) -> None:
-    installation.edit("coding/logistic.py", "COUNT_LIMIT = 250 ", "COUNT_LIMIT = 251 ")
+    installation.edit("codecs/coding/logistic.py", "COUNT_LIMIT = 250 ", "COUNT_LIMIT = 251 ")
     is_plain, sizes, (warned,) = installation.run()
     assert (is_plain, sizes) == (True, SIZES)
-    assert "mcz/coding/logistic.py is newer" in warned
+    assert "mcz/codecs/coding/logistic.py is newer" in warned
 
 
 DAMAGE = {

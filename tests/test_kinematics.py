@@ -24,7 +24,7 @@ from mcz.kinematics import (
 )
 from mcz.kinematics.frames import FramePositions
 from mcz.kinematics.sensitivity import sensitivities
-from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for
 
 # Khan 2016, Table 1: the normalized depth of CMU's joints, to three decimals.
@@ -188,7 +188,7 @@ def test_virtual_markers() -> None:
     markers = virtual_markers_of(skeleton, values).reshape(len(values), 31, 3, 3)
     arms = (markers - positions_of(skeleton, values)[:, :, None]) * skeleton.unit_cm
     assert np.abs(arms @ arms.transpose(0, 1, 3, 2) - 9 * np.eye(3)).max() < 1e-9
-    hand = skeleton.find("lhand")  # axes: 90 about y, then 90 about z; see mcz/sample.py
+    hand = skeleton.find("lhand")  # axes: 90 about y, then 90 about z; see mcz/sources/sample.py
     at_rest = virtual_markers_of(skeleton, np.zeros((1, skeleton.n_channels)))
     end = positions_of(skeleton, np.zeros((1, skeleton.n_channels)))[0, hand]
     axes = (at_rest.reshape(31, 3, 3)[hand] - end) * skeleton.unit_cm / 3

@@ -33,13 +33,13 @@ from mcz.container.packets import (
     build_packet,
 )
 from mcz.container.writer import Writer
-from mcz.live.reader_with_losses import FramesWithLosses, StreamSummary
-from mcz.live.strict_reader import live_frames
-from mcz.live.writer import LiveWriter
-from mcz.reading.fields import packet_framing
-from mcz.reading.report import info
-from mcz.reading.sizes import layout
-from mcz.writing.clip_writer import write_clip
+from mcz.files.live.reader_with_losses import FramesWithLosses, StreamSummary
+from mcz.files.live.strict_reader import live_frames
+from mcz.files.live.writer import LiveWriter
+from mcz.files.reading.fields import packet_framing
+from mcz.files.reading.report import info
+from mcz.files.reading.sizes import layout
+from mcz.files.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth
 from tests.repair import flipped, parts_of, use, with_packets
@@ -400,7 +400,7 @@ WRITES = """
 import sys, time
 import numpy as np
 from mcz import codecs
-from mcz.live.writer import LiveWriter
+from mcz.files.live.writer import LiveWriter
 from tests import live_codec
 from tests.motions import skeleton
 from tools.records import built

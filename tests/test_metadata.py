@@ -21,9 +21,9 @@ from mcz.container.chunks import Chunk
 from mcz.container.metadata import Record, applied, as_one, build_metas, parse_meta
 from mcz.container.metadata_keys import EXAMPLES, KEYS, TYPES, check_said
 from mcz.container.writer import Writer
-from mcz.editing.file_times import nanoseconds, stamp
-from mcz.editing.metadata_table import from_table
-from mcz.sample import write_samples
+from mcz.files.editing.file_times import nanoseconds, stamp
+from mcz.files.editing.metadata_table import from_table
+from mcz.sources.sample import write_samples
 from tests.commands import Call
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)

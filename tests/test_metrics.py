@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, codecs
-from mcz.angles import Unwrapper, turns, unwrap
 from mcz.codecs.contract import Encoded, Segment
-from mcz.writing.quality import LEFT_OUT, quality_entries
+from mcz.files.writing.quality import LEFT_OUT, quality_entries
+from mcz.kinematics.angles import Unwrapper, turns, unwrap
 from tests import overlap_codec
 from tests.motions import POSITIONS, motions, skeleton, smooth, written
 
@@ -216,7 +216,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     motion = smooth(50)
     other = motion.with_values(np.round(motion.values))
     whole = mcz.compare(motion, other)
-    monkeypatch.setattr("mcz.metrics.comparison.BLOCK", 100)
+    monkeypatch.setattr("mcz.kinematics.metrics.comparison.BLOCK", 100)
     parts = mcz.compare(motion, other)
     assert parts.where == whole.where
     for key, value in whole.entries().items():
@@ -443,7 +443,7 @@ def test_rounding_as_khan_does(data: Path) -> None:
 def test_positions_against_what_they_were_made_of(virtual_markers: bool) -> None:
     """Points with points and virtual markers with virtual markers, by places that are known."""
     from mcz.kinematics import points_and_markers_of
-    from mcz.sample import acclaim_walk
+    from mcz.sources.sample import acclaim_walk
 
     walk = acclaim_walk()
     places = mcz.in_positions(walk, virtual_markers=virtual_markers)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.kinematics import origins_of, points_of, reach
-from mcz.retargeting.sides import counterparts
-from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.kinematics.retargeting.sides import counterparts
+from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth, written
 from tests.skeletons import joints as random_joints
 from tests.skeletons import skeletons, values_for

@@ -16,7 +16,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 
 import mcz
 from mcz import Exceptions, OptionError
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
 from tests.commands import run
 from tests.motions import smooth
 

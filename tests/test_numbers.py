@@ -16,16 +16,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mcz import FormatError, SourceError
-from mcz.numbers import (
-    Grid,
-    GridFlag,
-    GridKind,
-    Tokens,
-    choose_grid,
-    fit,
-    print_values,
-    scan,
-)
+from mcz.model.numbers import Grid, GridFlag, GridKind, Tokens, choose_grid, fit, print_values, scan
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 PLAIN = [flag for flag in GridFlag if flag not in (GridFlag.POINT, GridFlag.EXPONENT1)]
@@ -543,7 +534,7 @@ def test_a_matrix_is_printed_as_number_by_number(
 
 def test_no_tokens_have_a_grid() -> None:
     """In a process of its own, where kernels are plain Python and no remainder by zero is 0."""
-    code = "from mcz.numbers import scan; from mcz.numbers.choose import choose_grid; "
+    code = "from mcz.model.numbers import scan; from mcz.model.numbers.choose import choose_grid; "
     code += "print(choose_grid(scan(b'', [], [])).kind.name)"
     plain = dict(os.environ, MCZ_LOOPS="interpreted")
     ran = subprocess.run([sys.executable, "-c", code], env=plain, capture_output=True, check=True)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import mcz
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
 from tests.motions import POSITIONS, skeleton, smooth
 
 N_FRAMES, N_CHANNELS = 6, 10

@@ -19,7 +19,7 @@ import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.codecs import CODECS, codec_by_name
-from mcz.sample import bvh_walk
+from mcz.sources.sample import bvh_walk
 from tests.motions import smooth
 
 N_FLIPS = 12  # of each codec

@@ -20,14 +20,14 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import MczError, Motion, MotionError, OptionError, plot
-from mcz.joint_errors import joint_errors
-from mcz.pictures.channel_charts import density
-from mcz.pictures.chart_pages import STYLE, ChartPage, Sheet
-from mcz.pictures.charts import MOST_POINTS, number, thinned
-from mcz.pictures.error_charts import errors_between
-from mcz.pictures.plotting import KINDS
-from mcz.reading.report import info
-from mcz.reading.sizes import byte_shares, layout
+from mcz.files.reading.report import info
+from mcz.files.reading.sizes import byte_shares, layout
+from mcz.kinematics.metrics.joint_errors import joint_errors
+from mcz.show.pictures.channel_charts import density
+from mcz.show.pictures.chart_pages import STYLE, ChartPage, Sheet
+from mcz.show.pictures.charts import MOST_POINTS, number, thinned
+from mcz.show.pictures.error_charts import errors_between
+from mcz.show.pictures.plotting import KINDS
 from tests.commands import run
 from tests.motions import motions, smooth
 from tests.test_render import HOSTILE

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import mcz
+from mcz.codecs.transforms.post_filter import CUTOFFS, DELAY, SCALE, PostFilter, filter_rows
+from mcz.codecs.transforms.post_filter import filter_taps as taps_of
 from mcz.errors import MotionError, OptionError
-from mcz.motion import Channel, Motion, Signal
-from mcz.reading.post_filtering import filtered_motion, filtered_part
-from mcz.sample import acclaim_walk, marker_walk
-from mcz.transforms.post_filter import CUTOFFS, DELAY, SCALE, PostFilter, filter_rows
-from mcz.transforms.post_filter import filter_taps as taps_of
+from mcz.files.reading.post_filtering import filtered_motion, filtered_part
+from mcz.model.motion import Channel, Motion, Signal
+from mcz.sources.sample import acclaim_walk, marker_walk
 from tests.motions import written
 from tests.plain_post_filter import plain_rows, plain_taps
 

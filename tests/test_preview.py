@@ -17,8 +17,8 @@ import mcz
 from mcz import codecs
 from mcz.cli.clip_selection import preview_motion
 from mcz.errors import OptionError
-from mcz.motion import Motion, Signal
-from mcz.reading.signal_info import SignalInfo
+from mcz.files.reading.signal_info import SignalInfo
+from mcz.model.motion import Motion, Signal
 from tests import overlap_codec
 from tests.commands import run
 from tests.motions import skeleton, smooth, written

@@ -18,9 +18,9 @@ from mcz.cli.common import run
 from mcz.cli.info import command
 from mcz.cli.previews import LEVELS, PLAIN_LEVELS, bar, bars_of, sparkline
 from mcz.errors import FormatError
-from mcz.motion import Motion
-from mcz.pictures.energy import CELLS, motion_energy
-from mcz.reading.signal_reader import SignalReader
+from mcz.files.reading.signal_reader import SignalReader
+from mcz.model.motion import Motion
+from mcz.show.pictures.energy import CELLS, motion_energy
 from tests.motions import smooth
 
 Call = Any
@@ -125,7 +125,7 @@ def test_on_a_terminal_it_is_there_by_itself(
     assert "mean speed" in call(walk)[1]
     assert "mean speed" not in call(walk, "--no-preview")[1]
     assert "preview" not in call(walk, "--json")[1]
-    monkeypatch.setattr("mcz.pictures.energy.CHEAP", 1000)
+    monkeypatch.setattr("mcz.show.pictures.energy.CHEAP", 1000)
     assert "mean speed" not in call(walk)[1]
     assert "mean speed" in call(walk, "--preview")[1]
 

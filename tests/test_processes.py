@@ -18,7 +18,7 @@ import pytest
 
 import mcz
 from mcz.container.locks import lock
-from mcz.writing.atomic import replacing
+from mcz.files.writing.atomic import replacing
 from tests.commands import run
 from tests.motions import smooth
 
@@ -97,7 +97,7 @@ def test_threads_read_one_file(path: Path) -> None:
 
 def test_what_a_killed_writer_left_is_taken_away(tmp_path: Path) -> None:
     program = (
-        "import os, signal, sys; from mcz.writing.atomic import replacing\n"
+        "import os, signal, sys; from mcz.files.writing.atomic import replacing\n"
         "with replacing(sys.argv[1], force=True) as stream:\n"
         "    stream.write(b'half'); stream.flush(); os.kill(os.getpid(), signal.SIGKILL)"
     )

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mcz import OptionError
-from mcz.queries import Query, Value
-from mcz.queries.parser import parse
-from mcz.queries.tokens import WORDS
-from mcz.queries.tree import (
+from mcz.files.queries import Query, Value
+from mcz.files.queries.parser import parse
+from mcz.files.queries.tokens import WORDS
+from mcz.files.queries.tree import (
     And,
     Compare,
     In,

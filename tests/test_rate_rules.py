@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.formats import FORMATS
-from mcz.sample import sample_files
+from mcz.sources import FORMATS
+from mcz.sources.sample import sample_files
 from tests.clocked_files import csv, motive, npz, sto, trc, vicon
 from tests.formats.c3d_files import Made
 

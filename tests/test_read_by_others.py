@@ -18,10 +18,10 @@ import pytest
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
-from mcz.conversion import converted_files
+from mcz.exchange.conversion import converted_files
+from mcz.files.tables.files import EXPORTS, table_of
 from mcz.kinematics.points import origins_of
-from mcz.motion import POSITION_KINDS
-from mcz.tables.files import EXPORTS, table_of
+from mcz.model.motion import POSITION_KINDS
 from tests.commands import run
 
 ROOT = Path(__file__).parents[1]

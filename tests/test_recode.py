@@ -13,10 +13,10 @@ import pytest
 import mcz
 from mcz.codecs import codec_by_name
 from mcz.container.writer import Writer
-from mcz.editing.recoding import recorded_options
 from mcz.errors import OptionError
-from mcz.writing.planning import prepare
-from mcz.writing.tuning import write_motion
+from mcz.files.editing.recoding import recorded_options
+from mcz.files.writing.planning import prepare
+from mcz.files.writing.tuning import write_motion
 from tests.commands import run
 from tests.motions import smooth
 

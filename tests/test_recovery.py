@@ -13,14 +13,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import mcz
+from mcz.container.recovery import encoder
+from mcz.container.recovery.code import encoded, log_weights, recovered, runs_of
+from mcz.container.recovery.galois_field import logarithms, over, times
+from mcz.container.recovery.layout import Shape, shape_for
+from mcz.container.recovery.packets import build_packet, read_packet
 from mcz.container.source import ByteSource
-from mcz.editing.protecting import protections
-from mcz.recovery import encoder
-from mcz.recovery.code import encoded, log_weights, recovered, runs_of
-from mcz.recovery.galois_field import logarithms, over, times
-from mcz.recovery.layout import Shape, shape_for
-from mcz.recovery.packets import build_packet, read_packet
-from mcz.sample import write_samples
+from mcz.files.editing.protecting import protections
+from mcz.sources.sample import write_samples
 from tests.clocked_files import bvh
 
 SHARED = [HealthCheck.function_scoped_fixture]
@@ -329,7 +329,7 @@ def test_a_full_disk_costs_no_recovery_data(
 
     path = tmp_path / "a.mcz"
     path.write_bytes(archive)
-    monkeypatch.setattr("mcz.editing.protecting.write_recovery", full)
+    monkeypatch.setattr("mcz.files.editing.protecting.write_recovery", full)
     for rewrite in (
         lambda: mcz.protect(path, 0.1, anew=True),
         lambda: mcz.delete_clips(path, "more"),

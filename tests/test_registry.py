@@ -8,16 +8,16 @@ from typing import Any
 
 import pytest
 
-from mcz import compare, sample
+from mcz import compare
 from mcz.codecs import CODECS, bitstream_name
 from mcz.codecs.basis_models import known_model_name
 from mcz.codecs.online.options import PRESET_IDS
+from mcz.codecs.transforms.wavelets import IDS, WAVELETS
 from mcz.container import limits
 from mcz.container.chunks import FLAGS_OF, ChunkType
 from mcz.container.versions import FORMAT_NAME
-from mcz.formats import FORMATS
-from mcz.motion import CHANNEL_KINDS, ROLES
-from mcz.transforms.wavelets import IDS, WAVELETS
+from mcz.model.motion import CHANNEL_KINDS, ROLES
+from mcz.sources import FORMATS, sample
 from tools import registry
 
 LIMITS = {

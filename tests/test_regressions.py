@@ -14,23 +14,24 @@ import numpy as np
 import pytest
 
 import mcz
-import mcz.formats.restore as restore_module
+import mcz.sources.restore as restore_module
 from mcz import Signal
 from mcz.cli.figures import figure_lines
 from mcz.cli.skeleton_lines import _tree
 from mcz.codecs import codec_by_name
+from mcz.codecs.transforms import dwt
 from mcz.container import strict
 from mcz.container.chunks import build_header
 from mcz.container.writer import Writer
-from mcz.formats import FORMATS, c3d
-from mcz.formats.cells import Cells
-from mcz.formats.hierarchy import write_hierarchy
-from mcz.formats.layout import MAX_RUNS, Layout, Pattern, Run
-from mcz.numbers import Grid, GridKind
-from mcz.sample import marker_walk, write_samples
-from mcz.transforms import dwt
-from mcz.writing.atomic import replacing
-from mcz.writing.clip_writer import write_clip
+from mcz.files.writing.atomic import replacing
+from mcz.files.writing.clip_writer import write_clip
+from mcz.model.numbers import Grid, GridKind
+from mcz.sources import FORMATS
+from mcz.sources.c3d import c3d
+from mcz.sources.sample import marker_walk, write_samples
+from mcz.sources.tables.cells import Cells
+from mcz.sources.text.hierarchy import write_hierarchy
+from mcz.sources.text.layout import MAX_RUNS, Layout, Pattern, Run
 from tests.clocked_files import bvh
 from tests.commands import run
 from tests.motions import smooth, written

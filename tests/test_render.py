@@ -16,14 +16,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz import Channel, Joint, MczError, Motion, MotionError, OptionError, Signal, Skeleton, extras
-from mcz.pictures import libraries, tracks
-from mcz.pictures.bodies import MIDDLE, body_of, fitted
-from mcz.pictures.cameras import VIEWS, Viewport
-from mcz.pictures.capsules import Shapes, capsules
-from mcz.pictures.rendering import drawn_frames
-from mcz.pictures.stages import stage_of
-from mcz.pictures.themes import THEMES, rgb
+from mcz import Channel, Joint, MczError, Motion, MotionError, OptionError, Signal, Skeleton
+from mcz.model import extras
+from mcz.show.pictures import libraries, tracks
+from mcz.show.pictures.bodies import MIDDLE, body_of, fitted
+from mcz.show.pictures.cameras import VIEWS, Viewport
+from mcz.show.pictures.capsules import Shapes, capsules
+from mcz.show.pictures.rendering import drawn_frames
+from mcz.show.pictures.stages import stage_of
+from mcz.show.pictures.themes import THEMES, rgb
 from tests.commands import run
 from tests.motions import motions, smooth
 

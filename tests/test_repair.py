@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container import payloads
 from mcz.container.chunks import HEADER
-from mcz.sample import write_samples
-from mcz.schema import build, parse
+from mcz.model.schema import build, parse
+from mcz.sources.sample import write_samples
 from tests.commands import run
 from tests.formats.c3d_files import made
 from tests.formats.test_c3d_recording import integers, reals, with_analog

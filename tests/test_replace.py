@@ -17,10 +17,10 @@ import mcz
 from mcz import codecs
 from mcz.codecs import raw
 from mcz.codecs.wavelet import mrdwt
-from mcz.editing.recoding import recorded_options
 from mcz.errors import AccessError, MotionError, OptionError
-from mcz.motion import Channel, Motion, Signal
-from mcz.numbers import Grid, GridKind
+from mcz.files.editing.recoding import recorded_options
+from mcz.model.motion import Channel, Motion, Signal
+from mcz.model.numbers import Grid, GridKind
 from tests import overlap_codec
 from tests.commands import run
 from tests.motions import motions, smooth

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz import Channel, Motion, MotionError, Signal, sample
-from mcz.formats import c3d
+from mcz import Channel, Motion, MotionError, Signal
+from mcz.sources import sample
+from mcz.sources.c3d import c3d
 from tests.commands import run
 from tests.formats.c3d_files import made
 from tests.motions import written

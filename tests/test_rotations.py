@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from mcz.poses.conversions import from_matrices, slerp, to_matrices
+from mcz.kinematics.poses.conversions import from_matrices, slerp, to_matrices
 
 RANDOM = np.random.default_rng(7)
 AXES = np.concatenate([RANDOM.normal(size=(30, 3)), np.eye(3), -np.eye(3), np.eye(3) - 1])

@@ -13,9 +13,9 @@ import pytest
 
 import mcz
 from mcz import OptionError
-from mcz.editing import safe_names, unpacking
-from mcz.editing.safe_names import HIDDEN, PortableNames, fault_of, folded, notes_on
-from mcz.editing.unpacking import NAMES
+from mcz.files.editing import safe_names, unpacking
+from mcz.files.editing.safe_names import HIDDEN, PortableNames, fault_of, folded, notes_on
+from mcz.files.editing.unpacking import NAMES
 from tests.commands import run
 from tests.motions import smooth
 

@@ -14,7 +14,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mcz import FormatError, LimitError, MczError, TruncatedError
-from mcz.schema import (
+from mcz.model.schema import (
     UVARINT,
     Checked,
     Exactly,

@@ -19,7 +19,7 @@ from mcz.kinematics import (
     shell_points_of,
     virtual_markers_of,
 )
-from mcz.sample import acclaim_walk, bvh_walk
+from mcz.sources.sample import acclaim_walk, bvh_walk
 from tests.motions import motions, smooth
 from tests.test_metrics import hinge
 
@@ -186,7 +186,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     walk = acclaim_walk()
     other = noisy(walk)
     whole = mcz.compare(walk, other)
-    monkeypatch.setattr("mcz.metrics.comparison.BLOCK", 5000)
+    monkeypatch.setattr("mcz.kinematics.metrics.comparison.BLOCK", 5000)
     parts = mcz.compare(walk, other)
     assert parts.shell_where == whole.shell_where
     for one, two in zip(parts.by_joint, whole.by_joint, strict=True):

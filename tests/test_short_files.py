@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container import payloads
 from mcz.container.dictionary_deflate import smallest, words
-from mcz.schema import deflate, inflate
+from mcz.model.schema import deflate, inflate
 
 TINY = """HIERARCHY
 ROOT Hips

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.formats import c3d
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
+from mcz.sources.c3d import c3d
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made, real, word
 from tests.motions import smooth
 

@@ -13,8 +13,8 @@ import pytest
 
 import mcz
 from mcz import SkeletonWarning, SourceError
-from mcz.reading.source_files import SourceOptions
-from mcz.writing.source_encoder import EncodingOptions
+from mcz.files.reading.source_files import SourceOptions
+from mcz.files.writing.source_encoder import EncodingOptions
 from tests.commands import Call
 from tests.live_codec import encode_live
 

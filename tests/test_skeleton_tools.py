@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Signal, Skeleton
+from mcz.files.reading.source_files import SourceOptions
 from mcz.kinematics import origins_of, shell_points_of
-from mcz.numbers import Grid, GridKind
-from mcz.numbers.scaling import Scaling
-from mcz.reading.source_files import SourceOptions
-from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.model.numbers import Grid, GridKind
+from mcz.model.numbers.scaling import Scaling
+from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth, stored
 from tests.skeletons import skeletons, values_for
 

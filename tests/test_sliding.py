@@ -159,7 +159,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     noise = np.random.default_rng(2).normal(0, 0.1, places.shape)
     other = markers("lfoot body", places + noise)
     whole = mcz.compare(motion, other, contacts=True).sliding
-    monkeypatch.setattr("mcz.metrics.comparison.BLOCK", 100)
+    monkeypatch.setattr("mcz.kinematics.metrics.comparison.BLOCK", 100)
     assert mcz.compare(motion, other, contacts=True).sliding == whole
 
 

@@ -11,9 +11,9 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.reading.faults import validate
-from mcz.reading.report import info, source_info
-from mcz.reading.sizes import layout
+from mcz.files.reading.faults import validate
+from mcz.files.reading.report import info, source_info
+from mcz.files.reading.sizes import layout
 from tests.motions import smooth
 
 

@@ -63,7 +63,7 @@ def test_worked_example_is_the_smallest_clip() -> None:
     with mcz.open(data) as file:
         clip = file.clips["a"]
         assert clip.read().tolist() == [[1.5], [-2.0]]
-        from mcz.reading.faults import validate
+        from mcz.files.reading.faults import validate
 
         assert validate(file) == []
 
@@ -90,13 +90,13 @@ def test_spec_never_defers(word: str) -> None:
 
 
 def test_annexes_are_there_once() -> None:
-    from mcz.annexes import FOLDER
+    from mcz.model.annexes import FOLDER
 
     assert (ROOT / "conformance/annex").resolve() == FOLDER.resolve()
 
 
 def test_wavelets_of_the_text_and_the_annex_are_those_of_the_package() -> None:
-    from mcz.transforms.wavelets import IDS, WAVELETS
+    from mcz.codecs.transforms.wavelets import IDS, WAVELETS
 
     annex = json.loads((ROOT / "conformance/annex/wavelets.json").read_text())
     found = {n: {"id": IDS[n], "lo": list(w.lo), "hi": list(w.hi)} for n, w in WAVELETS.items()}

@@ -12,18 +12,21 @@ import numpy as np
 import pytest
 
 from mcz.codecs import codec_by_id
+from mcz.codecs.coding import logistic, mixing, residuals, space_kernels
 from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.online import kernels as online_kernels
 from mcz.codecs.posewave import header as posewave
-from mcz.coding import logistic, mixing, residuals, space_kernels
+from mcz.codecs.transforms.wavelets import MAX_LEVELS
 from mcz.container.grammar import GRAMMAR
-from mcz.formats import FORMATS, amc, c3d_restore, trc
-from mcz.formats.c3d_layout import Kind
-from mcz.formats.layout import Template
-from mcz.formats.table_layout import PHRASES, TableTemplate
-from mcz.numbers import Grid, GridFlag, GridKind, printed_base, rules, values_of_texts
-from mcz.schema import parse
-from mcz.transforms.wavelets import MAX_LEVELS
+from mcz.model.numbers import Grid, GridFlag, GridKind, printed_base, rules, values_of_texts
+from mcz.model.schema import parse
+from mcz.sources import FORMATS
+from mcz.sources.c3d import restore as c3d_restore
+from mcz.sources.c3d.layout import Kind
+from mcz.sources.tables import trc
+from mcz.sources.tables.layout import PHRASES, TableTemplate
+from mcz.sources.text import amc
+from mcz.sources.text.layout import Template
 from tests.test_spec import ROOT, SPEC, rows_under
 
 WORDS = " ".join(SPEC.split())
@@ -331,7 +334,7 @@ def test_signals_of_c3d() -> None:
 
 def test_sizes_and_ratios() -> None:
     """Each figure of the table is one that the package states under that name."""
-    code = "\n".join(path.read_text() for path in (ROOT / "mcz/reading").glob("*.py"))
+    code = "\n".join(path.read_text() for path in (ROOT / "mcz/files/reading").glob("*.py"))
     text = (ROOT / "docs/measures.md").read_text("utf-8")
     for name, _ in rows_under("Sizes and ratios", text):
         assert f'"{name}"' in code, name
@@ -339,7 +342,7 @@ def test_sizes_and_ratios() -> None:
 
 @pytest.mark.parametrize(
     ("heading", "folder"),
-    [("Keys of cuts", "mcz/editing"), ("Keys of replaced joints", "mcz/editing")],
+    [("Keys of cuts", "mcz/files/editing"), ("Keys of replaced joints", "mcz/files/editing")],
 )
 def test_keys_of_edits(heading: str, folder: str) -> None:
     code = "\n".join(path.read_text() for path in Path(ROOT / folder).glob("*.py"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless.best import CODEC
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
 from tests.test_spec import SPEC
 from tools import spec_trace
 

@@ -39,11 +39,11 @@ from mcz.container.repeats import chunks_in
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.container.source import open_source
-from mcz.live.concealment import LiveFrame
-from mcz.live.reader_with_losses import MOST_MADE_UP
-from mcz.reading.report import info
-from mcz.reading.sizes import layout
-from mcz.schema import build, parse
+from mcz.files.live.concealment import LiveFrame
+from mcz.files.live.reader_with_losses import MOST_MADE_UP
+from mcz.files.reading.report import info
+from mcz.files.reading.sizes import layout
+from mcz.model.schema import build, parse
 from tests import live_codec
 from tests.clocked_files import bvh
 from tests.repair import flipped, parts_of, use

@@ -17,7 +17,7 @@ from mcz import ChecksumError, OptionError
 from mcz.codecs import CODECS
 from mcz.codecs.contract import Layout
 from mcz.codecs.segments import Sizing, segments_by_guess
-from mcz.threads import in_force, in_order, limited
+from mcz.model.threads import in_force, in_order, limited
 from tests.motions import smooth, written
 
 MOTION = smooth(1800)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import mcz
 from mcz import Motion, MotionError, OptionError
 from mcz.codecs.basis_models import parse_bases
-from mcz.training import (
+from mcz.codecs.training import (
     Recipe,
     TrainingSet,
     mirrored,
@@ -24,8 +24,8 @@ from mcz.training import (
     turned,
     window_coefficients,
 )
-from mcz.transforms.dct import dct_matrix
-from mcz.transforms.lsdt import (
+from mcz.codecs.transforms.dct import dct_matrix
+from mcz.codecs.transforms.lsdt import (
     PATIENCE,
     haar_basis,
     has_converged,
@@ -126,7 +126,7 @@ def test_a_dictionary_of_sparse_frames_is_found(start: str) -> None:
 
 
 def test_of_equal_magnitudes_the_first_is_kept() -> None:
-    from mcz.transforms.lsdt_kernels import truncate
+    from mcz.codecs.transforms.lsdt_kernels import truncate
 
     rows = np.array([[1.0, -2.0, 2.0, -1.0], [3.0, 3.0, 3.0, 3.0]])
     products = np.empty((4, 4))

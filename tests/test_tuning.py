@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs.parameters import Dial
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.reading.sizes import clip_sizes
-from mcz.writing.tuning import GOAL, PROMISED, Target, search
+from mcz.files.reading.sizes import clip_sizes
+from mcz.files.writing.tuning import GOAL, PROMISED, Target, search
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from tests.motions import written
 
 DIAL = Dial("T_g", 2.0**-20, 2.0**20)

@@ -25,10 +25,10 @@ with mcz.open("a.mcz") as file:
     rate: int = clip.frame_rate
 """
 SEEN = """
-5: Revealed type is "mcz.reading.clip.Clip"
+5: Revealed type is "mcz.files.reading.clip.Clip"
 6: Revealed type is "numpy.ndarray[tuple[Any, ...], numpy.dtype[numpy.float64 | numpy.int64]]"
 7: Revealed type is "numpy.ndarray[tuple[Any, ...], numpy.dtype[numpy.floating[Any]]]"
-8: Revealed type is "mcz.motion.Motion"
+8: Revealed type is "mcz.model.motion.Motion"
 9: "Clip" has no attribute "positons"; maybe "positions"?
 10: Module has no attribute "positons"; maybe "positions"?
 12: Revealed type is "dict[str, numpy.ndarray[tuple[Any, ...], numpy.dtype[numpy.floating[Any]]]]"

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mcz import OptionError
-from mcz.transforms import dwt
-from mcz.transforms.wavelets import IDS, INLINE, MAX_TAPS, WAVELETS, Wavelet, by_id, by_name
+from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms.wavelets import IDS, INLINE, MAX_TAPS, WAVELETS, Wavelet, by_id, by_name
 
 REGISTERED = tuple(WAVELETS)
 OTHERS = ("db10", "sym7", "coif3", "bior1.3", "bior2.2", "bior6.8", "rbio3.5", "dmey")

@@ -12,16 +12,16 @@ from scipy.spatial.transform import Rotation
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal, Skeleton
-from mcz.angles import Unwrapper, unwrap
-from mcz.conversion import converted_files
-from mcz.joint_errors import joint_errors
+from mcz.exchange.conversion import converted_files
+from mcz.kinematics.angles import Unwrapper, unwrap
+from mcz.kinematics.metrics.joint_errors import joint_errors
 from mcz.kinematics.rotation_vectors import (
     continuous,
     matrices_of_vectors,
     spins_of_vectors,
     vectors_of_quaternions,
 )
-from mcz.sample import acclaim_walk
+from mcz.sources.sample import acclaim_walk
 from tests.bodies import turned_by
 
 SIZES = st.sampled_from(

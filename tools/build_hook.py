@@ -21,7 +21,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PAGE = "tools/viewer/dist/viewer.html"
-PLACES = {"wheel": "mcz/viewing/viewer.html", "sdist": PAGE}
+PLACES = {"wheel": "mcz/show/viewing/viewer.html", "sdist": PAGE}
 WITHOUT = "MCZ_BUILD_WITHOUT_VIEWER"
 MODES = ("compiled", "checked", "sanitized", "interpreted")
 MODE = os.environ.get("MCZ_BUILD", "")

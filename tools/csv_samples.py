@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mcz
-from mcz.motion import Motion
+from mcz.model.motion import Motion
 
 Floats = NDArray[np.float64]
 MOST_FRAMES = 2000

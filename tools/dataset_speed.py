@@ -52,7 +52,7 @@ def windows_a_second(
 
 def decoded(count: list[int]) -> Callable[[], None]:
     """Count the frames that are decoded, from now on; returns what stops it."""
-    from mcz.reading.signal_reader import SignalReader
+    from mcz.files.reading.signal_reader import SignalReader
 
     whole = SignalReader._decode
 

@@ -16,8 +16,8 @@ from mcz.codecs import CODECS
 from mcz.codecs.contract import Codec
 from mcz.codecs.known_answer_table import KnownAnswer
 from mcz.codecs.known_answers import N_FRAMES, answer_layout, digest
-from mcz.motion import Motion, Signal
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import Motion, Signal
 
 HOME = Path(__file__).parent.parent / "mcz/codecs/known_answer_table.py"
 OPTIONS = {"segment_frames": N_FRAMES, "group": N_FRAMES}  # where a codec has them

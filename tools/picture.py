@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz.kinematics.points import point_names
-from mcz.sample import write_samples
+from mcz.sources.sample import write_samples
 
 PICTURE = Path(__file__).parent.parent / "docs" / "walk.svg"
 EVERY = 20  # frames from figure to figure

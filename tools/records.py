@@ -1,7 +1,7 @@
 """Records from plain fields, and where a field of a record lies in its bytes.
 
 Vectors and tests write what no writer would: they name fields and give numbers, lists and
-mappings, which become the records of ``mcz.schema``.
+mappings, which become the records of ``mcz.model.schema``.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from typing import Any, TypeVar
 import construct
 import numpy as np
 
-from mcz.annexes import annex_bytes
 from mcz.container.dictionary_deflate import chunk_id, plain_id
 from mcz.container.payloads import AFTER_WORDS, ENCODING
 from mcz.errors import MczError
-from mcz.schema import EXTENDED, Record, build, read_varint, varint
-from mcz.schema.columns import Columns, read_column, read_varints
-from mcz.schema.records import RecordType
-from mcz.schema.types import Checked, Counted, Exactly, Sized
+from mcz.model.annexes import annex_bytes
+from mcz.model.schema import EXTENDED, Record, build, read_varint, varint
+from mcz.model.schema.columns import Columns, read_column, read_varints
+from mcz.model.schema.records import RecordType
+from mcz.model.schema.types import Checked, Counted, Exactly, Sized
 
 R = TypeVar("R", bound=Record)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import mcz
 from mcz.errors import MczError
-from mcz.formats import FORMATS
+from mcz.sources import FORMATS
 
 SUFFIXES = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
 EFFORTS = ("fast", "best")

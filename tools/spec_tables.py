@@ -23,11 +23,11 @@ import construct
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # so that it runs as a script
 
-from mcz import numbers, schema
 from mcz.container import payloads
-from mcz.schema import types
-from mcz.schema.columns import Columns
-from mcz.schema.records import RecordType
+from mcz.model import numbers, schema
+from mcz.model.schema import types
+from mcz.model.schema.columns import Columns
+from mcz.model.schema.records import RecordType
 from tools import spec_trace
 
 MODULES = (
@@ -47,14 +47,14 @@ MODULES = (
     "mcz.codecs.online.coder",
     "mcz.codecs.posewave.header",
     "mcz.codecs.posewave.contact_plan",
-    "mcz.formats.layout",
-    "mcz.formats.table_layout",
-    "mcz.formats.arrays.layout",
-    "mcz.formats.notes",
-    "mcz.formats.table_notes",
-    "mcz.formats.c3d_layout",
-    "mcz.recovery.packets",
-    "mcz.numbers",
+    "mcz.sources.text.layout",
+    "mcz.sources.tables.layout",
+    "mcz.sources.arrays.layout",
+    "mcz.sources.text.notes",
+    "mcz.sources.tables.notes",
+    "mcz.sources.c3d.layout",
+    "mcz.container.recovery.packets",
+    "mcz.model.numbers",
 )
 NAMED = {
     id(schema.UVARINT): "varint",

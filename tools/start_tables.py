@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.coding import mixing
+from mcz.codecs.coding import mixing
 
 PER_LINE = 48
 
@@ -30,7 +30,7 @@ def untrained(state: np.ndarray) -> np.ndarray:
 
 
 def table(state: np.ndarray, n_mixers: int, max_count: int) -> dict[str, object]:
-    """The fields that ``mcz.coding.start_states.start_state`` reads."""
+    """The fields that ``mcz.codecs.coding.start_states.start_state`` reads."""
     probabilities = np.clip(state[mixing.MODELS :: 2] >> 8, 0, 255)
     counts = np.minimum(state[mixing.MODELS + 1 :: 2], max_count)
     return {

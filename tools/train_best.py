@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 import mcz
+from mcz.codecs.coding import mixing, residuals
+from mcz.codecs.coding.start_states import start_states
 from mcz.codecs.lossless import best_streams
 from mcz.codecs.lossless.best import CODEC
-from mcz.coding import mixing, residuals
-from mcz.coding.start_states import start_states
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
 from tools.start_tables import Kept, table, untrained
 
 MAX_COUNT = 20

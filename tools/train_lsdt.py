@@ -4,7 +4,7 @@
     python tools/train_lsdt.py --bvh OUT.bin CLIP.amc...
     python tools/train_lsdt.py --virtual-markers OUT.bin CLIP.amc...
 
-The recipe is ``mcz.training.SHIPPED``, tried from several starts, of which the best basis of each
+The recipe is ``mcz.codecs.training.SHIPPED``, tried from several starts; the best basis of each
 coordinate is kept; ``mcz train`` takes any other. With --bvh the clips are converted first, and the
 points are the 38 of CMU's BVH files. With three virtual markers a joint beside the
 points it is ``VIRTUAL``: mirrored axes are no axes, and one start of so many points is near enough.
@@ -25,7 +25,7 @@ import numpy as np
 
 import mcz
 from mcz.codecs.basis_models import build_bases, falling_digits, round_vectors
-from mcz.training import SHIPPED, Recipe, Trained, training_set
+from mcz.codecs.training import SHIPPED, Recipe, Trained, training_set
 
 TRIES = (("dct", 20), ("haar", 20), ("dct", 40), ("haar", 40), ("dct", 80))
 VIRTUAL = Recipe(sparsity=16, iterations=150, growth=6, headings=4, every=4)

@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding import mixing
 from mcz.codecs.posewave import choices, segment
 from mcz.codecs.posewave.header import parse_header
 from mcz.codecs.posewave.model import N_SECOND, Start, start_of, start_tables
@@ -45,7 +46,6 @@ from mcz.codecs.posewave.model_state import (
     USUAL,
     Model,
 )
-from mcz.coding import mixing
 from tools.posewave_counting import Counting
 from tools.training_clips import Piece, pieces_of, read, step_of
 

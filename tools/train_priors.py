@@ -29,7 +29,7 @@ from mcz.codecs.posewave.orders import Orders
 from mcz.codecs.posewave.priors import SEEN, UNITS, VARIANCE_UNITS, layout_of
 from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import classes_of, encode_segment, kinds_of
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 from tools.training_clips import Piece, pieces_of, read, step_of
 
 Floats = NDArray[np.float64]

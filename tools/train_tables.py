@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import mcz
+from mcz.codecs.coding import residuals
 from mcz.codecs.contract import Codec
 from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.curves import qbc
@@ -37,10 +38,9 @@ from mcz.codecs.spatial import (
 )
 from mcz.codecs.wavelet import mrdwt
 from mcz.codecs.wavelet import streams as wavelet_streams
-from mcz.coding import residuals
-from mcz.motion import Motion
-from mcz.writing.planning import prepare
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.planning import prepare
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import Motion
 from tools.start_tables import Kept, table, untrained
 
 SEGMENT_BYTES = 2**26

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mcz
-from mcz.angles import unwrap
 from mcz.codecs.contract import Layout
 from mcz.kinematics import reach
-from mcz.motion import Motion, Skeleton
+from mcz.kinematics.angles import unwrap
+from mcz.model.motion import Motion, Skeleton
 
 Floats = NDArray[np.float64]
 

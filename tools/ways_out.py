@@ -19,8 +19,8 @@ from tempfile import TemporaryDirectory
 
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.editing.folders import files_below, motion_files
-from mcz.formats import format_of
+from mcz.files.editing.folders import files_below, motion_files
+from mcz.sources import format_of
 
 Way = Callable[[Path, Path, Path], tuple[list[object], Path]]  # source, .mcz, folder: words, output
 OF_CLIPS = ("frames", "extract")  # ways that a skeleton alone does not have

@@ -13,8 +13,8 @@ import mcz
 from mcz.codecs import CODECS, codec_by_name
 from mcz.codecs.contract import Codec
 from mcz.errors import MczError, OptionError
-from mcz.motion import Motion
-from mcz.types import JsonObject, Params
+from mcz.model.motion import Motion
+from mcz.model.types import JsonObject, Params
 
 PUBLISHED = (
     "khan2014",

@@ -12,14 +12,14 @@ from mcz.bench.cases import Case, Variant, load
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Request, Segment, Span, model_finder
 from mcz.container.limits import BASE
+from mcz.files.reading.sizes import clip_ratios, clip_sizes
+from mcz.files.writing.clip_writer import file_in_memory
+from mcz.files.writing.planning import prepare
+from mcz.files.writing.signal_source import MemorySource
 from mcz.kinematics import SHELL_CM
-from mcz.metrics.figures import NO_CONTACTS
-from mcz.motion import Motion
-from mcz.reading.sizes import clip_ratios, clip_sizes
-from mcz.types import JsonObject, Params
-from mcz.writing.clip_writer import file_in_memory
-from mcz.writing.planning import prepare
-from mcz.writing.signal_source import MemorySource
+from mcz.kinematics.metrics.figures import NO_CONTACTS
+from mcz.model.motion import Motion
+from mcz.model.types import JsonObject, Params
 
 Record = JsonObject
 

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mcz
-from mcz.angles import unwrap
 from mcz.bench.cases import Loaded
 from mcz.bench.measure import cpu_seconds
-from mcz.types import JsonObject
+from mcz.kinematics.angles import unwrap
+from mcz.model.types import JsonObject
 
 Record = JsonObject
 Matrix = NDArray[np.float32]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mcz.bench.sweep import ClipResult, Curve
-from mcz.pictures.themes import THEMES, Theme, theme_of
+from mcz.show.pictures.themes import THEMES, Theme, theme_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

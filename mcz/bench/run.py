@@ -13,8 +13,8 @@ from mcz.bench.cases import find_cases, named, variants_of
 from mcz.bench.sweep import ClipResult
 from mcz.bench.tables import Table
 from mcz.bench.tasks import Runner
-from mcz.pictures.chart_pages import ChartPage, Sheet, data_uri
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
+from mcz.show.pictures.chart_pages import ChartPage, Sheet, data_uri
 
 
 @dataclass(frozen=True, slots=True)

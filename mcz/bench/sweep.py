@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from mcz.bench.bjontegaard import bd_rate, bd_sqnr, front
 from mcz.bench.cases import Case, Variant, load
 from mcz.bench.ladder import N_POINTS
 from mcz.bench.measure import Record
 from mcz.bench.tables import Table, setting
 from mcz.bench.tasks import Runner, Task
-from mcz.bjontegaard import bd_rate, bd_sqnr, front
 from mcz.codecs import codec_by_name
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 ZFP = "zfp, tolerance"
 AT_ERRORS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # cm, or length units where these are unknown

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from mcz.types import JsonObject, Settings
+from mcz.model.types import JsonObject, Settings
 
 Cell = float | int | str | None
 

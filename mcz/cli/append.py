@@ -21,7 +21,7 @@ from mcz.cli.options import (
     threads_option,
 )
 from mcz.cli.progress import Progress
-from mcz.types import Settings
+from mcz.model.types import Settings
 
 
 @click.command(short_help="Add files to an .mcz.")

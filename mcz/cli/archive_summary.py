@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from mcz.cli.common import Exit, echo, plural, print_json, say
 from mcz.cli.hints import in_options
-from mcz.reading.fidelity import GIVEN_BACK
+from mcz.files.reading.fidelity import GIVEN_BACK
 
 if TYPE_CHECKING:
-    from mcz.editing.batch_report import Outcome, Report
+    from mcz.files.editing.batch_report import Outcome, Report
 
 
 HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "written", *GIVEN_BACK)

@@ -27,7 +27,7 @@ def command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_json:
     a report of mcz verify, may be among them. mcz verify DIR checks a bag.
     """
     import mcz
-    from mcz.bags import check_bag
+    from mcz.files.bags import check_bag
 
     lines = [_line(text) for text in info]
     if len({name.lower() for name, _ in lines}) < len(lines):

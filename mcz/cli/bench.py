@@ -115,7 +115,7 @@ def show(outcome: Outcome, out: Path | None, *, as_json: bool) -> None:
 
 def _sample(folder: str) -> str:
     """The walk that this package makes itself."""
-    from mcz.sample import write_samples
+    from mcz.sources.sample import write_samples
 
     write_samples(Path(folder))
     return str(Path(folder) / "walk.amc")

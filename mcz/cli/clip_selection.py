@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
-from mcz.types import Values
+from mcz.files.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
+from mcz.model.types import Values
 
 if TYPE_CHECKING:
-    from mcz.clock import Timeline
-    from mcz.motion import Motion
-    from mcz.reading.clip import Clip
-    from mcz.tables.events import Event
-    from mcz.tables.files import Table
+    from mcz.files.reading.clip import Clip
+    from mcz.files.tables.events import Event
+    from mcz.files.tables.files import Table
+    from mcz.model.clock import Timeline
+    from mcz.model.motion import Motion
 
 Masked = tuple[Values, NDArray[np.bool_] | None]
 
@@ -82,8 +82,8 @@ class ClipSelection:
         names: list[str],
         units: Sequence[str] = (),
     ) -> Table:
-        from mcz.reading.decimation import decimated_rows
-        from mcz.tables.files import Table
+        from mcz.files.reading.decimation import decimated_rows
+        from mcz.files.tables.files import Table
 
         clip, per_frame = self.clip, self.clip.signals[signal].samples_per_frame
         mask = np.ones(values.shape, np.bool_) if mask is None else mask
@@ -125,21 +125,21 @@ class FilteredSelection(ClipSelection):
         return FILTERED
 
     def source_bytes(self) -> bytes:
-        from mcz.reading.post_filtering import filtered_source
+        from mcz.files.reading.post_filtering import filtered_source
 
         return filtered_source(
             self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
         )
 
     def motion(self) -> Motion:
-        from mcz.reading.post_filtering import filtered_motion
+        from mcz.files.reading.post_filtering import filtered_motion
 
         return filtered_motion(
             self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
         )
 
     def _rows(self, joints: Sequence[int | str] | None) -> Masked:
-        from mcz.reading.post_filtering import filtered_part
+        from mcz.files.reading.post_filtering import filtered_part
 
         return filtered_part(self.clip, self.frames, joints, self.resolution, rate=self.rate)
 
@@ -151,7 +151,7 @@ class PreviewSelection(ClipSelection):
         return preview_motion(self.clip)
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
-        from mcz.tables.files import Table
+        from mcz.files.tables.files import Table
 
         found = self.clip.previewed(joints)
         numbers, rate = self.clip.frame_numbers[found.frames], self.clip.frame_rate
@@ -171,8 +171,8 @@ def preview_motion(clip: Clip) -> Motion:
 
     A last frame that is nearer to the one before is left out.
     """
-    from mcz.clock import Timeline
-    from mcz.motion import Motion, Signal
+    from mcz.model.clock import Timeline
+    from mcz.model.motion import Motion, Signal
 
     found = clip.previewed()
     gaps = np.diff(found.frames)

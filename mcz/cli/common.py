@@ -36,12 +36,12 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.hints import Hint
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from mcz.reading.file import File
+    from mcz.files.reading.file import File
 
 
 class Exit(IntEnum):
@@ -324,7 +324,7 @@ def check_new(path: Path, force: bool) -> None:
 
 def write_output(path: Path, data: bytes, force: bool) -> None:
     """Write ``data`` under its name in one step, never over an existing file without ``force``."""
-    from mcz.writing.atomic import replacing
+    from mcz.files.writing.atomic import replacing
 
     with about(str(path)), replacing(path, force=force) as stream:
         stream.write(data)

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import LimitError, MczError, OptionError, UnsupportedError
-from mcz.types import JsonObject, Values
+from mcz.model.types import JsonObject, Values
 
 if TYPE_CHECKING:
-    from mcz.reading.clip import Clip
-    from mcz.reading.file import File
-    from mcz.reading.signal_info import SignalInfo
+    from mcz.files.reading.clip import Clip
+    from mcz.files.reading.file import File
+    from mcz.files.reading.signal_info import SignalInfo
 
 OPTIONS = ("--clip", "--frames", "--joints", "--resolution", "--post-filter", "--serve")
 MAX_LINE = 2**20
@@ -115,7 +115,7 @@ def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
 
 
 def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
-    from mcz.reading.signal_info import read_segments
+    from mcz.files.reading.signal_info import read_segments
 
     for attachment in file.attachments.values():
         attachment.read()
@@ -152,7 +152,7 @@ def _values(
     clip: Clip, given: argparse.Namespace, resolution: int, signal: int
 ) -> tuple[Values, NDArray[np.bool_] | None]:
     if given.post_filter and not signal:  # FILT-01
-        from mcz.reading.post_filtering import filtered_part
+        from mcz.files.reading.post_filtering import filtered_part
 
         return filtered_part(clip, given.frames, given.joints, resolution)
     return clip.read_masked(given.frames, given.joints, resolution, signal=signal)
@@ -178,7 +178,7 @@ def _part(clip: str, signal: str, array: str, values: Values | NDArray[np.bool_]
 
 def _sources(file: File) -> Iterator[Part]:
     """Every file that is held under a name: of clips, attached, and further names."""
-    from mcz.editing.unpacking import named_files
+    from mcz.files.editing.unpacking import named_files
 
     lacking: UnsupportedError | None = None
     for path, restore in named_files(file):

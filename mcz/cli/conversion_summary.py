@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
     from mcz.cli.clip_selection import ClipSelection
     from mcz.cli.decode_options import DecodeOptions
-    from mcz.conversion import Fit
-    from mcz.conversion.scenes import SceneFile
-    from mcz.reading.clip import Clip
+    from mcz.exchange.conversion import Fit
+    from mcz.exchange.conversion.scenes import SceneFile
+    from mcz.files.reading.clip import Clip
 
 
 @dataclass(slots=True)
@@ -118,7 +118,7 @@ def _fit_line(fit: Fit) -> str:
 
 def rate_notes(clip: Clip, part: ClipSelection, wanted: DecodeOptions) -> tuple[str, ...]:
     """Notes on text files whose stated times differ from those of the clip."""
-    from mcz.reading.rate_notes import text_notes
+    from mcz.files.reading.rate_notes import text_notes
 
     if wanted.decimate:
         return ()

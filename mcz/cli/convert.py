@@ -27,7 +27,7 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.suffixes import TARGETS, suffix_of
-from mcz.types import JsonObject, Params, Settings
+from mcz.model.types import JsonObject, Params, Settings
 
 MCZ = ".mcz"
 OF_SOURCES = ("skeleton", "arrays", "model")

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
 from mcz.hints import Hint
-from mcz.text_format import counted
-from mcz.types import Params
+from mcz.model.text_format import counted
+from mcz.model.types import Params
 
 
 @contextmanager
@@ -19,7 +19,7 @@ def hinted(target: str | bytes, options: Params) -> Iterator[None]:
     except (UnsupportedError, LimitError):
         raise
     except FormatError as error:
-        from mcz.reading.file import is_source
+        from mcz.files.reading.file import is_source
 
         whole = None if options.get("salvage") else _whole(target)
         if whole is not None:

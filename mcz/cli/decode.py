@@ -41,17 +41,17 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of, target_of_clip
-from mcz.reading.fidelity import CONVERTED, RESTORED
-from mcz.types import JsonObject
+from mcz.files.reading.fidelity import CONVERTED, RESTORED
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from mcz.conversion import Fit
-    from mcz.conversion.scenes import SceneFile
-    from mcz.motion import Motion
-    from mcz.reading.clip import Clip
-    from mcz.reading.file import File
+    from mcz.exchange.conversion import Fit
+    from mcz.exchange.conversion.scenes import SceneFile
+    from mcz.files.reading.clip import Clip
+    from mcz.files.reading.file import File
+    from mcz.model.motion import Motion
 
 
 @click.command(short_help="Restore the original file, or write its numbers.")
@@ -245,8 +245,8 @@ def _of_clip(
         outputs = [_source(clip, part)]
         summary.notes = rate_notes(clip, part, wanted)
     elif wanted.is_converted:
-        from mcz.conversion import left_out
-        from mcz.reading.source_files import SourceOptions
+        from mcz.exchange.conversion import left_out
+        from mcz.files.reading.source_files import SourceOptions
 
         motion = part.motion()
         if wanted.solve:
@@ -304,7 +304,7 @@ def _check_moves(clip: Clip) -> None:
 
 def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
     """The motion of the clip's base skeleton whose points lie where those of ``motion`` do."""
-    from mcz.conversion import from_positions
+    from mcz.exchange.conversion import from_positions
 
     base = clip.base_skeleton
     if base is None:
@@ -318,7 +318,7 @@ def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
 
 def _scene(motion: Motion, target: str, rate: Fraction | None, wanted: DecodeOptions) -> SceneFile:
     """The motion as a file of animated nodes."""
-    from mcz.conversion.scenes import to_scene
+    from mcz.exchange.conversion.scenes import to_scene
 
     return to_scene(motion, target, key_error_mm=wanted.key_error, rate=rate, unit=wanted.unit)
 
@@ -327,7 +327,7 @@ def _converted(
     motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
 ) -> list[Output]:
     """The motion as a plain file of another format, with its ASF where an AMC is to have one."""
-    from mcz.conversion import converted_files
+    from mcz.exchange.conversion import converted_files
 
     files = converted_files(motion, target, rate, with_skeleton)
     kinds = {"asf": "skeleton"}
@@ -338,8 +338,8 @@ def _converted(
 
 
 def _export(clip: Clip, target: str, part: ClipSelection, wanted: DecodeOptions) -> Output:
-    from mcz.tables.events import EVENT_EXPORTS
-    from mcz.tables.files import EXPORTS, channel_names, channel_units
+    from mcz.files.tables.events import EVENT_EXPORTS
+    from mcz.files.tables.files import EXPORTS, channel_names, channel_units
 
     joints = wanted.joints
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
@@ -365,7 +365,7 @@ def _export(clip: Clip, target: str, part: ClipSelection, wanted: DecodeOptions)
 
 def _beside(clip: Clip, wanted: DecodeOptions) -> tuple[str, ...]:
     """The signals that a table does not have, and --signal would write."""
-    from mcz.conversion.losses import of_recording, of_text
+    from mcz.exchange.conversion.losses import of_recording, of_text
 
     if wanted.signal is not None or wanted.joints is not None:
         return ()

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from mcz.cli.common import about, existing, opened, say
 from mcz.cli.decode_options import DecodeOptions, refuse
 from mcz.cli.hints import in_options
-from mcz.types import Params
+from mcz.model.types import Params
 
 if TYPE_CHECKING:
-    from mcz.reading.file import File
+    from mcz.files.reading.file import File
 
 SOURCE_GIVEN = "a source file, no .mcz; -o or --to says what it becomes, mcz encode compresses it"
 NO_LIMIT = 2**53  # of what is decoded: it was made here
@@ -32,7 +32,7 @@ class Input:
 
     @property
     def is_source(self) -> bool:
-        from mcz.reading.file import is_source
+        from mcz.files.reading.file import is_source
 
         return is_source(self.file)
 

@@ -19,7 +19,7 @@ from mcz.cli.common import (
     write_output,
 )
 from mcz.cli.suffixes import is_folder
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 
 class Output(NamedTuple):
@@ -49,7 +49,7 @@ def deliver(
 
     What stands in the way of one of them is found before the first is written.
     """
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.writing.atomic import refuse_inputs
 
     file = given[0]
     inputs = [sys.stdin if path == "-" else path for path in given]
@@ -96,6 +96,6 @@ def plain_name(name: str) -> str:
     >>> plain_name("walk.bvh"), plain_name(".."), plain_name("a\0b"), plain_name("con.bvh")
     ('walk.bvh', '__', 'a_b', 'con_.bvh')
     """
-    from mcz.editing.safe_names import PortableNames
+    from mcz.files.editing.safe_names import PortableNames
 
     return PortableNames()(name.replace("/", "_")) or "_"

@@ -34,11 +34,11 @@ from mcz.cli.options import (
     up_option,
     where_option,
 )
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.motion import Motion
-    from mcz.reading.file import File
+    from mcz.files.reading.file import File
+    from mcz.model.motion import Motion
 
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
 Cut = tuple[int, int | None] | None
@@ -155,7 +155,7 @@ class _Wanted:
 
     def told(self, motion: Motion) -> Motion:
         """``motion`` with what it does not say itself."""
-        from mcz.reading.source_files import SourceOptions
+        from mcz.files.reading.source_files import SourceOptions
 
         said = SourceOptions(rate=self.rate, unit=self.unit, up=self.up)
         return said.completing(motion)
@@ -180,7 +180,7 @@ class _Side:
         wanted: _Wanted,
         max_decoded: int | None,
     ) -> None:
-        from mcz.reading.file import is_mcz
+        from mcz.files.reading.file import is_mcz
 
         self.path, self._wanted = path, wanted
         self.file: File | None = None
@@ -196,7 +196,7 @@ class _Side:
     def load(self, name: str | None) -> _Loaded:
         """The motion called ``name``, or the only one, cut to the frames that are wanted."""
         import mcz
-        from mcz.reading.sizes import clip_ratios
+        from mcz.files.reading.sizes import clip_ratios
 
         frames = self._wanted.frames
         with about(self.path):
@@ -274,8 +274,8 @@ def _compared(
     left: _Side, right: _Side, a: str | None, b: str | None, wanted: _Wanted
 ) -> JsonObject:
     """The document of one pair of motions."""
-    from mcz.metrics.diff_document import diff_document
-    from mcz.reading.differences import document_of
+    from mcz.files.reading.differences import document_of
+    from mcz.kinematics.metrics.diff_document import diff_document
 
     one, other = left.load(a), right.load(b)
     if one.motion.n_frames != other.motion.n_frames:

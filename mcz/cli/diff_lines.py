@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from mcz.cli.common import plural, table
 from mcz.cli.figures import figure_lines
 from mcz.cli.hints import in_options
-from mcz.text_format import first_of
-from mcz.types import JsonObject, Params
+from mcz.model.text_format import first_of
+from mcz.model.types import JsonObject, Params
 
 FEW = 12  # names of joints that are shown
 SMALL_CM = 1.0  # below it distances are shown in mm

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import click
 
-from mcz.types import Settings
+from mcz.model.types import Settings
 
 HELP = ["-h", "--help"]
 

@@ -39,7 +39,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
-    from mcz.writing.file import Written
+    from mcz.files.writing.file import Written
 
 
 @click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv or .npz file.")
@@ -112,8 +112,8 @@ def _encode_piped(
     **options: Any,
 ) -> Exit:
     from mcz.cli.encode_stdin import encode_lines, stored
-    from mcz.live.text_writer import codes_live
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.live.text_writer import codes_live
+    from mcz.files.writing.atomic import refuse_inputs
 
     refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     if options["codec"] is not None and codes_live(options["codec"], options["params"] or {}):
@@ -138,7 +138,7 @@ def _encode_file(
     **options: Any,
 ) -> Exit:
     import mcz
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.writing.atomic import refuse_inputs
 
     if output == "-":
         refuse_inputs(sys.stdout, (source, skeleton))
@@ -179,7 +179,7 @@ def _tell(target: str, written: Written, as_json: bool) -> None:
             if clip.quality is not None:
                 echo(f"  {reached(clip.quality)}")
         return
-    from mcz.reading.report import info
+    from mcz.files.reading.report import info
 
     with opened(target) as file:
         print_json({"output": target, **info(file)})

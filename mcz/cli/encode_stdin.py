@@ -27,7 +27,7 @@ from mcz.errors import MczError
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
 
-    from mcz.live.writer import LiveTraffic, LiveWriter
+    from mcz.files.live.writer import LiveTraffic, LiveWriter
 
 NAME = "standard input"
 PATIENCE = 0.3  # seconds of waiting for input between two looks whether there was an interrupt
@@ -84,7 +84,7 @@ class Awaited(RawIOBase):
 @contextmanager
 def stored(format_name: str | None) -> Iterator[str]:
     """The path of a file, for as long as the block runs, that holds all of standard input."""
-    from mcz.live.text_writer import suffix_of
+    from mcz.files.live.text_writer import suffix_of
 
     data = standard_input().read()
     if not data:
@@ -102,9 +102,9 @@ def encode_lines(
     target: str | None, force: bool, format_name: str | None, skeleton: str | None, **options: Any
 ) -> None:
     """Encode standard input frame by frame to ``target``, - or None being standard output."""
-    from mcz.live.text_writer import begin_live
-    from mcz.reading.source_files import SourceOptions
-    from mcz.writing.source_encoder import encoding_options
+    from mcz.files.live.text_writer import begin_live
+    from mcz.files.reading.source_files import SourceOptions
+    from mcz.files.writing.source_encoder import encoding_options
 
     options["profile"] = options["profile"] != "base"
     for name in ("verbatim", "profile", "copies", "effort"):

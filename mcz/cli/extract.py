@@ -34,7 +34,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
-    from mcz.editing.extraction import ExtractedClip, Extraction
+    from mcz.files.editing.extraction import ExtractedClip, Extraction
 
 
 @click.command(short_help="Cut a part out of an .mcz, without re-encoding.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from mcz.cli.common import plural, printable, table
-from mcz.types import Params
+from mcz.model.types import Params
 
 SETTING = "param."
 SHOWN_ELSEWHERE = (

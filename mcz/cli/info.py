@@ -42,12 +42,12 @@ from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
 from mcz.errors import FormatError, MczError
-from mcz.text_format import first_of
-from mcz.types import JsonObject
+from mcz.model.text_format import first_of
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.reading.faults import Problem
-    from mcz.reading.file import File
+    from mcz.files.reading.faults import Problem
+    from mcz.files.reading.file import File
 
 FEW = 4  # clips that are shown in full; more are shown as a table
 WIDEST = 200  # characters that are shown of a value of metadata
@@ -101,9 +101,9 @@ def command(
     Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .npy, .npz) it shows the
     skeleton and the clip.
     """
-    from mcz.reading.file import is_source
-    from mcz.reading.report import info
-    from mcz.reading.sizes import layout
+    from mcz.files.reading.file import is_source
+    from mcz.files.reading.report import info
+    from mcz.files.reading.sizes import layout
 
     if is_source(file) and not (show_layout or check):
         if where is not None:
@@ -139,7 +139,7 @@ def _add_previews(held: File, document: JsonObject, as_json: bool, preview: bool
     if not as_json and len(document["clips"]) > FEW:
         return
     from mcz.cli.previews import preview_of
-    from mcz.pictures.energy import is_cheap
+    from mcz.show.pictures.energy import is_cheap
 
     for clip in document["clips"]:
         found = held.clips[clip["name"]]
@@ -152,7 +152,7 @@ def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) ->
     import mcz
     from mcz.cli.previews import motion_of
     from mcz.cli.source_text import source_lines
-    from mcz.reading.report import source_info
+    from mcz.files.reading.report import source_info
 
     existing(file)
     with about(file):
@@ -168,7 +168,7 @@ def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) ->
 
 
 def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
-    from mcz.reading.faults import Problem, validate
+    from mcz.files.reading.faults import Problem, validate
 
     size = 0
     try:

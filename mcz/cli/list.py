@@ -21,12 +21,12 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.options import json_option, salvage_option, where_option
-from mcz.text_format import spreadsheet_cell
-from mcz.types import JsonObject
+from mcz.model.text_format import spreadsheet_cell
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.reading.clip import Clip
-    from mcz.reading.file import File
+    from mcz.files.reading.clip import Clip
+    from mcz.files.reading.file import File
 
 ALIAS = ("name", "of", "target")
 USUAL = ("name", "codec", "n_frames", "n_channels", "frame_rate", "duration")
@@ -68,7 +68,7 @@ def command(
     with opened(file, salvage=salvage) as held, about(file):
         clips = held.chosen(where=where)
         if sort is not None:
-            from mcz.editing.reorganize import in_order
+            from mcz.files.editing.reorganize import in_order
 
             clips = in_order(held, clips, sort)
         rows = _rows(held, clips, names)
@@ -98,7 +98,7 @@ def command(
 
 def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[JsonObject]:
     """The values of each clip by column; without ``names`` those of the index, and its skeleton."""
-    from mcz.reading.fields import getter_of
+    from mcz.files.reading.fields import getter_of
 
     every = held.clips.values()
     getters: dict[str, Callable[[Clip], object]] = {

@@ -25,9 +25,9 @@ from mcz.cli.options import clips_option, json_option, where_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mcz.editing.metadata_edit import Said
-    from mcz.reading.clip import Clip
-    from mcz.reading.file import File
+    from mcz.files.editing.metadata_edit import Said
+    from mcz.files.reading.clip import Clip
+    from mcz.files.reading.file import File
 
     Rows = Callable[[File], tuple[dict[str, dict[str, str]], list[str]]]  # by clip; unknown ones
 
@@ -36,7 +36,7 @@ def _to_pairs(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, str]:
     """Callback of ``KEY=VALUE``; the value is text as it stands."""
-    from mcz.editing.metadata_edit import registered_key
+    from mcz.files.editing.metadata_edit import registered_key
 
     pairs = {}
     for value in values:
@@ -131,14 +131,14 @@ def command(
             return _show(held, _chosen(held, clips, where, of_file), as_json)
     rows = None
     if table is not None:
-        from mcz.editing.metadata_table import from_table
+        from mcz.files.editing.metadata_table import from_table
 
         columns = None if take is None else [name.strip() for name in take.split(",")]
         rows = partial(from_table, table, match=match, take=columns, skip_unknown=skip_unknown)
     said = dict.fromkeys(removed) | pairs
     changes, unknown = _changes(file, clips, where, of_file, said, rows)
     if unknown:
-        from mcz.reading.clips import listed
+        from mcz.files.reading.clips import listed
 
         say(f"{table}: no clip for {plural(len(unknown), 'row')}: {listed(unknown)}")
     return _set(file, changes, rate, (clips, where, force), purge, as_json)

@@ -21,8 +21,8 @@ from mcz.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from mcz.motion import Motion
-    from mcz.reading.clip import Clip
+    from mcz.files.reading.clip import Clip
+    from mcz.model.motion import Motion
 
 Function = Callable[..., object]
 
@@ -64,8 +64,8 @@ def moving_of(
     is given the same.
     """
     import mcz
-    from mcz.reading.file import is_mcz
-    from mcz.reading.source_files import SourceOptions
+    from mcz.files.reading.file import is_mcz
+    from mcz.files.reading.source_files import SourceOptions
 
     if path == "-" or is_mcz(path):
         with opened(path, max_decoded=max_decoded) as file, about(path):

@@ -10,7 +10,7 @@ import click
 
 from mcz.cli.common import Exit, Failure, echo, existing, to_frames, to_params, to_rate
 from mcz.cli.suffixes import file_in
-from mcz.types import Settings
+from mcz.model.types import Settings
 
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
 RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
@@ -99,7 +99,7 @@ def threads_option(function: Function) -> Function:
     def command(*args: object, threads: int | None, **options: object) -> object:
         if threads is None:
             return function(*args, **options)
-        from mcz.threads import limited
+        from mcz.model.threads import limited
 
         with limited(threads):
             return function(*args, **options)
@@ -117,8 +117,8 @@ def jobs_option(function: Function) -> Function:
 
     @wraps(function)
     def command(*args: object, jobs: int | None, **options: object) -> object:
-        from mcz import threads
-        from mcz.jobs import limited
+        from mcz.files.jobs import limited
+        from mcz.model import threads
 
         with limited(jobs or threads.processors()):
             return function(*args, **options)
@@ -153,7 +153,7 @@ clips_option = click.option(
 def _to_query(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """Callback of a query: refuse what is none before a file is opened; raises OptionError."""
     if value is not None:
-        from mcz.queries import Query
+        from mcz.files.queries import Query
 
         Query(value)
     return value
@@ -190,7 +190,7 @@ param_option = click.option(
 def _to_unit(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """Callback of a length unit: ``cm``, or one of so many centimeters, ``5.6444cm``."""
     from mcz.errors import OptionError
-    from mcz.units import unit_cm_of
+    from mcz.model.units import unit_cm_of
 
     if value is not None:
         try:
@@ -280,7 +280,7 @@ def force_rate_option(function: Function) -> Function:
 def _to_quality(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
     """Callback of the greatest error, a length or a word of ``PRESETS``, in centimeters."""
     from mcz.errors import OptionError
-    from mcz.units import unit_cm_of
+    from mcz.model.units import unit_cm_of
 
     if value is None or value in PRESETS:
         return None if value is None else PRESETS[value]

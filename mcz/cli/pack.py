@@ -27,7 +27,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
-    from mcz.editing.batch_report import Report
+    from mcz.files.editing.batch_report import Report
 
 
 @click.command(short_help="Pack a folder of motion files into one .mcz.")
@@ -93,9 +93,9 @@ def command(
 def _packing(scheduler: str | None) -> Callable[..., Report]:
     """The ``pack`` function: local, or on a Dask scheduler."""
     if scheduler is None:
-        from mcz.editing.archive import pack
+        from mcz.files.editing.archive import pack
 
         return pack
-    from mcz.dask import pack as pack_there
+    from mcz.files.dask import pack as pack_there
 
     return partial(pack_there, client=scheduler)

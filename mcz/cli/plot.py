@@ -27,7 +27,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.render import to_size
 from mcz.cli.suffixes import file_in
 
-WHAT = ("channels", "spectrum", "error", "bytes", "rate-distortion")  # as in mcz.pictures
+WHAT = ("channels", "spectrum", "error", "bytes", "rate-distortion")  # as in mcz.show.pictures
 MOST_ROWS = 24  # of a table that is printed
 
 
@@ -98,7 +98,7 @@ def command(
     rate-distortion at a few settings of lossy codecs. It needs pip install 'mcz[plot]'.
     """
     import mcz
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.writing.atomic import refuse_inputs
 
     if "-" in (file, other) and output is None:
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)

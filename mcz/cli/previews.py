@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from mcz.cli.common import table
 from mcz.cli.terminal import can_show
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.poses.motion_like import MotionLike
-    from mcz.reading.clip import Clip
+    from mcz.files.reading.clip import Clip
+    from mcz.kinematics.poses.motion_like import MotionLike
 
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"
 EIGHTHS, PLAIN = "▏▎▍▌▋▊▉█", "#"
@@ -24,7 +24,7 @@ MOST_BARS = 8
 
 def preview_of(clip: Clip) -> JsonObject:
     """The keys of a clip's preview; ``motion`` is None where there is none."""
-    from mcz.reading.sizes import byte_shares
+    from mcz.files.reading.sizes import byte_shares
 
     shares = [
         {"signal": s.signal, "joints": s.name, "resolution": s.resolution, "bytes": s.n_bytes}
@@ -35,7 +35,7 @@ def preview_of(clip: Clip) -> JsonObject:
 
 def motion_of(moving: MotionLike) -> JsonObject | None:
     """The speeds of equal parts of the time, and what they are in; None where they are unknown."""
-    from mcz.pictures.energy import motion_energy
+    from mcz.show.pictures.energy import motion_energy
 
     speeds = motion_energy(moving)
     if speeds is None:
@@ -91,7 +91,7 @@ def bar(share: float, blocks: bool | None = None) -> str:
 def bars_of(payload: Sequence[JsonObject]) -> tuple[list[Bar], list[Bar]]:
     """Bars and the rest: the joints that take most, or of one group its
     resolutions."""
-    from mcz.reading.sizes import Share, by_group
+    from mcz.files.reading.sizes import Share, by_group
 
     groups = by_group(
         Share(of["signal"], None, of["joints"], of["resolution"], of["bytes"]) for of in payload

@@ -12,7 +12,7 @@ from mcz.cli.options import json_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mcz.editing.recovering import Recovery
+    from mcz.files.editing.recovering import Recovery
 
 
 def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
@@ -85,7 +85,7 @@ def command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool
 
 
 def _check(file: str, as_json: bool) -> Exit:
-    from mcz.editing.recovering import Recovery, checked
+    from mcz.files.editing.recovering import Recovery, checked
 
     with about(file):
         found = checked(file)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mcz.cli.common import plural, table
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 MOST = 24  # rows of a list; --json has all of them
 

@@ -26,7 +26,7 @@ from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
-VIEWS = ("front", "side", "top", "three-quarter")  # as in mcz.pictures, which takes longer
+VIEWS = ("front", "side", "top", "three-quarter")  # as in mcz.show.pictures, which takes longer
 
 
 def to_size(
@@ -95,7 +95,7 @@ def command(
     length, left and right have colors of their own. It needs pip install 'mcz[render]'.
     """
     import mcz
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.writing.atomic import refuse_inputs
 
     if file == "-" and output is None:
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)

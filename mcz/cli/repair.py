@@ -14,7 +14,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
-    from mcz.editing.repair import Repair
+    from mcz.files.editing.repair import Repair
 
 
 @click.command(short_help="Write the intact parts of a damaged .mcz to a sound one.")

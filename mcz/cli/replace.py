@@ -27,10 +27,10 @@ from mcz.cli.common import (
 from mcz.cli.options import copies_option, force_option, json_option
 from mcz.cli.progress import Progress
 from mcz.cli.suffixes import file_in
-from mcz.text_format import cell_text
+from mcz.model.text_format import cell_text
 
 if TYPE_CHECKING:
-    from mcz.reading.clip import Clip
+    from mcz.files.reading.clip import Clip
 
 
 @click.command(short_help="Replace the values of one joint.")
@@ -82,7 +82,7 @@ def command(
     else. IN.mcz itself is changed by --in-place alone.
     """
     import mcz
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.writing.atomic import refuse_inputs
 
     if in_place == (output is not None):
         raise Failure("name OUT.mcz, or say --in-place to change IN.mcz itself", Exit.USAGE)
@@ -131,7 +131,7 @@ def command(
 
 def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
     """The columns of the joint in a table, NaN where it says invalid; raises Failure."""
-    from mcz.tables.files import channel_names
+    from mcz.files.tables.files import channel_names
 
     is_npz = Path(path).suffix.lower() == ".npz"
     all_names = channel_names(clip.skeleton, clip.signals[0].channels)

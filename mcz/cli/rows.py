@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from mcz.cli.common import literal
 from mcz.errors import OptionError, SourceError
-from mcz.motion import Skeleton
-from mcz.text_format import cell_text
-from mcz.types import JsonObject
+from mcz.model.motion import Skeleton
+from mcz.model.text_format import cell_text
+from mcz.model.types import JsonObject
 
 MOST_LINE = 2**24  # bytes of a line
 SET = b"# set "

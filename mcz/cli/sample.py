@@ -21,7 +21,7 @@ def command(folder: Path, force: bool, as_json: bool) -> Exit:
     --rate 120); the BVH is the same walk in centimeters (--unit cm), the C3D its markers, some of
     them out of sight for a while. The bytes are the same on every machine.
     """
-    from mcz.sample import sample_files
+    from mcz.sources.sample import sample_files
 
     files = sample_files()
     taken = [folder / name for name in files if (folder / name).exists()]

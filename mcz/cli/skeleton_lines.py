@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mcz.cli.common import plural
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 

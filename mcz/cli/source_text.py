@@ -8,7 +8,7 @@ from mcz.cli.common import plural
 from mcz.cli.previews import preview_lines
 from mcz.cli.recording_lines import array_lines, recording_lines
 from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 
 def source_lines(file: str, document: JsonObject) -> Iterator[str]:

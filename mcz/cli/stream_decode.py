@@ -30,14 +30,14 @@ from mcz.cli.hints import OPTION_HINTS
 from mcz.cli.options import rate_option, token_option
 from mcz.cli.rows import NUMBER, STATE
 from mcz.errors import TruncatedError
-from mcz.text_format import spreadsheet_cell
+from mcz.model.text_format import spreadsheet_cell
 
 TIMEOUT = 30.0  # seconds; ``mcz stream encode --listen`` sends a heartbeat every 5
 
 if TYPE_CHECKING:
-    from mcz.live.clip_state import LiveClip
-    from mcz.live.concealment import LiveFrame, Lost
-    from mcz.live.generators import LiveReader
+    from mcz.files.live.clip_state import LiveClip
+    from mcz.files.live.concealment import LiveFrame, Lost
+    from mcz.files.live.generators import LiveReader
 
 
 @click.command(short_help="Decode a live stream to rows of numbers.")
@@ -98,8 +98,8 @@ def command(
         raise Failure("--states has no place in binary rows", Exit.USAGE)
     if rate is not None and not post_filter:
         raise Failure("--rate needs --post-filter", Exit.USAGE)
-    from mcz.live.generators import stream_decode
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.live.generators import stream_decode
+    from mcz.files.writing.atomic import refuse_inputs
 
     if connect is None:
         refuse_inputs(sys.stdout, (sys.stdin if file == "-" else file,))
@@ -183,7 +183,7 @@ def _csv(cells: list[str]) -> bytes:
 
 
 def _print_all(reader: LiveReader, printer: _Text | _Binary) -> None:
-    from mcz.tables.files import channel_names
+    from mcz.files.tables.files import channel_names
 
     output = binary_output() if isinstance(printer, _Binary) else text_output()
     clip: LiveClip | None = None

@@ -32,7 +32,7 @@ from mcz.cli.rows import Rows, skeleton_in
 
 if TYPE_CHECKING:
     from mcz.cli.tcp import Listener
-    from mcz.live.writer import LiveWriter
+    from mcz.files.live.writer import LiveWriter
 
 HEARTBEAT = 5.0  # seconds
 WARN_AFTER = 5.0  # seconds of frames
@@ -108,7 +108,7 @@ def command(
     A bad row or one that is cut off aborts the stream: all frames before it are sent, and no end.
     Standard error says at the end what the stream took, framing included.
     """
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.files.writing.atomic import refuse_inputs
 
     if listen is not None and output is not None:
         raise Failure("-o and --listen exclude each other", Exit.USAGE)
@@ -142,7 +142,7 @@ class _Source:
     """The rows on standard input, and the skeleton that their columns are the channels of."""
 
     def __init__(self, skeleton: str | None, binary: bool) -> None:
-        from mcz.live.generators import markers
+        from mcz.files.live.generators import markers
 
         known = None if skeleton is None else skeleton_in(skeleton)
         n_channels = None if known is None else known.n_channels
@@ -161,8 +161,8 @@ def _writer(
     **live: Any,
 ) -> LiveWriter:
     """The writer of the stream; ``live`` are further arguments of ``LiveWriter``."""
-    from mcz.live.writer import LiveWriter
-    from mcz.units import facing, in_unit
+    from mcz.files.live.writer import LiveWriter
+    from mcz.model.units import facing, in_unit
 
     skeleton = facing(in_unit(source.skeleton, unit), up)
     return LiveWriter(sink, skeleton, frame_rate=rate, **live)

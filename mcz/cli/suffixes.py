@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from mcz.cli.common import Exit, Failure, about
 
 if TYPE_CHECKING:
-    from mcz.reading.clip import Clip
+    from mcz.files.reading.clip import Clip
 
 CONVERSIONS = ("bvh", "amc", "c3d", "trc", "sto", "mot")
-SCENES = ("glb", "usda")  # animated nodes; mcz.conversion.scenes writes them
-NUMBERS = ("csv", "npz")  # tables; mcz.tables.files writes them
+SCENES = ("glb", "usda")  # animated nodes; mcz.exchange.conversion.scenes writes them
+NUMBERS = ("csv", "npz")  # tables; mcz.files.tables.files writes them
 TARGETS = (*NUMBERS, *CONVERSIONS, *SCENES)
 # Suffixes that decode does not write; a file of that name would hold something else.
 OTHERS = {
@@ -56,7 +56,7 @@ def file_in(output: str, source: str, suffix: str = "") -> str:
 
 def target_of(suffix: str) -> str | None:
     """The target whose files have a suffix, None where there is none."""
-    from mcz.reading.file import suffixes_of
+    from mcz.files.reading.file import suffixes_of
 
     return next((name for name in TARGETS if suffix in suffixes_of(name)), None)
 
@@ -93,7 +93,7 @@ def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
 
 def _unknown(output: str, suffix: str, text: str, own: tuple[str, ...]) -> Failure:
     """The refusal of a suffix, with the nearest that would do."""
-    from mcz.text_format import nearest
+    from mcz.model.text_format import nearest
 
     known = list(dict.fromkeys((*filter(None, own), *(f".{name}" for name in TARGETS))))
     near = nearest(suffix, known).replace("'", "")

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, BinaryIO, TextIO
 import click
 
 from mcz.errors import AccessError, OptionError
-from mcz.text_format import ODD
-from mcz.text_format import printable as printable
+from mcz.model.text_format import ODD
+from mcz.model.text_format import printable as printable
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer

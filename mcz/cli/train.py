@@ -22,10 +22,10 @@ from mcz.cli.common import (
 )
 from mcz.cli.options import force_option, json_option, unit_option
 from mcz.cli.progress import Progress
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.motion import Motion
+    from mcz.model.motion import Motion
 
 AXES = "xyz"
 
@@ -110,8 +110,8 @@ def command(
     each frame stay, then comes the basis nearest to what has stayed. OUT holds the bases in
     integers, as SPEC.md, "Bases", has them.
     """
-    from mcz.training import Recipe, train
-    from mcz.writing.atomic import refuse_inputs
+    from mcz.codecs.training import Recipe, train
+    from mcz.files.writing.atomic import refuse_inputs
 
     refuse_inputs(output, clips)
     check_new(output, force)

@@ -32,10 +32,10 @@ from mcz.cli.options import (
 from mcz.cli.progress import Progress
 from mcz.cli.verify_report import VerifyReport
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.reading.file import File
+    from mcz.files.reading.file import File
 
 
 @click.command(short_help="Prove that sources come back identical.")
@@ -129,7 +129,7 @@ def _bag(
     as_json: bool,
 ) -> Exit:
     """Check a bag, and each archive in it."""
-    from mcz.bags import check_bag, is_bag
+    from mcz.files.bags import check_bag, is_bag
 
     if not is_bag(folder):
         raise Failure("a folder and no bag: it has no bagit.txt", path=folder, kind="AccessError")
@@ -195,7 +195,7 @@ def _verify_fully(
 
 def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[JsonObject], str]:
     """One row, that of the checksums; and what was seen."""
-    from mcz.reading.faults import quick_check
+    from mcz.files.reading.faults import quick_check
 
     target = given(file)
     with about(file), Progress() as progress:
@@ -224,7 +224,7 @@ def is_unsound(error: MczError) -> bool:
 
 
 def _parts(held: File, where: str | None, progress: Progress) -> Iterator[JsonObject]:
-    from mcz.reading.faults import part_problems, structure_problems
+    from mcz.files.reading.faults import part_problems, structure_problems
 
     clips = None if where is None else held.chosen(where=where)
     total = 1 + len(held.clips if clips is None else clips) + len(held.attachments)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from mcz.cli.common import Exit, Failure, about, check_new, given, write_output
 from mcz.cli.terminal import json_text
-from mcz.types import JsonObject
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
-    from mcz.bags import BagCheck
-    from mcz.reading.file import File
+    from mcz.files.bags import BagCheck
+    from mcz.files.reading.file import File
 
 SUFFIXES = (".txt", ".json")
 NONE = "none"  # as a date
@@ -22,7 +22,7 @@ class VerifyReport:
     """A report at ``path``, which must be new unless ``force``; raises Failure at once."""
 
     def __init__(self, path: str, date: str | None, force: bool, inputs: Sequence[str]) -> None:
-        from mcz.writing.atomic import refuse_inputs
+        from mcz.files.writing.atomic import refuse_inputs
 
         self.path, self.force = Path(path), force
         if self.path.suffix.lower() not in SUFFIXES:
@@ -35,14 +35,14 @@ class VerifyReport:
 
     def take(self, held: File) -> None:
         """Keep what the report says of an open file."""
-        from mcz.reading.verification import bytes_facts, contents
+        from mcz.files.reading.verification import bytes_facts, contents
 
         self._facts = {**bytes_facts(held.container.source), **contents(held)}
 
     def take_bytes(self, file: str) -> None:
         """Keep what can be said of a file that cannot be opened."""
-        from mcz.reading.file import open_bytes
-        from mcz.reading.verification import bytes_facts
+        from mcz.files.reading.file import open_bytes
+        from mcz.files.reading.verification import bytes_facts
 
         with about(file):
             source = open_bytes(given(file))
@@ -52,16 +52,16 @@ class VerifyReport:
                 source.close()
 
     def document(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> JsonObject:
-        """The report, see ``mcz.reading.verification.report``."""
+        """The report, see ``mcz.files.reading.verification.report``."""
         from mcz import __version__
-        from mcz.reading.verification import report
+        from mcz.files.reading.verification import report
 
         tool = f"mcz {__version__}"
         return report(self._facts, rows, tool=tool, date=self.date, quick=quick, chosen=where)
 
     def write(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> None:
         """Write the report of ``rows``, one for each part."""
-        from mcz.reading.verification import text_lines
+        from mcz.files.reading.verification import text_lines
 
         document = self.document(rows, quick=quick, where=where)
         self._write(document, text_lines(document))
@@ -78,7 +78,7 @@ class VerifyReport:
         ``files``: a row for each archive, unreadable ones included.
         """
         from mcz import __version__
-        from mcz.reading.verification import bag_lines, text_lines
+        from mcz.files.reading.verification import bag_lines, text_lines
 
         unread = [
             f"{row['file']}: {problem}"

@@ -40,11 +40,11 @@ from mcz.cli.options import (
 from mcz.cli.suffixes import file_in
 from mcz.cli.terminal import say_json
 from mcz.cli.view_rerun import is_rerun, show_in_rerun
-from mcz.types import Settings
+from mcz.model.types import Settings
 
 if TYPE_CHECKING:
-    from mcz.viewing.embedding import PageWritten
-    from mcz.viewing.file_registry import Shelf
+    from mcz.show.viewing.embedding import PageWritten
+    from mcz.show.viewing.file_registry import Shelf
 
 SAID = ("skeleton", "rate", "unit", "up", "arrays", "model")  # what a file may not say itself
 OF_PAGE = ("clips", "where", "codec", "effort", "params", "max_decoded", "most", "force")
@@ -130,7 +130,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
         output = file_in(output, files[0], ".rrd" if options["rerun"] else ".html")
     in_rerun = is_rerun(options.pop("rerun"), output)
     _check_use(output, options, in_rerun)
-    from mcz.viewing.file_registry import Shelf, put
+    from mcz.show.viewing.file_registry import Shelf, put
 
     def told(line: str) -> None:
         if as_json:
@@ -175,9 +175,9 @@ def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
 
 
 def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str, port: int) -> Exit:
-    from mcz.viewing.browser import show
-    from mcz.viewing.server import Server
-    from mcz.viewing.small_page import viewer_page
+    from mcz.show.viewing.browser import show
+    from mcz.show.viewing.server import Server
+    from mcz.show.viewing.small_page import viewer_page
 
     with Server(viewer_page(shelf), shelf, host=host, port=port) as server:
         if as_json:
@@ -196,8 +196,8 @@ def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str,
 def _write(shelf: Shelf, output: str, as_json: bool, options: Settings) -> Exit:
     from pathlib import Path
 
-    from mcz.viewing.embedding import MOST_BYTES, Wanted, write_page
-    from mcz.viewing.page import page
+    from mcz.show.viewing.embedding import MOST_BYTES, Wanted, write_page
+    from mcz.show.viewing.page import page
 
     force, most = options.pop("force"), options.pop("most") or MOST_BYTES
     if "://" not in output:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from mcz.cli.common import Exit, Failure, about, check_new, echo, plural, print_json
 from mcz.cli.hints import OPTION_HINTS
-from mcz.extras import import_extra
-from mcz.types import JsonObject, Settings
+from mcz.model.extras import import_extra
+from mcz.model.types import JsonObject, Settings
 
 if TYPE_CHECKING:
-    from mcz.motion import Motion
-    from mcz.reading.clip import Clip
-    from mcz.viewing.file_registry import Shelf
+    from mcz.files.reading.clip import Clip
+    from mcz.model.motion import Motion
+    from mcz.show.viewing.file_registry import Shelf
 
 SUFFIX = ".rrd"
 FACTS = ("rate", "unit", "up")
@@ -62,7 +62,7 @@ def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: Sett
 def _recording() -> Any:
     import uuid
 
-    from mcz.adapters.rerun import APPLICATION
+    from mcz.show.rerun import APPLICATION
 
     rerun = import_extra("rerun", "rerun")
     return rerun.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
@@ -78,7 +78,7 @@ def _check_screen() -> None:
 
 def _write(shelf: Shelf, output: str, options: Settings) -> tuple[list[JsonObject], int]:
     """Log to a file, which appears when it is whole."""
-    from mcz.writing.atomic import replacing
+    from mcz.files.writing.atomic import replacing
 
     check_new(Path(output), options["force"])
     inputs = [file.source for _, file in shelf.given()]
@@ -100,8 +100,8 @@ def _write(shelf: Shelf, output: str, options: Settings) -> tuple[list[JsonObjec
 
 def _log(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[JsonObject], int]:
     """Log the clips; return their rows and the number of failures."""
-    from mcz.adapters.rerun import to_rerun, view_of
     from mcz.errors import MczError
+    from mcz.show.rerun import to_rerun, view_of
 
     rows: list[JsonObject] = []
     views: list[Any] = []
@@ -130,7 +130,7 @@ def _log(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[JsonObje
 
 
 def _clips(shelf: Shelf, options: Settings) -> Iterator[tuple[str, Clip]]:
-    from mcz.reading.file import open
+    from mcz.files.reading.file import open
 
     for _, given in shelf.given():
         with (
@@ -150,6 +150,6 @@ def _told(clip: Clip, options: Settings) -> Clip | Motion:
     said = [options[fact] for fact in FACTS]
     if not any(there and fact is not None for there, fact in zip(unknown, said, strict=True)):
         return clip
-    from mcz.reading.source_files import SourceOptions
+    from mcz.files.reading.source_files import SourceOptions
 
     return SourceOptions(**{fact: options[fact] for fact in FACTS}).completing(clip.motion())

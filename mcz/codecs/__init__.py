@@ -1,4 +1,11 @@
-"""The codec table: one row a codec, SPEC.md's registry."""
+"""The codec table: one row a codec, SPEC.md's registry.
+
+A codec is a module with a ``CODEC`` (``contract``); a family of them is a folder. ``coding`` has
+entropy coders, ``transforms`` wavelets and bases, ``training`` fits bases to clips. Families never
+import each other, the container or sources.
+
+Imports ``mcz.model`` and ``mcz.kinematics``.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +16,7 @@ from typing import NamedTuple
 
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError, UnsupportedError
-from mcz.text_format import among
+from mcz.model.text_format import among
 
 
 class CodecEntry(NamedTuple):

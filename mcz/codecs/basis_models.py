@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.annexes import annex_bytes, annex_names
+from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import code, uncode
 from mcz.codecs.contract import Layout, Model, model_id
-from mcz.coding.start_states import start_states
-from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError, MotionError, UnsupportedError
-from mcz.schema import read_varint, varint
+from mcz.model.annexes import annex_bytes, annex_names
+from mcz.model.schema import read_varint, varint
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

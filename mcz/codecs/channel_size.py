@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.fast.encoder import StreamBuilder
-from mcz.numbers import Grid
+from mcz.codecs.coding.fast.encoder import StreamBuilder
+from mcz.model.numbers import Grid
 
 BLOCK_ROWS = 1024
 

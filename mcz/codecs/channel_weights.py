@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mcz.errors import MczError
 from mcz.kinematics import depths, reach
 from mcz.kinematics.sensitivity import sensitivities
-from mcz.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, Skeleton
+from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 

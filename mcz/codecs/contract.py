@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from mcz.codecs.parameters import TARGETS, Dial, Parameter
 from mcz.errors import FormatError, OptionError
-from mcz.motion import Skeleton
-from mcz.numbers import Grid
-from mcz.schema import varint
-from mcz.types import Params, Settings, Values
+from mcz.model.motion import Skeleton
+from mcz.model.numbers import Grid
+from mcz.model.schema import varint
+from mcz.model.types import Params, Settings, Values
 
 Domain = Literal["ordinals", "values"]
 Grouping = Literal["all", "joint", "channel"]

@@ -7,10 +7,10 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.angles import Unwrapper
 from mcz.codecs.contract import Layout, SignalSource
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import MotionError
+from mcz.kinematics.angles import Unwrapper
 
 Floats = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from mcz.codecs import CODECS
 from mcz.codecs.contract import Codec, Layout, Model, Request, Span, model_finder
 from mcz.codecs.known_answer_table import ANSWERS, KnownAnswer
 from mcz.errors import UnsupportedError
-from mcz.motion import Channel, Joint, Skeleton
-from mcz.numbers import Grid, GridKind
+from mcz.model.motion import Channel, Joint, Skeleton
+from mcz.model.numbers import Grid, GridKind
 
 N_FRAMES = 16
 _proved: set[str] = set()

@@ -6,7 +6,7 @@ import re
 
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import TARGETS, Parameter
-from mcz.types import Settings
+from mcz.model.types import Settings
 
 DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the clip decides
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.arguments import choice as choice
-from mcz.arguments import in_range as in_range
-from mcz.arguments import integer as integer
-from mcz.arguments import number as number
-from mcz.types import Params, Settings
+from mcz.model.arguments import choice as choice
+from mcz.model.arguments import in_range as in_range
+from mcz.model.arguments import integer as integer
+from mcz.model.arguments import number as number
+from mcz.model.types import Params, Settings
 
 MAX_DECIMALS = 15
 SCALED = 255  # in place of decimals: there are steps

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.streams import halves_of
+from mcz.codecs.coding.streams import halves_of
 
 MAX_SCALE = 62  # in half octaves
 

@@ -27,7 +27,7 @@ from mcz.codecs.contract import (
 from mcz.codecs.parameters import Parameter, integer
 from mcz.codecs.segments import Sizing, gather, segments_by_guess
 from mcz.errors import FormatError
-from mcz.types import Params
+from mcz.model.types import Params
 
 MAX_ROWS = 2**20
 SIZING = Sizing(target=58_000, most=62_000, value_bytes=4, most_rows=MAX_ROWS)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.parameters import Parameter, integer
 from mcz.errors import MotionError
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.angles import Unwrapper
 from mcz.codecs.basis_models import (
     MAX_POINTS,
     Basis,
@@ -41,14 +40,15 @@ from mcz.codecs.space import (
     columns_of,
 )
 from mcz.codecs.step_codes import code_of, ratio_of
+from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import (
     AccessError,
     MotionError,
     OptionError,
     reason_of,
 )
-from mcz.motion import POSITION_KINDS, Skeleton
-from mcz.transforms.dct import dct_matrix
+from mcz.kinematics.angles import Unwrapper
+from mcz.model.motion import POSITION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 
@@ -276,7 +276,7 @@ class _SampleKey:
 
 @lru_cache(maxsize=4)
 def _learn_cached(_digest: bytes, held: _SampleKey, apart: bool) -> Model:
-    from mcz.transforms.lsdt import learn_basis
+    from mcz.codecs.transforms.lsdt import learn_basis
 
     bases: list[Basis | Floats] = []
     for columns in columns_of(held.steps.shape[1], apart=apart):

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import SignalSource
-from mcz.motion import Joint, Skeleton
-from mcz.numbers import Grid
+from mcz.model.motion import Joint, Skeleton
+from mcz.model.numbers import Grid
 
 Item = TypeVar("Item", bound=np.generic)
 Read = Callable[[int, int], NDArray[Item]]  # frames first <= f < stop

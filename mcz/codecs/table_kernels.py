@@ -5,8 +5,8 @@ SPEC.md, "Numbers in a row" and "Bases", are normative. Imported on first use on
 
 from __future__ import annotations
 
-from mcz.coding import residuals
-from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
+from mcz.codecs.coding import residuals
+from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Ints, Ints2
 

@@ -13,7 +13,7 @@ from mcz.container.chunks import Chunk
 from mcz.container.dictionary_deflate import decoded
 from mcz.container.directory import AttachmentRow
 from mcz.errors import ChecksumError, FormatError
-from mcz.schema import parse
+from mcz.model.schema import parse
 
 
 def joined_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> bytes:

@@ -31,7 +31,7 @@ from mcz.container.scan import scan
 from mcz.container.source import ByteSource, Overlay
 from mcz.container.writer import build_head
 from mcz.errors import FormatError, MczError
-from mcz.schema import build
+from mcz.model.schema import build
 
 MOST_READ = 4  # times the bytes of a file, in search of a bit
 

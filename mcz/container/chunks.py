@@ -12,7 +12,7 @@ from enum import Enum, IntFlag
 
 from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
-from mcz.schema import MAX_COUNT
+from mcz.model.schema import MAX_COUNT
 
 SIGNATURE = b"\x89MCZ\r\n\x1a\n"
 END_MAGIC = b"\x89ZCM\r\n\x1a\n"

@@ -18,7 +18,7 @@ from mcz.container.limits import check
 from mcz.container.parser_drivers import chunks
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
-from mcz.schema import build, deflate, parse, parse_all
+from mcz.model.schema import build, deflate, parse, parse_all
 
 MOST_BYTES = 64 * 1024  # of the copies in one COPY, decoded, so that a bad byte costs no more
 SMALL_PART = 64  # a model is copied where the file has this many times its bytes

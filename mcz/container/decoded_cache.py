@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.types import Values
+from mcz.model.types import Values
 
 MOST_BYTES = 8 * 2**20  # of a file
 MOST_OF_ONE = MOST_BYTES // 2

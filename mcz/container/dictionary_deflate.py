@@ -11,22 +11,12 @@ from functools import cache
 
 from construct import GreedyBytes, If, Int8ul, this
 
-from mcz.annexes import annex_bytes
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.limits import LARGE, Profile, check, check_decoded
 from mcz.errors import FormatError
-from mcz.schema import (
-    EXTENDED,
-    TEXT,
-    UVARINT,
-    Record,
-    build,
-    deflate,
-    field,
-    inflate,
-    parse,
-)
+from mcz.model.annexes import annex_bytes
+from mcz.model.schema import EXTENDED, TEXT, UVARINT, Record, build, deflate, field, inflate, parse
 
 PACKED = 2  # bit 1 of the flags of SKEL
 

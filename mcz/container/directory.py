@@ -19,7 +19,7 @@ from mcz.container.index_records import PreviousIndex
 from mcz.container.limits import PROFILES, Profile
 from mcz.container.segments import SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
-from mcz.schema import MAX_COUNT, parse
+from mcz.model.schema import MAX_COUNT, parse
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from mcz.container.index_records import (
 from mcz.container.packets import FRAME, SEGMENT
 from mcz.container.segments import FRESH, KNOWN_FLAGS
 from mcz.errors import FormatError
-from mcz.schema import Table, build, deflate
+from mcz.model.schema import Table, build, deflate
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
 PACKETS = {SEGMENT: 64, FRAME: 32}

@@ -47,8 +47,8 @@ from mcz.container.limits import check
 from mcz.container.packets import FRAME
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError
-from mcz.schema import MAX_COUNT, Table, build, inflate, parse
-from mcz.schema.columns import Numbers
+from mcz.model.schema import MAX_COUNT, Table, build, inflate, parse
+from mcz.model.schema.columns import Numbers
 
 MOST_INDEXES = 8  # that continue each other
 

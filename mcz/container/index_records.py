@@ -5,7 +5,7 @@ from __future__ import annotations
 from construct import GreedyBytes, If, Int8ul, Int32ul, this
 
 from mcz.container.payloads import ID, OF_ATTACHMENT, OF_CLIP, OF_SKELETON
-from mcz.schema import (
+from mcz.model.schema import (
     EXTENSION,
     POSITIVE,
     SIZED,
@@ -20,7 +20,7 @@ from mcz.schema import (
     flags,
     one_of,
 )
-from mcz.schema.types import as_construct
+from mcz.model.schema.types import as_construct
 
 CONTINUES = 1
 

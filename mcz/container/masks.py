@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
-from mcz.schema import read_varint, varint
+from mcz.model.schema import read_varint, varint
 
 Mask = NDArray[np.bool_]
 

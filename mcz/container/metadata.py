@@ -16,7 +16,7 @@ from mcz.container.directory import ClipRow
 from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.container.metadata_keys import INTERPRETED
 from mcz.errors import FormatError
-from mcz.schema import build, parse, parse_all, parse_until
+from mcz.model.schema import build, parse, parse_all, parse_until
 
 MOST_KEPT = 16 * MIB  # bytes, about: 40,000 clips of three keys
 PAIR = 100  # bytes that Python takes for a pair, beside its letters

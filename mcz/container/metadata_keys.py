@@ -10,7 +10,7 @@ from collections.abc import Callable
 from datetime import date, datetime
 
 from mcz.errors import OptionError
-from mcz.text_format import nearest
+from mcz.model.text_format import nearest
 
 PRIVATE = "x-"
 SPDX = re.compile(r"\(*[A-Za-z0-9.+:-]+\)*( (AND|OR|WITH) \(*[A-Za-z0-9.+:-]+\)*)*")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mcz.numbers import GRID, Grid
-from mcz.schema import SIZED, UVARINT, Record, counted, field
+from mcz.model.numbers import GRID, Grid
+from mcz.model.schema import SIZED, UVARINT, Record, counted, field
 
 
 class GridChange(Record):

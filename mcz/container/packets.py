@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from mcz.container.limits import check
 from mcz.errors import FormatError, TruncatedError
-from mcz.schema import read_varint, varint
+from mcz.model.schema import read_varint, varint
 
 END, SEGMENT, FRAME = 0, 1, 2  # kinds, bits 0 to 3 of the first byte
 KIND, FRESH = 0x0F, 0x80  # bits of the first byte: its kind, and that it needs none before it

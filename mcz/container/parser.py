@@ -59,7 +59,7 @@ from mcz.container.packets import FRESH as FRESH_PACKET
 from mcz.container.segments import FRESH, MASKS, mask_of
 from mcz.container.segments import parse_header as parse_segment
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
-from mcz.schema import MAX_COUNT
+from mcz.model.schema import MAX_COUNT
 
 BLOCK = 2 * 1024 * 1024  # a chunk that is longer, and not wanted, is checked in parts
 ALL = MAX_COUNT  # of a payload, which is checked then

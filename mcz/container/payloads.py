@@ -13,8 +13,8 @@ from itertools import groupby
 from construct import GreedyBytes, If, Int8ul, this
 
 from mcz.container.versions import FORMAT, NEEDS_MINOR
-from mcz.numbers import GRID, Grid
-from mcz.schema import (
+from mcz.model.numbers import GRID, Grid
+from mcz.model.schema import (
     EXTENDED,
     EXTENSION,
     FINITE,

@@ -56,9 +56,9 @@ from mcz.container.segments import (
 from mcz.container.skeletons import read_skeleton
 from mcz.container.source import ByteSource, Overlay
 from mcz.errors import ChecksumError, FormatError, TruncatedError
-from mcz.motion import Skeleton
-from mcz.schema import parse, parse_until
-from mcz.types import Settings
+from mcz.model.motion import Skeleton
+from mcz.model.schema import parse, parse_until
+from mcz.model.types import Settings
 
 _said = attrgetter(
     "name", "skeleton", "n_frames", "rate_numerator", "rate_denominator", "signals"

@@ -28,7 +28,7 @@ from mcz.container.parser import ALL, PASS, Parser
 from mcz.container.segments import GROUP_NOTES, parse_header
 from mcz.container.small_profile import check_plain
 from mcz.errors import FormatError, LimitError
-from mcz.schema import parse
+from mcz.model.schema import parse
 
 PEEK = 64  # enough for the fields of a segment before its table
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from mcz.errors import ChecksumError, FormatError, TruncatedError
-from mcz.schema import EXTENDED, MAX_COUNT, read_varint, varint
+from mcz.model.schema import EXTENDED, MAX_COUNT, read_varint, varint
 
 FRESH, FRAME_NOTES, GROUP_NOTES, MASKS = 1, 2, 4, 8
 KNOWN_FLAGS = 15 | EXTENDED

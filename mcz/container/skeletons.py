@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from mcz.container import payloads
 from mcz.container.limits import Profile, check
 from mcz.errors import FormatError, MotionError
-from mcz.motion import CHANNEL_KINDS, ORIGIN, Channel, Joint, Skeleton
-from mcz.schema import build, parse
-from mcz.skeleton import AXES, HANDS
+from mcz.model.motion import CHANNEL_KINDS, ORIGIN, Channel, Joint, Skeleton
+from mcz.model.schema import build, parse
+from mcz.model.skeleton import AXES, HANDS
 
 ANGLE_UNITS = ("", "deg", "rad")
 MOST_KNOWN, MOST_BYTES = 64, 1 << 16  # skeletons that are kept, and how long a payload may be

@@ -9,8 +9,8 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.dictionary_deflate import is_packed
 from mcz.errors import LimitError
-from mcz.numbers import GridKind
-from mcz.schema import Record, parse
+from mcz.model.numbers import GridKind
+from mcz.model.schema import Record, parse
 
 CODECS = {0, 1}  # raw and fast
 ENCODED: dict[bytes, type[Record]] = {

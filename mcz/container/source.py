@@ -18,8 +18,8 @@ from mcz.errors import (
     TruncatedError,
     reason_of,
 )
-from mcz.extras import import_extra
-from mcz.types import Target
+from mcz.model.extras import import_extra
+from mcz.model.types import Target
 
 
 class ByteSource:

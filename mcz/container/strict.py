@@ -17,7 +17,7 @@ from mcz.container.limits import Profile
 from mcz.container.metadata import parse_meta
 from mcz.container.skeletons import parse_skeleton
 from mcz.errors import FormatError
-from mcz.schema import parse
+from mcz.model.schema import parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 # The source formats of the registry, by what they are sources of.

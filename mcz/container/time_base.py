@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clock import MAX_NUMBER
 from mcz.container import payloads
 from mcz.errors import FormatError, OptionError
+from mcz.model.clock import MAX_NUMBER
 
 Ints = NDArray[np.int64]
 

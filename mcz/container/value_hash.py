@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.types import Values
+from mcz.model.types import Values
 
 ROWS = 4096  # at a time, so that hashing needs little memory
 PIECE = 2**20  # bytes of a mask that are made at a time

@@ -9,7 +9,7 @@ from construct import Container, Int8ul
 
 from mcz.errors import UnsupportedError
 from mcz.hints import Hint
-from mcz.schema import CheckedBeside
+from mcz.model.schema import CheckedBeside
 
 FORMAT = 0, 99  # the draft of 1.0, which reads itself alone
 FORMAT_NAME = f"{FORMAT[0]}.{FORMAT[1]}"

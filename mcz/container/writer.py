@@ -45,9 +45,9 @@ from mcz.container.packets import (
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
 from mcz.container.small_profile import check_plain
 from mcz.errors import FormatError, MotionError
-from mcz.motion import Skeleton
-from mcz.schema import build
-from mcz.types import Params
+from mcz.model.motion import Skeleton
+from mcz.model.schema import build
+from mcz.model.types import Params
 
 ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
 

@@ -2,7 +2,10 @@
 
 SPEC.md, "Kinematics", has the conventions and the point sets. Distances are in the length unit of
 the skeleton. Everything is vectorized over frames and works in blocks of them. What fewer need is
-imported from its own module: ``inverse``, ``sensitivity``, ``single``.
+imported from its own module: ``inverse``, ``sensitivity``, ``single``. ``metrics`` compares two
+motions, ``poses`` resamples and differentiates, ``retargeting`` moves motions between skeletons.
+
+Imports ``mcz.model``.
 """
 
 from __future__ import annotations

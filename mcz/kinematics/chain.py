@@ -22,7 +22,7 @@ from mcz.kinematics.rotation_vectors import (
     matrices_of_vectors,
     spins_of_vectors,
 )
-from mcz.motion import (
+from mcz.model.motion import (
     ANGLE_KINDS,
     POSITION_KINDS,
     QUATERNION_KINDS,
@@ -31,7 +31,7 @@ from mcz.motion import (
     Joint,
     Skeleton,
 )
-from mcz.skeleton import first_columns
+from mcz.model.skeleton import first_columns
 
 Floats = NDArray[np.float64]
 

@@ -18,9 +18,9 @@ from mcz.hints import Hint
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import first_points, positions_of
-from mcz.motion import Motion, Skeleton
-from mcz.skeleton import column_of, signs_of
-from mcz.text_format import brief, counted
+from mcz.model.motion import Motion, Skeleton
+from mcz.model.skeleton import column_of, signs_of
+from mcz.model.text_format import brief, counted
 
 Flags = NDArray[np.bool_]
 

@@ -27,7 +27,7 @@ from mcz.kinematics.points import (
     points_of,
     positions_of,
 )
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 
 class FramePoses:

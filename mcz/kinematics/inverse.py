@@ -23,7 +23,7 @@ from mcz.kinematics.initial_pose import InitialPose
 from mcz.kinematics.rotation_fit import center_angles, smallest_angles
 from mcz.kinematics.rotation_vectors import continuous
 from mcz.kinematics.targets import Targets
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 Ints = NDArray[np.int64]
 

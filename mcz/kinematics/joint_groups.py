@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from mcz.errors import OptionError
-from mcz.motion import Skeleton
-from mcz.text_format import among
+from mcz.model.motion import Skeleton
+from mcz.model.text_format import among
 
 GROUPS = {
     "hands": r"hand|wrist|finger|thumb|index|middle|ring|pinky",

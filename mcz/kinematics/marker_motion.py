@@ -1,7 +1,7 @@
 """Positions as a domain: a motion as the positions of its points, markers that name their skeleton.
 
 SPEC.md, "Kinematics", has the points, and "Positions" there what a clip of them says. The way back
-is in ``mcz/conversion/marker_fit.py``.
+is in ``mcz/exchange/conversion/marker_fit.py``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.kinematics.points import point_names, point_set, points_and_markers_of, positions_of
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 
 Floats = NDArray[np.float64]
 

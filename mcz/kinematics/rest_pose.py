@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.kinematics.joint_groups import find_feet
-from mcz.motion import POSITION_KINDS, Skeleton
+from mcz.model.motion import POSITION_KINDS, Skeleton
 
 NO_LENGTHS = "no bone has a length"
 PEOPLE_CM = 80.0, 260.0  # from a small child to a tall person with arms stretched out

@@ -14,7 +14,7 @@ import numpy as np
 from mcz.errors import OptionError
 from mcz.kinematics.chain import Chain, Floats, Link, Pose, to_world
 from mcz.kinematics.points import point_position, points_of
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 
 def sensitivities(skeleton: Skeleton, values: Floats, max_frames: int | None = None) -> Floats:

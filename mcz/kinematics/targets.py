@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mcz.kinematics.chain import Chain, Floats, Link, Pose, to_world
 from mcz.kinematics.points import marker_distance, point_position, points_of, reach
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 TYPICAL_LEVER = 0.125  # of the reach: to turn by one radian counts as to move by so much
 

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 import mcz
 from mcz.kinematics import origins_of, positions_of
 from mcz.kinematics.points import listed_points
-from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.blender.clips import stretching_arm
 from tests.skeletons import skeletons, values_for
 from tools.blender import build

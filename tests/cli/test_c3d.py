@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.formats import c3d
+from mcz.sources.c3d import c3d
 from tests.commands import Call
 from tests.formats.c3d_files import INTEL, made, real
 from tests.formats.test_c3d_outputs import listed

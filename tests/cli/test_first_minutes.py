@@ -9,7 +9,7 @@ import pytest
 
 import mcz
 from mcz.codecs.posewave.choices import PRESETS
-from mcz.formats import FORMATS
+from mcz.sources import FORMATS
 from tests.commands import Call
 
 SUFFIXES = sorted({suffix for found in FORMATS.values() for suffix in found.suffixes} | {".mcz"})

@@ -21,7 +21,7 @@ from mcz import AccessError, ExistsError, Signal
 from mcz.cli.common import Exit, code_of
 from mcz.codecs import codec_by_name
 from mcz.container.writer import Writer
-from mcz.writing.clip_writer import write_clip
+from mcz.files.writing.clip_writer import write_clip
 from tests.commands import ENV, Call, run
 from tests.motions import smooth
 
@@ -105,7 +105,7 @@ def test_sigterm_leaves_nothing_behind(tmp_path: Path) -> None:
     program = (
         "import sys, time, click\n"
         "from mcz.cli.common import run\n"
-        "from mcz.writing.atomic import replacing\n"
+        "from mcz.files.writing.atomic import replacing\n"
         "@click.command()\n"
         "def command():\n"
         "    with replacing('out.mcz', force=False) as stream:\n"
@@ -266,7 +266,7 @@ def test_csv_of_a_motion_with_channels_of_its_own(folder: Path, call: Call) -> N
 
 
 def test_csv_of_no_clip(folder: Path, call: Call) -> None:
-    from mcz.sample import write_samples
+    from mcz.sources.sample import write_samples
 
     write_samples(folder)
     mcz.encode(folder / "walk.asf", folder / "walk.mcz")

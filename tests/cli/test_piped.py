@@ -13,10 +13,10 @@ import pytest
 
 import mcz
 from mcz import live_frames
-from mcz.formats import FORMATS
-from mcz.live.strict_reader import StrictFrames
-from mcz.reading.source_files import SourceOptions
-from mcz.writing.source_encoder import EncodingOptions
+from mcz.files.live.strict_reader import StrictFrames
+from mcz.files.reading.source_files import SourceOptions
+from mcz.files.writing.source_encoder import EncodingOptions
+from mcz.sources import FORMATS
 from tests.commands import ENV, ROOT, Started
 from tests.live_codec import encode_live
 

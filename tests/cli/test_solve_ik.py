@@ -15,11 +15,11 @@ from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skelet
 from mcz.codecs import codec_by_name
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
+from mcz.files.writing.clip_writer import write_plan
+from mcz.files.writing.planning import Prepared, StoredSkeleton, plan_clip
 from mcz.kinematics import point_names, points_and_markers_of
 from mcz.kinematics.marker_motion import NOTE, in_positions
-from mcz.sample import bvh_walk, marker_walk
-from mcz.writing.clip_writer import write_plan
-from mcz.writing.planning import Prepared, StoredSkeleton, plan_clip
+from mcz.sources.sample import bvh_walk, marker_walk
 from tests.commands import Call
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import mcz
-from mcz.formats import FORMATS
+from mcz.sources import FORMATS
 from tests.commands import Call
 
 SOURCES = Path(__file__).parents[2] / "conformance" / "vectors" / "valid" / "sources"

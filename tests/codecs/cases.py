@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.angles import unwrap
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec
+from mcz.kinematics.angles import unwrap
 from tests.codecs.lossy import Direct, markers, wandering
 from tests.motions import smooth
 

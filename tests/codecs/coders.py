@@ -11,13 +11,13 @@ import numpy as np
 from hypothesis import strategies as st
 
 from mcz.codecs import codec_by_name
+from mcz.codecs.coding.fast import decoder
+from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
+from mcz.codecs.coding.forms import products
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless.best_streams import AS_FAST, code_plan
 from mcz.codecs.lossless.references import choose_references
-from mcz.coding.fast import decoder
-from mcz.coding.fast.encoder import Plan, StreamBuilder
-from mcz.coding.forms import products
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
 
 GRIDS = (
     Grid(GridKind.FIXED, 4),

@@ -14,10 +14,10 @@ import numpy as np
 import mcz
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
-from mcz.reading.sizes import clip_sizes
-from mcz.writing.signal_source import MemorySource
+from mcz.files.reading.sizes import clip_sizes
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
 from tests.motions import smooth
 
 Array = np.ndarray

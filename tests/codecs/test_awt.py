@@ -13,8 +13,8 @@ from mcz.codecs.contract import SignalSource
 from mcz.codecs.wavelet import awt_choices as choice
 from mcz.codecs.wavelet.awt import CODEC
 from mcz.codecs.wavelet.wavelet import transform_of
-from mcz.motion import Motion
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import Motion
 from tests.codecs.lossy import saved, wandering
 from tests.motions import smooth
 

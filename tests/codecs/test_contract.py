@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import CODECS, codec_by_name
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
+from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
 from tests import overlap_codec
 from tests.codecs.cases import CASES, Case, meant, saved, small, written
 from tests.codecs.lossy import Direct, bones, bytes_of, clip_of, gapped, markers, wandering

@@ -16,8 +16,8 @@ import mcz
 from mcz.codecs import CODECS, codec_by_name
 from mcz.codecs.contract import Layout, LiveDecoder, LiveEncoder, Request, Span, model_finder
 from mcz.errors import LostFrameError
-from mcz.motion import Motion
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import Motion
 from tests.codecs.lossy import Array, Direct, clip_of, gapped, markers
 from tests.repair import flipped
 

@@ -10,15 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.coding.fast.decoder import Shape, read_alone
-from mcz.coding.fast.encoder import StreamBuilder
-from mcz.coding.forms.count_search import VANISHING, find_counts
-from mcz.coding.forms.counts import Law
-from mcz.coding.forms.ids import BINARY32, COUNTS, MULTIPLES
-from mcz.coding.forms.rounding import bounds
-from mcz.coding.forms.units import find_units
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
+from mcz.codecs.coding.fast.decoder import Shape, read_alone
+from mcz.codecs.coding.fast.encoder import StreamBuilder
+from mcz.codecs.coding.forms.count_search import VANISHING, find_counts
+from mcz.codecs.coding.forms.counts import Law
+from mcz.codecs.coding.forms.ids import BINARY32, COUNTS, MULTIPLES
+from mcz.codecs.coding.forms.rounding import bounds
+from mcz.codecs.coding.forms.units import find_units
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
 from tests.codecs.lossy import saved
 from tests.commands import run
 

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.coding.forms.counts import Law
-from mcz.coding.forms.multiples import of_multiples
-from mcz.coding.forms.products import DEGREE, of_products
-from mcz.formats import FORMATS
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
+from mcz.codecs.coding.forms.counts import Law
+from mcz.codecs.coding.forms.multiples import of_multiples
+from mcz.codecs.coding.forms.products import DEGREE, of_products
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
+from mcz.sources import FORMATS
 from tests.codecs.lossy import saved
 
 BINARY32, SIX = Grid(GridKind.BINARY32), Grid(GridKind.GENERAL, 6)

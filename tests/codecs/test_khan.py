@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.angles import unwrap
-from mcz.metrics import compare
+from mcz.kinematics.angles import unwrap
+from mcz.kinematics.metrics import compare
 from tests.codecs.lossy import amc, bytes_of, saved
 
 pytestmark = pytest.mark.real

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import basis_models
-from mcz.motion import Signal
+from mcz.model.motion import Signal
 from tests.codecs.lossy import (
     Direct,
     amc,
@@ -94,7 +94,7 @@ def test_a_window_decodes_without_the_others() -> None:
     coded = Direct("lsdt-clip", markers(100, 3), step=0.2, window=20)
     whole, data = coded.read(), coded.stream(0, 0, 0)
     from mcz.codecs.spatial.window_streams import windows_of
-    from mcz.schema import varint
+    from mcz.model.schema import varint
 
     parts = list(windows_of(data, 5, "test"))
     for kept in range(5):  # the others are damaged

@@ -14,10 +14,10 @@ import mcz
 from mcz.codecs.basis_models import Basis, parse_bases
 from mcz.codecs.space import COURSES
 from mcz.codecs.spatial.windows import WindowsHeader
+from mcz.files.reading.sizes import clip_sizes
 from mcz.kinematics import point_names
-from mcz.motion import Signal
-from mcz.reading.sizes import clip_sizes
-from mcz.schema import parse
+from mcz.model.motion import Signal
+from mcz.model.schema import parse
 from tests.codecs.lossy import (
     Direct,
     amc,

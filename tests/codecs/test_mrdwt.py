@@ -14,14 +14,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.angles import unwrap
 from mcz.codecs.channel_weights import weights_of
 from mcz.codecs.step_codes import code_of, ratio_of
+from mcz.codecs.transforms import wavelets
 from mcz.codecs.wavelet.wavelet import WaveletHeader
-from mcz.metrics import compare
-from mcz.motion import POSITION_KINDS, Motion
-from mcz.schema import parse
-from mcz.transforms import wavelets
+from mcz.kinematics.angles import unwrap
+from mcz.kinematics.metrics import compare
+from mcz.model.motion import POSITION_KINDS, Motion
+from mcz.model.schema import parse
 from tests.codecs import lossy
 from tests.codecs.lossy import bones, clip_of, gapped, wandering
 from tests.formats.c3d_files import INTEL, SGI, made

@@ -18,7 +18,7 @@ from mcz.codecs import codec_by_name
 from mcz.codecs.contract import model_finder
 from mcz.codecs.online.units import INTRA, LTR, STR, Unit, build_units, parse_units
 from mcz.errors import LostFrameError
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
 from tests.codecs.lossy import Direct, amc, markers
 
 ONLINE = codec_by_name("online")

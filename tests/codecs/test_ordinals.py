@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import codec_by_name
+from mcz.codecs.coding.fast import decoder
+from mcz.codecs.coding.fast.encoder import StreamBuilder
 from mcz.codecs.contract import Layout, Request, Span
-from mcz.coding.fast import decoder
-from mcz.coding.fast.encoder import StreamBuilder
-from mcz.numbers import Grid
+from mcz.model.numbers import Grid
 from tests.codecs.coders import CODERS, GRIDS, Coder, columns
 from tests.motions import motions, smooth
 

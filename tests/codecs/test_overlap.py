@@ -28,7 +28,7 @@ def encoded(motion: mcz.Motion, **params: object) -> bytes:
 def test_unknown_codec_makes_only_that_clip_unsupported(monkeypatch: pytest.MonkeyPatch) -> None:
     out = io.BytesIO()
     from mcz.container.writer import Writer
-    from mcz.writing.clip_writer import write_clip
+    from mcz.files.writing.clip_writer import write_clip
 
     writer = Writer(out)
     write_clip(writer, smooth(), codecs.codec_by_name("raw"), {})
@@ -47,7 +47,7 @@ def test_unknown_codec_makes_only_that_clip_unsupported(monkeypatch: pytest.Monk
 
 def test_tiny_payloads_keep_the_overhead_bound() -> None:
     """DESIGN 3: 160 bytes, 1 byte a stream, 1 % of the payload."""
-    from mcz.reading.sizes import clip_sizes
+    from mcz.files.reading.sizes import clip_sizes
 
     motion = smooth(40)
     values = np.zeros_like(motion.values)

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mcz.angles import unwrap
+from mcz.kinematics.angles import unwrap
 from tests.codecs.lossy import Direct, clip_of, decoded, wandering
 from tests.motions import smooth
 

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs import codec_by_name
 from mcz.codecs.posewave.choices import PRESETS
-from mcz.motion import Motion, Signal
-from mcz.numbers import Grid, GridKind
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import Motion, Signal
+from mcz.model.numbers import Grid, GridKind
 from tests.codecs.lossy import (
     Array,
     Direct,

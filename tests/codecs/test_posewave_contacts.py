@@ -18,9 +18,9 @@ from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs
 from mcz.codecs.posewave.contact_plan import Contacts, parse_contacts
 from mcz.codecs.posewave.contact_tracker import ContactTracker, Outcome, Piece
 from mcz.errors import ContactWarning, MotionError, OptionError
+from mcz.files.writing.signal_source import MemorySource
 from mcz.kinematics.points import first_points, positions_of
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.writing.signal_source import MemorySource
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from tests.codecs.lossy import Direct, amc
 
 Runs = Sequence[tuple[str, int, int]]

@@ -13,9 +13,9 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.editing.extraction import extract
-from mcz.motion import Exceptions, Signal
-from mcz.numbers import Grid, GridKind
+from mcz.files.editing.extraction import extract
+from mcz.model.motion import Exceptions, Signal
+from mcz.model.numbers import Grid, GridKind
 from tests.codecs.lossy import Array, amc, bytes_of, saved
 from tests.motions import smooth
 

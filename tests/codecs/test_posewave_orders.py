@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mcz.angles import FULL_TURN, unwrap
 from mcz.codecs.posewave.choices import choose
 from mcz.codecs.posewave.header import parse_header
 from mcz.codecs.posewave.order_choices import choose_orders
@@ -18,9 +17,10 @@ from mcz.codecs.posewave.orders import SEQUENCES, Orders
 from mcz.codecs.posewave.posewave import CODEC
 from mcz.codecs.posewave.segment import decode_segment, encode_segment
 from mcz.errors import MotionError
+from mcz.files.writing.signal_source import MemorySource
+from mcz.kinematics.angles import FULL_TURN, unwrap
 from mcz.kinematics.points import positions_of
-from mcz.motion import ROTATION_KINDS, Channel, Joint, Motion, Signal, Skeleton
-from mcz.writing.signal_source import MemorySource
+from mcz.model.motion import ROTATION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 
 Floats = np.ndarray
 UNITS = st.sampled_from(["deg", "rad"])

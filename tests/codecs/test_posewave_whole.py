@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mcz
-from mcz.motion import Channel, Motion, Signal
-from mcz.sample import acclaim_walk
+from mcz.model.motion import Channel, Motion, Signal
+from mcz.sources.sample import acclaim_walk
 from tests.bodies import turned_by
 
 WALK = acclaim_walk()

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.angles import unwrap
 from mcz.codecs.curves import qbc, streams
 from mcz.codecs.curves.choices import STEP_SHARE
 from mcz.codecs.parameters import SCALED
 from mcz.kinematics import reach
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import parse
+from mcz.kinematics.angles import unwrap
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.schema import parse
 from tests.codecs import lossy
 from tests.codecs.lossy import Direct, clip_of
 from tests.motions import smooth

@@ -25,7 +25,7 @@ from conformance.child import Limits
 from conformance.server import Server
 from mcz.cli import conformance
 from mcz.errors import MczError
-from mcz.reading.lost_skeletons import LOST
+from mcz.files.reading.lost_skeletons import LOST
 from tests.codecs import cases as contract
 from tests.codecs.lossy import gapped, markers, rough, saved, wandering
 from tests.motions import smooth

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
-from mcz.formats import amc, asf
-from mcz.formats.bones import derive
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
+from mcz.sources.text import amc, asf
+from mcz.sources.text.bones import derive
 from tests.formats.text_files import AMC, ASF
 
 SKELETON = asf.read(ASF)

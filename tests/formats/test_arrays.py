@@ -20,10 +20,10 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import MczError, MotionError, OptionError, SourceError
-from mcz.editing.folders import motion_files
-from mcz.formats import FORMATS, likely_formats
-from mcz.formats.arrays.kinds import KINDS
-from mcz.numbers import GridKind
+from mcz.files.editing.folders import motion_files
+from mcz.model.numbers import GridKind
+from mcz.sources import FORMATS, likely_formats
+from mcz.sources.arrays.kinds import KINDS
 from tests.commands import run
 from tests.formats.saved_arrays import arrays, saved
 from tools.vectors.build.array_files import Member, floats, npy, npz

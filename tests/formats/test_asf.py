@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mcz import Channel, Joint, MotionError, Skeleton, SourceError
-from mcz.formats import asf
+from mcz.sources.text import asf
 from tests.formats.text_files import ASF_OF_ALL_KINDS
 
 

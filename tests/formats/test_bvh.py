@@ -13,8 +13,9 @@ import pytest
 import mcz
 from mcz import Channel, Exceptions, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.container.limits import BASE, LARGE
-from mcz.formats import amc, asf, bvh, hierarchy, likely_formats, limits
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
+from mcz.sources import likely_formats, limits
+from mcz.sources.text import amc, asf, bvh, hierarchy
 from tests.formats.text_files import BVH
 
 

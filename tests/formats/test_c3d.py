@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
-from mcz.formats import c3d
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
+from mcz.sources.c3d import c3d
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, c3d_files, made, real_of
 
 ORDERS = (INTEL, DEC, SGI)

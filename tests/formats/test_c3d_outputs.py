@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton
-from mcz.formats import c3d
-from mcz.formats.c3d_outputs import Split
+from mcz.sources.c3d import c3d
+from mcz.sources.c3d.outputs import Split
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made
 
 ORDERS = (INTEL, DEC, SGI)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz import Motion
-from mcz.formats import c3d
-from mcz.formats.c3d_layout import parse_layout
+from mcz.sources.c3d import c3d
+from mcz.sources.c3d.layout import parse_layout
 from tests.formats.c3d_files import DEC, SGI, real_of
 
 DATA = Path(os.environ.get("MCZ_DATA", "no-data"))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Motion, MotionError, OptionError, Signal
-from mcz.formats import c3d
+from mcz.sources.c3d import c3d
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made, real, word
 
 ORDERS = (INTEL, DEC, SGI)

@@ -9,7 +9,7 @@ import pytest
 
 import mcz
 from mcz import SourceError
-from mcz.formats import FORMATS, format_of, likely_formats
+from mcz.sources import FORMATS, format_of, likely_formats
 from tests.cli.test_ways_out import CLIPS, source_files
 from tests.commands import run
 

@@ -10,9 +10,9 @@ import pytest
 
 import mcz
 from mcz import Motion, MotionError, SourceError
-from mcz.formats import FORMATS, likely_formats
-from mcz.formats.csv_files import is_motion, kind_of
-from mcz.sample import bvh_walk
+from mcz.sources import FORMATS, likely_formats
+from mcz.sources.sample import bvh_walk
+from mcz.sources.tables.csv_files import is_motion, kind_of
 from tools.vectors.build.table_files import COLUMNS, DEVICES, EULER, MOTIVE, VICON
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mcz import SourceError
-from mcz.formats import format_of
-from mcz.formats.find import NUMBER, SUBJECT, TAKE, skeletons_around
+from mcz.sources import format_of
+from mcz.sources.text.find import NUMBER, SUBJECT, TAKE, skeletons_around
 
 
 def touch(folder: Path, *names: str) -> None:

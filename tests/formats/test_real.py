@@ -11,8 +11,8 @@ import pytest
 
 import mcz
 from mcz import Motion, Skeleton, SkeletonWarning, SourceError
-from mcz.formats import FORMATS, format_of
-from mcz.formats.csv_files import is_motion
+from mcz.sources import FORMATS, format_of
+from mcz.sources.tables.csv_files import is_motion
 
 DATA = Path(os.environ.get("MCZ_DATA", "no-data"))
 pytestmark = [

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, LimitError, Motion, MotionError, SourceError
-from mcz.formats import FORMATS
-from mcz.formats.table_layout import PHRASES, fill
-from mcz.formats.times import find_clock, rate_of_times, stated_rate
-from mcz.numbers import GridKind, scan
-from mcz.sample import bvh_walk, marker_walk
+from mcz.model.numbers import GridKind, scan
+from mcz.sources import FORMATS
+from mcz.sources.sample import bvh_walk, marker_walk
+from mcz.sources.tables.layout import PHRASES, fill
+from mcz.sources.tables.times import find_clock, rate_of_times, stated_rate
 from tests.formats.tab_files import NUMBERS
 from tools.vectors.build.table_files import FORCES, MARKERS, QUATERNIONS, TIMES
 

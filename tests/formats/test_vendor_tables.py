@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Motion, SourceError
-from mcz.formats import FORMATS
-from mcz.formats.csv_files import is_motion
-from mcz.formats.csv_text import first_row
-from mcz.formats.table_rows import lines_from
+from mcz.sources import FORMATS
+from mcz.sources.tables.csv_files import is_motion
+from mcz.sources.tables.csv_text import first_row
+from mcz.sources.tables.rows import lines_from
 from tests.formats.csv_files import column_files, motive_files, vicon_files
 from tools.vectors.build.table_files import COLUMNS, DEVICES, MOTIVE, VICON
 

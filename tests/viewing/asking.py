@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from mcz.viewing.file_registry import Shelf, put
-from mcz.viewing.page import page
-from mcz.viewing.server import Server
+from mcz.show.viewing.file_registry import Shelf, put
+from mcz.show.viewing.page import page
+from mcz.show.viewing.server import Server
 
 
 class Answer(NamedTuple):

@@ -15,8 +15,8 @@ import pytest
 
 import mcz
 from mcz import AccessError
-from mcz.viewing import page_build
-from mcz.viewing.page_build import built
+from mcz.show.viewing import page_build
+from mcz.show.viewing.page_build import built
 
 ROOT = Path(mcz.__file__).parents[1]
 PAGE = Path(__file__).with_name("page.html")
@@ -139,10 +139,10 @@ def test_a_wheel_has_the_page_unless_told(
     (whl,) = wheel.WheelBuilder(str(tmp_path)).build(directory=str(tmp_path / "out"))
     with zipfile.ZipFile(whl) as archive:
         names = archive.namelist()
-        assert ("mcz/viewing/viewer.html" in names) == has_page
+        assert ("mcz/show/viewing/viewer.html" in names) == has_page
         assert not [name for name in names if name.startswith("tools")]
         if has_page:
-            assert archive.read("mcz/viewing/viewer.html") == PAGE.read_bytes()
+            assert archive.read("mcz/show/viewing/viewer.html") == PAGE.read_bytes()
     (tar,) = sdist.SdistBuilder(str(tmp_path)).build(directory=str(tmp_path / "out"))
     with tarfile.open(tar) as source:
         held = [
@@ -155,7 +155,7 @@ def test_an_installed_page_is_found(tmp_path: Path) -> None:
     """As of a wheel that is unpacked, with nothing of the repository around."""
     shutil.copytree(ROOT / "mcz", tmp_path / "mcz", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(PAGE, tmp_path / "mcz" / "viewing" / "viewer.html")
-    code = "from mcz.viewing.page import page; print(page().policy)"
+    code = "from mcz.show.viewing.page import page; print(page().policy)"
     environment = {k: v for k, v in os.environ.items() if k != "MCZ_VIEWER_PAGE"}
     done = subprocess.run(
         [sys.executable, "-c", code],

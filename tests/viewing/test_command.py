@@ -19,8 +19,8 @@ import pytest
 
 import mcz
 from mcz import AccessError, OptionError
-from mcz.viewing import browser, view
-from mcz.viewing.open_pages import Visitors
+from mcz.show.viewing import browser, view
+from mcz.show.viewing.open_pages import Visitors
 from tests.commands import Call
 
 
@@ -89,7 +89,7 @@ def test_it_ends_with_its_pages(
     samples: Path, temporary: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """While one of them is open it stays; it ends when all have been closed for a while."""
-    monkeypatch.setattr("mcz.viewing.server.GRACE", 0.2)
+    monkeypatch.setattr("mcz.show.viewing.server.GRACE", 0.2)
     seen: list[object] = []
 
     def visit(url: str) -> bool:

@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.annexes import annex_bytes
 from mcz.codecs import CODECS
-from mcz.viewing.embedding import element
-from mcz.viewing.page import page
-from mcz.viewing.tables import TABLES, tables_for
+from mcz.model.annexes import annex_bytes
+from mcz.show.viewing.embedding import element
+from mcz.show.viewing.page import page
+from mcz.show.viewing.tables import TABLES, tables_for
 from tests.commands import run
 from tests.motions import smooth
 
@@ -229,7 +229,7 @@ def test_what_a_codec_needs_is_there(tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("no node")
-    from mcz.viewing.tables import deflated
+    from mcz.show.viewing.tables import deflated
 
     motion = smooth(40)
     documents = []

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import AccessError, FormatError, OptionError
-from mcz.annexes import annex_bytes
-from mcz.viewing import file_registry as shelf_module
-from mcz.viewing.file_registry import Shelf, put
-from mcz.viewing.page import Page, page
-from mcz.viewing.requests import Refused, range_of
-from mcz.viewing.server import Server
+from mcz.model.annexes import annex_bytes
+from mcz.show.viewing import file_registry as shelf_module
+from mcz.show.viewing.file_registry import Shelf, put
+from mcz.show.viewing.page import Page, page
+from mcz.show.viewing.requests import Refused, range_of
+from mcz.show.viewing.server import Server
 from tests.motions import smooth
 from tests.viewing.asking import Answer, ask, ask_anywhere, convert, form, post, raw, serving
 
@@ -600,7 +600,7 @@ def test_any_bytes_are_a_form_or_refused(
 ) -> None:
     import io
 
-    from mcz.viewing.multipart import save_files
+    from mcz.show.viewing.multipart import save_files
 
     whole = form(("a/x.bvh", body), ("b.bvh", body[::-1]))
     folder = tmp_path_factory.mktemp("form")
@@ -618,7 +618,7 @@ def test_any_bytes_are_a_form_or_refused(
 def test_a_form_in_pieces_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import io
 
-    from mcz.viewing import multipart
+    from mcz.show.viewing import multipart
 
     data = b"\r\n--\r\n--X" * 3 + b"\r\n-" + bytes(range(256)) * 4
     data = data.replace(b"\r\n--X", b"\r\n--Z")

@@ -10,10 +10,10 @@ import pytest
 
 import mcz
 from mcz import AccessError
-from mcz.viewing import page, page_build
-from mcz.viewing.file_registry import Shelf, put
-from mcz.viewing.server import Server
-from mcz.viewing.small_page import MOST_CLIPS, viewer_page
+from mcz.show.viewing import page, page_build
+from mcz.show.viewing.file_registry import Shelf, put
+from mcz.show.viewing.server import Server
+from mcz.show.viewing.small_page import MOST_CLIPS, viewer_page
 from tests.viewing.asking import ask
 
 

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mcz
-from mcz.clock import TIMES, times_fault
 from mcz.container.scan import scan
 from mcz.errors import FormatError, LimitError, MczError, OptionError, UnsupportedError
-from mcz.reading.clip import Clip
-from mcz.reading.faults import validate
-from mcz.reading.file import File
-from mcz.reading.post_filtering import filtered_part
-from mcz.reading.report import info
-from mcz.reading.signal_reader import SignalReader
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.faults import validate
+from mcz.files.reading.file import File
+from mcz.files.reading.post_filtering import filtered_part
+from mcz.files.reading.report import info
+from mcz.files.reading.signal_reader import SignalReader
+from mcz.model.clock import TIMES, times_fault
 from tools.fuzz.guard import hold
 from tools.fuzz.repair import unhashed
 

@@ -16,7 +16,7 @@ from mcz.container.dictionary_deflate import decoded
 from mcz.container.packets import FRAME, SEGMENT, Packet
 from mcz.container.segments import parse_header
 from mcz.errors import MczError
-from mcz.schema import MAX_COUNT, build, parse
+from mcz.model.schema import MAX_COUNT, build, parse
 from tools.fuzz.repair import (
     Piece,
     Pieces,

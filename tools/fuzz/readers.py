@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.formats import FORMATS, asf
-from mcz.formats.line_by_line import Floats
-from mcz.motion import Motion, Skeleton
-from mcz.reading.faults import validate
-from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.files.reading.faults import validate
+from mcz.model.motion import Motion, Skeleton
+from mcz.sources import FORMATS
+from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
+from mcz.sources.text import asf
+from mcz.sources.text.line_by_line import Floats
 from tools.fuzz.guard import hold
 from tools.fuzz.seeds import sources
 from tools.vectors.build import table_files

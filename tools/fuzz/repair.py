@@ -38,8 +38,8 @@ from mcz.container.segments import SegmentHeader, mask_of, parse_header
 from mcz.container.source import open_source
 from mcz.container.value_hash import value_hash
 from mcz.errors import FormatError, MczError
-from mcz.reading.clip import Clip
-from mcz.schema import build, deflate, inflate, parse, read_varint, varint
+from mcz.files.reading.clip import Clip
+from mcz.model.schema import build, deflate, inflate, parse, read_varint, varint
 from tools.records import id_of
 
 SHARED = (b"SKEL", b"SRCE", b"MODL")  # chunks with an id

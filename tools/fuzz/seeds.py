@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 import mcz
-from mcz.editing.unpacking import named_files
+from mcz.files.editing.unpacking import named_files
 
 VECTORS = Path(__file__).parents[2] / "conformance" / "vectors"
 LARGEST = 16 * 1024  # bytes of a seed

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 PACKAGE = Path(__file__).parents[2] / "mcz"
-APART = ("mcz.bench", "mcz.cli", "mcz.datasets")  # not part of reading
+APART = ("mcz.bench", "mcz.cli", "mcz.exchange.datasets")  # not part of reading
 WARM = 30  # seeds that are checked beforehand
 HANG = 150  # seconds of wall time after which libFuzzer ends the process, in a loop of its own
 

@@ -127,7 +127,7 @@ import sys
 from dataclasses import replace
 from mcz.codecs import by_name
 from mcz.container.writer import Writer
-from mcz.writing.clip_writer import write_clip
+from mcz.files.writing.clip_writer import write_clip
 from tests.motions import smooth
 
 motions = [smooth(130 + 13 * k) for k in range(17)]

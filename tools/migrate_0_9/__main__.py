@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 import mcz
-from mcz.writing.atomic import replacing
+from mcz.files.writing.atomic import replacing
 from tools.migrate_0_9 import write_new
 
 READER = Path(__file__).with_name("read_old.py")

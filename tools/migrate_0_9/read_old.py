@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import mcz
-from mcz.editing.protecting import redundancy_of
+from mcz.files.editing.protecting import redundancy_of
 
 
 class Folder:

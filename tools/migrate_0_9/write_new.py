@@ -14,18 +14,18 @@ from typing import Any, BinaryIO
 import numpy as np
 
 import mcz
-from mcz.clock import EXACT, Timeline, check_numbers, numbers_or_rows
 from mcz.codecs import codec_by_name
 from mcz.container import payloads
 from mcz.container.limits import BASE, LARGE
 from mcz.container.metadata import Record
 from mcz.container.value_hash import value_hash
 from mcz.container.writer import Writer
-from mcz.editing.unpacking import named_files
-from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
-from mcz.writing.clip_writer import write_clip, write_skeleton
-from mcz.writing.quality import CHUNK, quality_payload
+from mcz.files.editing.unpacking import named_files
+from mcz.files.writing.clip_writer import write_clip, write_skeleton
+from mcz.files.writing.quality import CHUNK, quality_payload
+from mcz.model.clock import EXACT, Timeline, check_numbers, numbers_or_rows
+from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
 
 START = "start-time"  # a key of 0.9: the time base of a clip says it now
 NUMBERS = "x-frame-numbers-0-9"  # what `frame-numbers` of 0.9 said, where no clip can have such now

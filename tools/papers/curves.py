@@ -32,12 +32,12 @@ from mcz.bench.measure import (
 )
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, model_finder
+from mcz.codecs.training import Recipe, train
 from mcz.container.limits import BASE
 from mcz.errors import MczError, MotionError
-from mcz.reading.sizes import clip_sizes
-from mcz.training import Recipe, train
-from mcz.writing.planning import prepare
-from mcz.writing.signal_source import MemorySource
+from mcz.files.reading.sizes import clip_sizes
+from mcz.files.writing.planning import prepare
+from mcz.files.writing.signal_source import MemorySource
 
 LOW, HIGH = 0.09, 2.3  # cm
 RATIO = 1.7  # from one error to the next

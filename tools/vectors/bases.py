@@ -21,10 +21,10 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, ChunkType
 from mcz.container.limits import LARGE
 from mcz.container.segments import SegmentHeader
-from mcz.formats import FORMATS
-from mcz.motion import Channel, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
-from mcz.schema import varint
+from mcz.model.motion import Channel, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
+from mcz.model.schema import varint
+from mcz.sources import FORMATS
 from tools.vectors import source_bases
 from tools.vectors.build import by_hand as written
 from tools.vectors.build import extensions, motions

@@ -11,8 +11,8 @@ import numpy as np
 
 from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Encoded, Model, Segment
-from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
+from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
 from tools.vectors.build import motions, pose_clips
 from tools.vectors.build.files import Crafter, file_of, finished
 

@@ -10,8 +10,8 @@ from mcz.container.chunks import HEADER, parse_header
 from mcz.container.dictionary_deflate import unpacked
 from mcz.container.limits import BASE
 from mcz.errors import MczError
-from mcz.formats import FORMATS
-from mcz.schema import parse
+from mcz.model.schema import parse
+from mcz.sources import FORMATS
 from tools.vectors.build.files import Vector
 
 OPEN = 2**64 - 1

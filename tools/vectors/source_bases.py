@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from mcz.container import payloads
-from mcz.formats import FORMATS, amc, asf
-from mcz.formats.layout import Detail
-from mcz.formats.table_layout import SectionFields, TableDetail, TableTemplate
-from mcz.motion import Motion
-from mcz.schema import parse, varint
-from mcz.writing.clip_writer import write_skeleton
+from mcz.files.writing.clip_writer import write_skeleton
+from mcz.model.motion import Motion
+from mcz.model.schema import parse, varint
+from mcz.sources import FORMATS
+from mcz.sources.tables.layout import SectionFields, TableDetail, TableTemplate
+from mcz.sources.text import amc, asf
+from mcz.sources.text.layout import Detail
 from tools.records import built
 from tools.vectors.build.array_files import floats, npy, plain_npz, take_arrays
 from tools.vectors.build.c3d_files import c3d_file, c3d_outputs, take_c3d

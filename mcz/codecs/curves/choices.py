@@ -17,8 +17,8 @@ from mcz.codecs.parameters import SCALED, preset_values
 from mcz.codecs.segments import segment_frames_of
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
-from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Skeleton
-from mcz.types import Params, Settings
+from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Skeleton
+from mcz.model.types import Params, Settings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

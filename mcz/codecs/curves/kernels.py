@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.coding import residuals
-from mcz.coding.mixing import mixed
-from mcz.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
+from mcz.codecs.coding import residuals
+from mcz.codecs.coding.mixing import mixed
+from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, FloatColumns, Floats2, Ints, Ints2
 

@@ -69,8 +69,8 @@ from mcz.codecs.segments import (
 )
 from mcz.codecs.subset_source import SubsetSource
 from mcz.errors import FormatError, OptionError
-from mcz.schema import UVARINT, Checked, Record, bounded, build, field, parse
-from mcz.types import Params
+from mcz.model.schema import UVARINT, Checked, Record, bounded, build, field, parse
+from mcz.model.types import Params
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -12,8 +12,8 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.start_states import start_states
-from mcz.coding.streams import bare_state, code, halves_of, scale_of, uncode
+from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import bare_state, code, halves_of, scale_of, uncode
 from mcz.errors import FormatError
 
 Ints = NDArray[np.int64]

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.fast.decoder import MOST_ROWS, Shape, check_size
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -28,10 +29,9 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.lossless.best_streams import build_stream, read_stream
 from mcz.codecs.segments import Sizing, gather, lossless_segment_frames, segments_by_guess
-from mcz.coding.fast.decoder import MOST_ROWS, Shape, check_size
 from mcz.errors import FormatError
-from mcz.threads import in_force
-from mcz.types import Params
+from mcz.model.threads import in_force
+from mcz.model.types import Params
 
 Ints = NDArray[np.int64]
 

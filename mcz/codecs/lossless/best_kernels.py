@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcz.coding.fast.residual_kernels import BEHIND, Predictors, is_read
-from mcz.coding.fast.survey_kernels import CodedLanes
-from mcz.coding.fast.tail_kernels import REST, Tails, read_ordinal, settle
-from mcz.coding.fast.write_kernels import put_tail
-from mcz.coding.mixing import number
-from mcz.coding.regression import LIMIT, Regressions, bound_value, estimate, learn, solve
-from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
+from mcz.codecs.coding.fast.residual_kernels import BEHIND, Predictors, is_read
+from mcz.codecs.coding.fast.survey_kernels import CodedLanes
+from mcz.codecs.coding.fast.tail_kernels import REST, Tails, read_ordinal, settle
+from mcz.codecs.coding.fast.write_kernels import put_tail
+from mcz.codecs.coding.mixing import number
+from mcz.codecs.coding.regression import LIMIT, Regressions, bound_value, estimate, learn, solve
+from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.kernels import kernel, wrapped
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2, Words2
 

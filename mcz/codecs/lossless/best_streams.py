@@ -13,24 +13,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.fast.decoder import SegmentDecoder, Shape, read_segments
+from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
+from mcz.codecs.coding.fast.encoder import kernels as fast_kernels
+from mcz.codecs.coding.fast.lanes import fault_of
+from mcz.codecs.coding.forms.ids import WITH_UNIT
+from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import code, uncode
 from mcz.codecs.contract import Layout
 from mcz.codecs.lossless.echoes import Echo, build_echoes, echo_table, find_echoes, read_echoes
 from mcz.codecs.lossless.references import choose_references
-from mcz.coding.fast.decoder import SegmentDecoder, Shape, read_segments
-from mcz.coding.fast.encoder import Plan, StreamBuilder
-from mcz.coding.fast.encoder import kernels as fast_kernels
-from mcz.coding.fast.lanes import fault_of
-from mcz.coding.forms.ids import WITH_UNIT
-from mcz.coding.start_states import start_states
-from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError
-from mcz.numbers import Grid
-from mcz.schema import varint
+from mcz.model.numbers import Grid
+from mcz.model.schema import varint
 
 if TYPE_CHECKING:
+    from mcz.codecs.coding.fast.residual_kernels import Predictors
+    from mcz.codecs.coding.regression import Regressions
     from mcz.codecs.lossless.best_kernels import Rests
-    from mcz.coding.fast.residual_kernels import Predictors
-    from mcz.coding.regression import Regressions
 
 Ints = NDArray[np.int64]
 Words = NDArray[np.int32]
@@ -43,9 +43,9 @@ WORK, SPARE = 64, 1024  # references x rows that a byte pays for; bytes that are
 @cache
 def kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
     """The compiled loops, imported on first use: of best, regressions, residuals of fast."""
+    from mcz.codecs.coding import regression
+    from mcz.codecs.coding.fast import residual_kernels
     from mcz.codecs.lossless import best_kernels
-    from mcz.coding import regression
-    from mcz.coding.fast import residual_kernels
 
     return best_kernels, regression, residual_kernels
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
-from mcz.schema import read_varint, varint
+from mcz.model.schema import read_varint, varint
 
 Ints = NDArray[np.int64]
 Words = NDArray[np.int32]

@@ -15,6 +15,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.fast.decoder import (
+    MOST_ROWS,
+    MOST_VALUES,
+    SegmentDecoder,
+    Shape,
+    check_size,
+    read_segments,
+)
+from mcz.codecs.coding.fast.encoder import StreamBuilder
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -27,16 +36,7 @@ from mcz.codecs.contract import (
     refuse_extras,
 )
 from mcz.codecs.segments import Sizing, lossless_segment_frames, segments_by_guess
-from mcz.coding.fast.decoder import (
-    MOST_ROWS,
-    MOST_VALUES,
-    SegmentDecoder,
-    Shape,
-    check_size,
-    read_segments,
-)
-from mcz.coding.fast.encoder import StreamBuilder
-from mcz.types import Params
+from mcz.model.types import Params
 
 Ints = NDArray[np.int64]
 

@@ -14,12 +14,12 @@ import numpy as np
 from construct import Int8ul
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.start_states import start_states
 from mcz.codecs.contract import Layout
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
 from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, Space, SpaceFields, space_of
-from mcz.coding.start_states import start_states
 from mcz.errors import FormatError, LostFrameError, MotionError
-from mcz.schema import Record, field, one_of, parse
+from mcz.model.schema import Record, field, one_of, parse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,7 +52,7 @@ def _kernels() -> ModuleType:
 
 @cache
 def _coding() -> ModuleType:
-    from mcz.coding import mixing
+    from mcz.codecs.coding import mixing
 
     return mixing
 

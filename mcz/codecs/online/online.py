@@ -55,8 +55,8 @@ from mcz.codecs.segments import TARGET_BYTES
 from mcz.codecs.space import SpaceFields, check, uses_of
 from mcz.codecs.space_choices import sample_of
 from mcz.errors import FormatError, OptionError
-from mcz.schema import build
-from mcz.types import Params, Settings
+from mcz.model.schema import build
+from mcz.model.types import Params, Settings
 
 Floats = NDArray[np.float64]
 

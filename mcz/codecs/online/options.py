@@ -30,7 +30,7 @@ from mcz.codecs.space_choices import (
     live_sample,
 )
 from mcz.errors import OptionError
-from mcz.types import Params, Settings
+from mcz.model.types import Params, Settings
 
 MOST_GOF = 2**20
 

@@ -20,7 +20,7 @@ from mcz.codecs.contract import Layout
 from mcz.codecs.online.units import MODES
 from mcz.errors import OptionError
 from mcz.hints import Hint
-from mcz.types import Params
+from mcz.model.types import Params
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mcz.errors import FormatError
-from mcz.schema import read_varint, varint
+from mcz.model.schema import read_varint, varint
 
 STR, LTR, INTRA = 0, 1, 2  # what a frame is predicted from: the last, the last LTR, nothing
 MIXED, GOLOMB = 0, 1  # coders

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.coding import residuals
-from mcz.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
+from mcz.codecs.coding import residuals
+from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 

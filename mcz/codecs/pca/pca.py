@@ -40,8 +40,8 @@ from mcz.codecs.segments import (
 )
 from mcz.codecs.step_codes import ratio_of
 from mcz.errors import FormatError
-from mcz.schema import Checked, Record, build, field, parse
-from mcz.types import Params, Reals, Settings, Values
+from mcz.model.schema import Checked, Record, build, field, parse
+from mcz.model.types import Params, Reals, Settings, Values
 
 Floats = NDArray[np.float64]
 

@@ -43,9 +43,9 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
-from mcz.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
-from mcz.schema import parse
-from mcz.types import Params, Settings
+from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.model.schema import parse
+from mcz.model.types import Params, Settings
 
 Floats = NDArray[np.float64]
 

@@ -27,11 +27,11 @@ from mcz.codecs.posewave.header import NAME
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import OptionError
-from mcz.indexing import merged_ranges
 from mcz.kinematics.contacts import USUAL_RATE, FootTracks
 from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import points_of, positions_of
-from mcz.motion import Skeleton
+from mcz.model.indexing import merged_ranges
+from mcz.model.motion import Skeleton
 
 Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, how many frames
 Runs = tuple[Run, ...] | str

@@ -16,8 +16,8 @@ from mcz.codecs.posewave.skeleton_plan import PLAIN, Plan, limit_number, orienta
 from mcz.codecs.posewave.trigonometry import RULES
 from mcz.errors import FormatError
 from mcz.kernels.types import Floats, Floats2, Ints
-from mcz.motion import Skeleton
-from mcz.schema import UVARINT, Record, bounded, counted, field
+from mcz.model.motion import Skeleton
+from mcz.model.schema import UVARINT, Record, bounded, counted, field
 
 MAX_POINTS = 8
 MAX_ROUNDS = 6

@@ -17,7 +17,7 @@ from mcz.codecs.posewave.contacts import Coder, Corrections
 from mcz.codecs.posewave.row_coder import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan
 from mcz.errors import ContactWarning, MotionError
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.codecs.posewave.contact_plan import Contacts, HeldPoints
 from mcz.codecs.posewave.row_coder import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan
-from mcz.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.errors import FormatError
 
 if TYPE_CHECKING:  # compiled kernels, imported on first use
@@ -56,7 +56,7 @@ def _coding() -> ModuleType:
 
 @cache
 def _mixing() -> ModuleType:
-    from mcz.coding import mixing
+    from mcz.codecs.coding import mixing
 
     return mixing
 

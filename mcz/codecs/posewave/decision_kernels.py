@@ -6,6 +6,10 @@ function serves encoder and decoder. Imported on first use only.
 
 from __future__ import annotations
 
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.logistic import LIMIT
+from mcz.codecs.coding.mixing import adaptive, code, mixed, number
+from mcz.codecs.coding.residuals import bits
 from mcz.codecs.posewave.model_state import (
     C_ESCAPE,
     C_EXTRA,
@@ -17,10 +21,6 @@ from mcz.codecs.posewave.model_state import (
     N_SLOTS,
     Model,
 )
-from mcz.coding import mixing
-from mcz.coding.logistic import LIMIT
-from mcz.coding.mixing import adaptive, code, mixed, number
-from mcz.coding.residuals import bits
 from mcz.kernels.types import Bytes, Ints
 
 BIAS = 77

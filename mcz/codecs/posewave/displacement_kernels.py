@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mcz.codecs.coding.mixing import ENCODING, adaptive, mixed
 from mcz.codecs.posewave import head_kernels as head
 from mcz.codecs.posewave.contact_plan import START_UNITS
 from mcz.codecs.posewave.head_kernels import code_number
-from mcz.coding.mixing import ENCODING, adaptive, mixed
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Floats3, Ints, Ints2
 

@@ -12,16 +12,16 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.fast.decoder import MOST_ROWS, MOST_VALUES, Shape, read_alone
+from mcz.codecs.coding.fast.encoder import StreamBuilder
 from mcz.codecs.contract import Layout, Request, SignalSource, Span
 from mcz.codecs.posewave.header import NAME, START_TABLES, PosewaveHeader, build_header
 from mcz.codecs.segments import gather
-from mcz.coding.fast.decoder import MOST_ROWS, MOST_VALUES, Shape, read_alone
-from mcz.coding.fast.encoder import StreamBuilder
 from mcz.errors import FormatError, OptionError
 from mcz.kinematics.joint_groups import find_joints
-from mcz.motion import Skeleton
-from mcz.schema import parse
-from mcz.types import Params
+from mcz.model.motion import Skeleton
+from mcz.model.schema import parse
+from mcz.model.types import Params
 
 Ints = NDArray[np.int64]
 Groups = tuple[tuple[int, ...], ...]

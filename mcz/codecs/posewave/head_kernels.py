@@ -6,7 +6,7 @@ first use only.
 
 from __future__ import annotations
 
-from mcz.coding.mixing import adaptive, number
+from mcz.codecs.coding.mixing import adaptive, number
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Ints
 

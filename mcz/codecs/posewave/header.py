@@ -21,7 +21,7 @@ from mcz.codecs.posewave.orders import N_ORDERS, check_orders
 from mcz.codecs.posewave.priors import Prior, priors
 from mcz.codecs.step_codes import code_of, ratio_of
 from mcz.errors import FormatError
-from mcz.motion import (
+from mcz.model.motion import (
     ANGLE_KINDS,
     POSITION_KINDS,
     QUATERNION_KINDS,
@@ -29,7 +29,7 @@ from mcz.motion import (
     VECTOR_KINDS,
     Skeleton,
 )
-from mcz.schema import (
+from mcz.model.schema import (
     UVARINT,
     Checked,
     CheckedBeside,
@@ -40,7 +40,7 @@ from mcz.schema import (
     field,
     parse,
 )
-from mcz.skeleton import first_columns
+from mcz.model.skeleton import first_columns
 
 Floats = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from mcz.codecs.posewave.contact_plan import Contacts, HeldPoints, make_held_poi
 from mcz.codecs.posewave.header import Header
 from mcz.codecs.posewave.metric import Metric
 from mcz.codecs.posewave.pyramid import Pyramid
-from mcz.motion import Skeleton
-from mcz.transforms import lifting
+from mcz.codecs.transforms import lifting
+from mcz.model.motion import Skeleton
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

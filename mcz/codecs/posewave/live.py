@@ -22,7 +22,7 @@ from mcz.codecs.posewave.segment_chain import SegmentChain
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import FormatError, LostFrameError, OptionError
 from mcz.kinematics.frames import FramePositions
-from mcz.types import Params
+from mcz.model.types import Params
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.posewave.header import Header
 from mcz.codecs.posewave.skeleton_plan import bounded_regularization, make_plan
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcz.annexes import annex_bytes
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.codecs.posewave.model_state import (
     BLOCK,
     LANES,
@@ -30,10 +31,9 @@ from mcz.codecs.posewave.model_state import (
     Model,
 )
 from mcz.codecs.posewave.priors import SEEN, Prior
-from mcz.coding import mixing
-from mcz.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.kernels.types import Floats, Ints
-from mcz.types import Params
+from mcz.model.annexes import annex_bytes
+from mcz.model.types import Params
 
 N_SECOND = 33
 START_ENERGY = 500.0

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.mixing import adaptive, mixed
 from mcz.codecs.posewave.decision_kernels import (
     COST_UNIT,
     Contexts,
@@ -62,8 +64,6 @@ from mcz.codecs.posewave.size_kernels import (
     learn_sizes,
     log_of,
 )
-from mcz.coding import mixing
-from mcz.coding.mixing import adaptive, mixed
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 

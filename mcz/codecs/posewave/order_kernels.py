@@ -50,7 +50,7 @@ def _rotate(m: Floats, j: int, k: int, sine: float, cosine: float) -> None:
 
 
 def whole_turns(step: float, full: float) -> float:
-    """Whole turns in ``step``, as ``mcz.angles.turns``."""
+    """Whole turns in ``step``, as ``mcz.kinematics.angles.turns``."""
     ratio = step / full
     count: float = -np.floor(0.5 - abs(ratio))
     return count if ratio >= 0.0 else -count

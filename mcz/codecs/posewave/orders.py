@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.angles import FULL_TURN
 from mcz.codecs.posewave.trigonometry import BEYOND, RULES
 from mcz.errors import FormatError, MotionError
-from mcz.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Joint, Skeleton
-from mcz.schema import read_varint, varint
+from mcz.kinematics.angles import FULL_TURN
+from mcz.model.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Joint, Skeleton
+from mcz.model.schema import read_varint, varint
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -55,9 +55,9 @@ from mcz.codecs.segments import (
     skeleton_of,
 )
 from mcz.errors import FormatError, OptionError
-from mcz.motion import Skeleton
-from mcz.types import Params, Settings, Values
-from mcz.units import UNIT_CM
+from mcz.model.motion import Skeleton
+from mcz.model.types import Params, Settings, Values
+from mcz.model.units import UNIT_CM
 
 Floats = NDArray[np.float64]
 

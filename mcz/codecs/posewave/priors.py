@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.annexes import annex_bytes
-from mcz.motion import Skeleton
-from mcz.types import JsonObject
+from mcz.model.annexes import annex_bytes
+from mcz.model.motion import Skeleton
+from mcz.model.types import JsonObject
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.transforms import lifting
+from mcz.codecs.transforms import lifting
 
 Ints = NDArray[np.int64]
 

@@ -46,7 +46,7 @@ def _head() -> ModuleType:
 
 @cache
 def _coding() -> ModuleType:
-    from mcz.coding import mixing
+    from mcz.codecs.coding import mixing
 
     return mixing
 

@@ -19,9 +19,9 @@ from mcz.codecs.posewave.level_coder import LevelCoder
 from mcz.codecs.posewave.orders import Orders
 from mcz.codecs.posewave.pyramid import Pyramid
 from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
+from mcz.codecs.transforms import lifting
 from mcz.errors import FormatError, MotionError
-from mcz.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
-from mcz.transforms import lifting
+from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -16,7 +16,7 @@ from mcz.codecs.posewave.pyramid import Pyramid
 from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import Head, choose_head, classes_of, kinds_of, room_of
 from mcz.errors import FormatError
-from mcz.motion import Skeleton
+from mcz.model.motion import Skeleton
 
 Floats = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from mcz.codecs.posewave.orders import SEQUENCES
 from mcz.codecs.posewave.trigonometry import BEYOND, RULES, Rule, sine_cosine
 from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints2
 from mcz.kinematics.points import points_of
-from mcz.motion import (
+from mcz.model.motion import (
     ANGLE_KINDS,
     POSITION_KINDS,
     QUATERNION_KINDS,
@@ -28,7 +28,7 @@ from mcz.motion import (
     Joint,
     Skeleton,
 )
-from mcz.skeleton import first_columns
+from mcz.model.skeleton import first_columns
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]  # rows

@@ -30,7 +30,7 @@ from mcz.codecs.space_choices import (
 )
 from mcz.codecs.spatial import windows
 from mcz.codecs.spatial.windows import Plan
-from mcz.types import Params, Settings
+from mcz.model.types import Params, Settings
 
 NAME = "lsdt-clip"
 

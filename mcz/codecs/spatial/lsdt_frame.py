@@ -18,6 +18,8 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import code, uncode
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -61,11 +63,9 @@ from mcz.codecs.spatial.prefix_streams import (
     fields_of,
     parse_vectors,
 )
-from mcz.coding.start_states import start_states
-from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
-from mcz.schema import Record, build, field, parse
-from mcz.types import Params, Settings
+from mcz.model.schema import Record, build, field, parse
+from mcz.model.types import Params, Settings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

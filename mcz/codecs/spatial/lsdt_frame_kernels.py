@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.coding.space_kernels import (
+from mcz.codecs.coding.space_kernels import (
     MAX_INDEX,
     N_SETS,
     TRACK_SIZE,

@@ -16,7 +16,7 @@ from mcz.codecs.parameters import preset_values
 from mcz.codecs.space_choices import default_step, sample_of
 from mcz.codecs.spatial import windows
 from mcz.codecs.spatial.window_choices import THRESHOLD, parameters_of, plan_of, window_options
-from mcz.types import Params, Settings
+from mcz.model.types import Params, Settings
 
 NAME = "pca-rdo"
 WINDOW = 120

@@ -6,8 +6,8 @@ serves encoder and decoder. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.coding.huffman import DIRECT, MAX_LENGTH
-from mcz.coding.residuals import bits
+from mcz.codecs.coding.huffman import DIRECT, MAX_LENGTH
+from mcz.codecs.coding.residuals import bits
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Ints, Ints2
 

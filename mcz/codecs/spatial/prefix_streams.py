@@ -14,9 +14,9 @@ import numpy as np
 from construct import If, Int8ul, this
 from numpy.typing import NDArray
 
-from mcz.coding.huffman import DIRECT, MAX_LENGTH, N_CLASSES, code_lengths, codes_of
+from mcz.codecs.coding.huffman import DIRECT, MAX_LENGTH, N_CLASSES, code_lengths, codes_of
 from mcz.errors import FormatError
-from mcz.schema import Checked, Record, counted, field, one_of
+from mcz.model.schema import Checked, Record, counted, field, one_of
 
 Ints = NDArray[np.int64]
 

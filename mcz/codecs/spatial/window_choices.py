@@ -40,9 +40,9 @@ from mcz.codecs.space import (
 from mcz.codecs.space_choices import CODER, DOMAIN, STEP, VIRTUAL_MARKERS, Sample
 from mcz.codecs.spatial.windows import MAX_WINDOW, Plan
 from mcz.codecs.step_codes import ratio_of
+from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import MotionError
-from mcz.transforms.dct import dct_matrix
-from mcz.types import Params
+from mcz.model.types import Params
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
-from mcz.coding.space_kernels import FIRSTS, LENGTHS, MAX_INDEX, OTHERS, Transform
+from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_residual, side_of
+from mcz.codecs.coding.space_kernels import FIRSTS, LENGTHS, MAX_INDEX, OTHERS, Transform
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 

@@ -13,11 +13,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import code, uncode
 from mcz.codecs.spatial.prefix_streams import Codes, build_vectors, parse_vectors
-from mcz.coding.start_states import start_states
-from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError
-from mcz.schema import read_varint, varint
+from mcz.model.schema import read_varint, varint
 
 Ints = NDArray[np.int64]
 

@@ -30,9 +30,9 @@ from mcz.codecs.segments import SEGMENT_FRAMES, TARGET_BYTES
 from mcz.codecs.space import Space, SpaceFields, check, space_of, uses_of
 from mcz.codecs.spatial.prefix_streams import NO_CODES, CodeFields, Codes, codes_from, fields_of
 from mcz.codecs.spatial.window_streams import MAX_INDEX, build_window, parse_window, windows_of
+from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import FormatError, MotionError
-from mcz.schema import UVARINT, CheckedBeside, Record, bounded, build, field, parse
-from mcz.transforms.dct import dct_matrix
+from mcz.model.schema import UVARINT, CheckedBeside, Record, bounded, build, field, parse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -40,7 +40,7 @@ from mcz.codecs.wavelet.wavelet import (
     Q,
     transform_of,
 )
-from mcz.types import Params, Settings
+from mcz.model.types import Params, Settings
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ serves encoder and decoder. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
+from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, IntColumns, Ints
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import Recode, RecodeRequest, SignalSource
 from mcz.codecs.step_codes import code_of
 from mcz.codecs.subset_source import SubsetSource
+from mcz.codecs.transforms.wavelets import INLINE, Wavelet, by_id
 from mcz.codecs.wavelet.quantizer import DEAD_ZONE, Quantizer
 from mcz.codecs.wavelet.wavelet import NAME, Plan, Transform, WaveletHeader, segment_streams
 from mcz.codecs.wavelet.windows import Frames
-from mcz.schema import parse
-from mcz.transforms.wavelets import INLINE, Wavelet, by_id
-from mcz.types import Params
+from mcz.model.schema import parse
+from mcz.model.types import Params
 
 Floats = NDArray[np.float64]
 

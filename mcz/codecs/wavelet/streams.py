@@ -13,11 +13,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import code, scale_of, uncode
 from mcz.codecs.predictor_choice import choose_predictor
-from mcz.coding.start_states import start_states
-from mcz.coding.streams import code, scale_of, uncode
 from mcz.errors import FormatError, MotionError
-from mcz.schema import read_varint, varint
+from mcz.model.schema import read_varint, varint
 
 Ints = NDArray[np.int64]
 

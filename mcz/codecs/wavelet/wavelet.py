@@ -19,13 +19,13 @@ from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment,
 from mcz.codecs.parameters import MAX_DECIMALS, SCALED, Parameter, decimals_parameter, integer
 from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, segments_by_halving
 from mcz.codecs.step_codes import ratio_of
+from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
 from mcz.codecs.wavelet.quantizer import Quantizer
 from mcz.codecs.wavelet.streams import Coding, build_streams, parse_streams
 from mcz.codecs.wavelet.windows import Frames
 from mcz.errors import FormatError
-from mcz.schema import UVARINT, Checked, Record, bounded, build, counted, field, parse
-from mcz.transforms import dwt
-from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
+from mcz.model.schema import UVARINT, Checked, Record, bounded, build, counted, field, parse
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
-from mcz.transforms import dwt
-from mcz.transforms.wavelets import Wavelet
+from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms.wavelets import Wavelet
 
 Floats = NDArray[np.float64]
 

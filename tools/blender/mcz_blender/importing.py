@@ -168,7 +168,7 @@ def bring(
 
 def mcz_line(text: str) -> str:
     """One line, without what a terminal or a status bar would take for more than text."""
-    from mcz.text_format import printable
+    from mcz.model.text_format import printable
 
     return printable(" ".join(text.split()))
 

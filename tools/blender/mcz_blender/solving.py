@@ -14,7 +14,7 @@ import numpy as np
 
 import mcz
 from mcz.kinematics.euler import euler_angles, euler_order
-from mcz.numbers import Grid, GridKind
+from mcz.model.numbers import Grid, GridKind
 
 from .spaces import TO_Z_UP, Floats
 

@@ -9,7 +9,7 @@ from typing import Any
 from mcz.bench.cases import load
 from mcz.bench.measure import Record
 from mcz.codecs.basis_models import known_models, parse_bases
-from mcz.training import frames_of, training_set
+from mcz.codecs.training import frames_of, training_set
 from tools.papers.curves import Clips, referenced
 from tools.papers.hou2016.training import (
     convergence,

@@ -9,7 +9,7 @@ from typing import Any
 from mcz.bench.cases import Case, Variant, has_preset
 from mcz.bench.tasks import Runner, Task
 from mcz.codecs import CODECS
-from mcz.training import SHIPPED
+from mcz.codecs.training import SHIPPED
 from tools.papers.curves import at, references
 from tools.papers.hou2016.spatial import P_ROWS
 from tools.papers.hou2016.training import SPARSITIES, TRAINING_CLIPS

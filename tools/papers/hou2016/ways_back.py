@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 import mcz
 from mcz.bench.cases import Case, load
 from mcz.bench.measure import Record, what_is_coded, write_file
-from mcz.conversion import from_positions
 from mcz.errors import MotionError
+from mcz.exchange.conversion import from_positions
+from mcz.files.reading.sizes import clip_sizes
 from mcz.kinematics.chain import chain_of
 from mcz.kinematics.marker_motion import in_positions
-from mcz.motion import ROTATION_KINDS, Motion, Skeleton
-from mcz.reading.sizes import clip_sizes
+from mcz.model.motion import ROTATION_KINDS, Motion, Skeleton
 
 Floats = NDArray[np.float64]
 

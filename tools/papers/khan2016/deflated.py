@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from mcz.bench.cases import Case, Variant, load
 from mcz.codecs import codec_by_name
+from mcz.codecs.transforms.dwt import own_range
+from mcz.codecs.transforms.wavelets import by_id
 from mcz.codecs.wavelet import wavelet as wavelet_codec
 from mcz.codecs.wavelet.streams import Coding, parse_streams
-from mcz.schema import parse, varint
-from mcz.transforms.dwt import own_range
-from mcz.transforms.wavelets import by_id
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.schema import parse, varint
 
 LEAST_RUN = 6  # zeros; shorter runs are written one by one, as published
 SEGMENT_BYTES = 2**40

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.angles import unwrap
 from mcz.bench.cases import Case, Variant, load
 from mcz.bench.measure import Record, write_file
+from mcz.kinematics.angles import unwrap
 
 
 def resolutions(case: Case, variant: Variant, params: Mapping[str, Any], joint: str) -> Record:

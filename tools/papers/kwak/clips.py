@@ -20,7 +20,7 @@ import mcz
 from mcz.bench.cases import Case, find_cases
 from mcz.errors import MczError, OptionError
 from mcz.kinematics.marker_motion import in_positions
-from mcz.motion import Motion, Signal
+from mcz.model.motion import Motion, Signal
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from mcz.bench.measure import Record
 from mcz.codecs import codec_by_name
 from mcz.codecs.online.coder import Coder
 from mcz.codecs.online.units import INTRA, STR
-from mcz.live.writer import LiveWriter
-from mcz.motion import Motion
+from mcz.files.live.writer import LiveWriter
+from mcz.model.motion import Motion
 from tools.papers.kwak.clips import Clip, motion_in_positions
 from tools.papers.kwak.losses import pushed_by
 from tools.papers.kwak.measure import NAME, STEP_CM, Coded, code, dialed, live_basis, rate_point

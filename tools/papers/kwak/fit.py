@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.online.rate_control import FLOOR_CM
-from mcz.motion import Motion
+from mcz.model.motion import Motion
 from tools.papers.kwak.measure import code, errors
 
 Floats = NDArray[np.float64]

@@ -20,8 +20,8 @@ from mcz.codecs.contract import Codec, Layout, model_finder
 from mcz.codecs.online.units import INTRA, LTR, STR, parse_units
 from mcz.container.limits import BASE
 from mcz.errors import LostFrameError
-from mcz.motion import Motion
-from mcz.writing.signal_source import MemorySource
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import Motion
 from tools.papers.kwak.clips import Clip, motion_in_positions
 from tools.papers.kwak.measure import NAME, STEP_CM, dialed, errors
 

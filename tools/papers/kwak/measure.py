@@ -25,10 +25,10 @@ from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_f
 from mcz.codecs.online.units import Unit, parse_units
 from mcz.codecs.space_choices import live_sample
 from mcz.container.limits import BASE
-from mcz.motion import Motion
-from mcz.reading.sizes import clip_sizes
-from mcz.writing.planning import prepare
-from mcz.writing.signal_source import MemorySource
+from mcz.files.reading.sizes import clip_sizes
+from mcz.files.writing.planning import prepare
+from mcz.files.writing.signal_source import MemorySource
+from mcz.model.motion import Motion
 from tools.papers.curves import POINT_BYTES, live_seconds, point_of, walk
 from tools.papers.kwak.clips import Clip, motion_in_positions, source_of
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.formats import FORMATS
-from mcz.formats.arrays.layout import Kind, Piece
-from mcz.motion import Motion
-from mcz.schema import varint
+from mcz.model.motion import Motion
+from mcz.model.schema import varint
+from mcz.sources import FORMATS
+from mcz.sources.arrays.layout import Kind, Piece
 from tools.vectors.build.source_files import called
 
 SPEC = "Template of arrays; The bytes of arrays"

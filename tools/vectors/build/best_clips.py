@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from mcz.codecs.coding.fast.encoder import StreamBuilder
 from mcz.codecs.lossless.best_streams import AS_FAST, code_plan
 from mcz.codecs.lossless.echoes import Echo
-from mcz.coding.fast.encoder import StreamBuilder
-from mcz.numbers import Grid
+from mcz.model.numbers import Grid
 
 
 def build_stream(

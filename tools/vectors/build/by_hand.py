@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mcz.motion import Channel, Motion, Signal, Skeleton
+from mcz.model.motion import Channel, Motion, Signal, Skeleton
 
 FOLDER = Path(__file__).parent.parent / "by_hand"
 ASF = b"""\

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.formats import c3d
-from mcz.motion import Motion
+from mcz.model.motion import Motion
+from mcz.sources.c3d import c3d
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, real
 from tools.vectors.build.source_files import called
 

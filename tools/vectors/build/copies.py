@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from mcz.container import payloads
 from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
 from mcz.container.copies import Copy
-from mcz.schema import deflate, varint
+from mcz.model.schema import deflate, varint
 from tools.records import built
 from tools.vectors.build.files import Crafter
 

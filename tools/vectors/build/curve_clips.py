@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import raw
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.start_states import start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.curves import qbc, streams
 from mcz.codecs.parameters import SCALED
-from mcz.coding import mixing
-from mcz.coding.start_states import start_states
-from mcz.motion import Motion, Skeleton
-from mcz.schema import varint
+from mcz.model.motion import Motion, Skeleton
+from mcz.model.schema import varint
 from tools.vectors.build.files import partial
 
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has

@@ -10,7 +10,7 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
-from mcz.schema import varint
+from mcz.model.schema import varint
 from tools.records import span
 
 Edit = Callable[[bytes], bytes]

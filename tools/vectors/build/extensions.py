@@ -9,8 +9,8 @@ from functools import partial
 from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.metadata import Record
-from mcz.motion import Motion
-from mcz.schema import EXTENDED
+from mcz.model.motion import Motion
+from mcz.model.schema import EXTENDED
 from tools.records import built, extend
 from tools.vectors.build import copies, metadata
 from tools.vectors.build.edits import Made, both, plus

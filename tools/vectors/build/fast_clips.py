@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.fast.head_kernels import TAP_UNIT, scale_of
-from mcz.coding.forms.counts import Law
-from mcz.coding.forms.ids import form_of_grid
-from mcz.numbers import Grid
-from mcz.schema import varint
+from mcz.codecs.coding.fast.head_kernels import TAP_UNIT, scale_of
+from mcz.codecs.coding.forms.counts import Law
+from mcz.codecs.coding.forms.ids import form_of_grid
+from mcz.model.numbers import Grid
+from mcz.model.schema import varint
 from tools.vectors.build import fast_heads
 
 if TYPE_CHECKING:
-    from mcz.coding.fast.survey_kernels import CodedLanes
+    from mcz.codecs.coding.fast.survey_kernels import CodedLanes
 
 Ints = NDArray[np.int64]
 # Forms; 1 to 15: digits of base 10.
@@ -141,7 +141,7 @@ def _head_of(head: Head, grid: Grid, column: Ints) -> bytes | _Lane:
 
 
 def _lane(coded: Coded, grid: Grid, numbers: list[int]) -> _Lane:
-    from mcz.coding.fast import tail_kernels as tail
+    from mcz.codecs.coding.fast import tail_kernels as tail
 
     form = form_of_grid(grid) if coded.form is None else coded.form
     base, digits, top = 0, 0, 0
@@ -176,8 +176,8 @@ def _predicted(
     lanes: Sequence[_Lane], places: Sequence[tuple[int, int]], columns: Ints
 ) -> CodedLanes:
     """The lanes as they are written, whose ``columns`` become tails; heads have all fields then."""
-    from mcz.coding.fast import tail_kernels as tail
-    from mcz.coding.fast import write_kernels as write
+    from mcz.codecs.coding.fast import tail_kernels as tail
+    from mcz.codecs.coding.fast import write_kernels as write
 
     lattices = np.array([lane.lattice for lane in lanes], np.int64)
     leads = np.zeros(columns.shape, np.int32)
@@ -225,7 +225,7 @@ def _left(leads: Ints, taps: Sequence[int]) -> Ints:
 
 def _parts(lanes: CodedLanes, columns: Ints, start: int, stop: int) -> list[bytes]:
     """Residuals and tails of lanes start <= l < stop."""
-    from mcz.coding.fast import write_kernels as write
+    from mcz.codecs.coding.fast import write_kernels as write
 
     room = np.zeros((2, (columns[start:stop].size + 1) * CODE_BYTES), np.uint8)
     sizes = write.write_parts(lanes, columns, start, stop, room[0], room[1])

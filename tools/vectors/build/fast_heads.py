@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.schema import varint
+from mcz.model.schema import varint
 
 CODED, CONSTANT, COPY, STEPS = range(4)  # bits 0 and 1 of ``kind``
 PREDICTOR = 2  # shift; 2 bits

@@ -45,10 +45,10 @@ from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, m
 from mcz.container.value_hash import canonical, value_hash
 from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import deflate, parse, varint
-from mcz.writing.clip_writer import ClipCopy, Decoded, write_plan
-from mcz.writing.planning import Prepared, SignalPlan, plan_clip
+from mcz.files.writing.clip_writer import ClipCopy, Decoded, write_plan
+from mcz.files.writing.planning import Prepared, SignalPlan, plan_clip
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.schema import deflate, parse, varint
 from tools.records import built, id_of, update
 from tools.vectors.build.edits import Edit, Made, put
 

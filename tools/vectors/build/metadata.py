@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from mcz.container import payloads
 from mcz.container.dictionary_deflate import words
 from mcz.container.metadata import Record, record_bytes
-from mcz.schema import deflate
+from mcz.model.schema import deflate
 from tools.records import built
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
+from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
 
 HUNDREDTHS = Grid(GridKind.FIXED, 2)
 INFINITE, NOT_A_NUMBER = float("inf"), float("nan")

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs.basis_models import Basis
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.residuals import N_CONTEXTS, N_MIXERS, code_residual
+from mcz.codecs.coding.start_states import start_states
 from mcz.codecs.contract import Segment
 from mcz.codecs.online.units import Unit, build_units
-from mcz.coding import mixing
-from mcz.coding.residuals import N_CONTEXTS, N_MIXERS, code_residual
-from mcz.coding.start_states import start_states
 from tools.vectors.build import spatial_clips
 from tools.vectors.build.spatial_clips import FRAME, Ints, waves
 

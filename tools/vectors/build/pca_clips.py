@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import raw
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import scale_of
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.pca import kernels, pca
 from mcz.codecs.table_kernels import code_table
-from mcz.coding import mixing
-from mcz.coding.start_states import start_states
-from mcz.coding.streams import scale_of
-from mcz.schema import varint
+from mcz.model.schema import varint
 
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 Ints = NDArray[np.int64]

@@ -22,8 +22,8 @@ from mcz.codecs.posewave.exact_channels import build_exact, groups_of
 from mcz.codecs.posewave.header import Header, PosewaveHeader, parse_header
 from mcz.codecs.posewave.segment import Weights, encode_segment
 from mcz.codecs.posewave.segment_chain import SegmentChain
-from mcz.motion import Joint, Skeleton
-from mcz.numbers import Grid
+from mcz.model.motion import Joint, Skeleton
+from mcz.model.numbers import Grid
 from tools.records import built
 from tools.vectors.build.motions import channels
 

@@ -16,9 +16,9 @@ import numpy as np
 from mcz.codecs import codec_by_name, raw
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import SCALED
-from mcz.motion import Motion, Signal
-from mcz.numbers import Grid, GridKind
-from mcz.transforms.wavelets import Wavelet
+from mcz.codecs.transforms.wavelets import Wavelet
+from mcz.model.motion import Motion, Signal
+from mcz.model.numbers import Grid, GridKind
 from tools.vectors.build import (
     curve_clips,
     online_clips,

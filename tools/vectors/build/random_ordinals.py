@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import codec_by_name, raw
+from mcz.codecs.coding.forms.ids import form_of_grid
 from mcz.codecs.contract import Encoded, Segment
-from mcz.coding.forms.ids import form_of_grid
-from mcz.motion import Exceptions, Motion, Signal
-from mcz.numbers import Grid, GridFlag, GridKind
+from mcz.model.motion import Exceptions, Motion, Signal
+from mcz.model.numbers import Grid, GridFlag, GridKind
 from tools.vectors.build import (
     best_clips,
     fast_clips,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec
-from mcz.motion import CHANNEL_KINDS, Channel, Joint, Motion, Skeleton
+from mcz.model.motion import CHANNEL_KINDS, Channel, Joint, Motion, Skeleton
 
 Chance = random.Random
 Ints = NDArray[np.int64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from mcz.editing.archive import append
-from mcz.editing.rewriting import protect
+from mcz.files.editing.archive import append
+from mcz.files.editing.rewriting import protect
 
 
 def protected(data: bytes, redundancy: float, behind: bytes = b"") -> bytes:

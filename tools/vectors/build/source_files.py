@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.codecs.contract import Codec
-from mcz.formats import FORMATS, bvh
-from mcz.motion import Motion, Signal
-from mcz.numbers import Grid
+from mcz.model.motion import Motion, Signal
+from mcz.model.numbers import Grid
+from mcz.sources import FORMATS
+from mcz.sources.text import bvh
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.edits import Edit
 from tools.vectors.build.wavelet_clips import Plan, Wave

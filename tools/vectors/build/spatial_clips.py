@@ -31,8 +31,8 @@ from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
 from mcz.codecs.spatial import lsdt_frame, window_streams
 from mcz.codecs.spatial.prefix_streams import codes_from, fields_of
 from mcz.codecs.spatial.windows import WindowsHeader
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.schema import parse, varint
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.schema import parse, varint
 from tools.vectors.build.files import file_of
 
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has

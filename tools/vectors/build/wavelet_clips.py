@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import raw
+from mcz.codecs.coding import mixing
+from mcz.codecs.coding.start_states import start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.parameters import SCALED
+from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms.wavelets import Wavelet, by_id
 from mcz.codecs.wavelet import mrdwt, streams
-from mcz.coding import mixing
-from mcz.coding.start_states import start_states
-from mcz.motion import Motion
-from mcz.schema import varint
-from mcz.transforms import dwt
-from mcz.transforms.wavelets import Wavelet, by_id
+from mcz.model.motion import Motion
+from mcz.model.schema import varint
 from tools.vectors.build.files import file_of, partial
 
 HEADING = "Codec 16: wavelet"

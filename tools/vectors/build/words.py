@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mcz.container import payloads
 from mcz.container.dictionary_deflate import PACKED, words
-from mcz.schema import deflate, inflate, parse, varint
+from mcz.model.schema import deflate, inflate, parse, varint
 from tools.records import built
 
 BEYOND = 32768  # a distance that the words are too few for

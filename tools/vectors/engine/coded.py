@@ -18,11 +18,11 @@ from mcz.container import payloads
 from mcz.container.limits import BASE, LARGE
 from mcz.container.segments import SegmentHeader
 from mcz.container.skeletons import parse_skeleton
-from mcz.motion import Motion, Signal, Skeleton
-from mcz.schema import parse
-from mcz.types import Params
-from mcz.writing.clip_writer import ClipCopy, Decoded, write_plan
-from mcz.writing.planning import Prepared, SignalPlan, plan_clip
+from mcz.files.writing.clip_writer import ClipCopy, Decoded, write_plan
+from mcz.files.writing.planning import Prepared, SignalPlan, plan_clip
+from mcz.model.motion import Motion, Signal, Skeleton
+from mcz.model.schema import parse
+from mcz.model.types import Params
 from tools.vectors.build.edits import both, put
 from tools.vectors.build.files import Crafter, finished
 from tools.vectors.engine.notation import read_bytes

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from mcz.container.chunks import Chunk, ChunkFlag
 from mcz.container.index_records import Index
 from mcz.container.packets import implied_by
-from mcz.schema import build, read_varint, varint
+from mcz.model.schema import build, read_varint, varint
 from tools.vectors.engine.fields import SCHEMAS, STREAMS, VIEWS, place_of, swapped
 from tools.vectors.engine.layout import (
     Layout,

@@ -1,4 +1,4 @@
-"""Fields of records and slices of bytes: the one place of the engine that knows ``mcz.schema``."""
+"""Fields of records and slices of bytes: the engine's one user of ``mcz.model.schema``."""
 
 from __future__ import annotations
 
@@ -16,12 +16,7 @@ from mcz.codecs.wavelet.wavelet import WaveletHeader
 from mcz.container import index_records, note_records, payloads
 from mcz.container.dictionary_deflate import decoded, words
 from mcz.container.index_records import Index
-from mcz.formats import notes
-from mcz.formats.arrays.layout import ArrayTemplate
-from mcz.formats.c3d_layout import C3dDetail, C3dOutputsTemplate, C3dTemplate
-from mcz.formats.layout import Detail, Template
-from mcz.formats.table_layout import TableDetail, TableTemplate
-from mcz.schema import (
+from mcz.model.schema import (
     Record,
     build,
     counted,
@@ -32,6 +27,11 @@ from mcz.schema import (
     read_varint,
     varint,
 )
+from mcz.sources.arrays.layout import ArrayTemplate
+from mcz.sources.c3d.layout import C3dDetail, C3dOutputsTemplate, C3dTemplate
+from mcz.sources.tables.layout import TableDetail, TableTemplate
+from mcz.sources.text import notes
+from mcz.sources.text.layout import Detail, Template
 from tools.records import built, span
 
 SCHEMAS: dict[str, Any] = {

@@ -42,7 +42,7 @@ from mcz.container.segments import SegmentHeader, build_segment, mask_of
 from mcz.container.segments import parse_header as parse_segment
 from mcz.container.source import open_source
 from mcz.errors import FormatError, MczError, TruncatedError
-from mcz.schema import EXTENDED, build, deflate, parse, read_varint
+from mcz.model.schema import EXTENDED, build, deflate, parse, read_varint
 from tools.records import id_of
 
 SHARED = (b"SKEL", b"MODL", b"SRCE")

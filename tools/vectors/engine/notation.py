@@ -10,7 +10,7 @@ import struct
 import zlib
 from collections.abc import Callable, Mapping
 
-from mcz.schema import deflate, varint
+from mcz.model.schema import deflate, varint
 
 TOKEN = re.compile(
     r"""\s*(?:

@@ -17,9 +17,9 @@ from mcz.codecs.contract import model_id
 from mcz.container import payloads
 from mcz.container.chunks import ChunkFlag, build_foot
 from mcz.container.packets import END, Packet, build_packet
-from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.numbers import Grid, GridKind
-from mcz.schema import inflate, parse
+from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.model.numbers import Grid, GridKind
+from mcz.model.schema import inflate, parse
 from tools.records import built, extend
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.edits import Made, at, both, headed, plus, put, swap

@@ -23,9 +23,9 @@ from mcz.container.segments import FRESH, SegmentHeader
 from mcz.container.time_base import missing_runs
 from mcz.container.value_hash import value_hash
 from mcz.container.versions import FORMAT
-from mcz.motion import Motion
-from mcz.schema import build, deflate, parse, varint
-from mcz.writing.clip_writer import write_skeleton
+from mcz.files.writing.clip_writer import write_skeleton
+from mcz.model.motion import Motion
+from mcz.model.schema import build, deflate, parse, varint
 from tools.records import built, extend
 from tools.vectors.build.edits import both, plus, put
 from tools.vectors.build.files import Crafter, Vector, arrays, partial

@@ -1,4 +1,4 @@
-// Frame time as printed -> frames a second: the rule of mcz/formats/rates.py.
+// Frame time as printed -> frames a second: the rule of mcz/sources/rates.py.
 
 import { numberOf } from "./lines.js";
 

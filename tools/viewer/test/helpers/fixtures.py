@@ -13,9 +13,9 @@ import mcz
 from mcz.codecs import codec_by_name
 from mcz.container.limits import LARGE
 from mcz.container.writer import Writer
-from mcz.motion import Motion, Signal
-from mcz.sample import acclaim_walk, sample_files
-from mcz.writing.clip_writer import write_clip
+from mcz.files.writing.clip_writer import write_clip
+from mcz.model.motion import Motion, Signal
+from mcz.sources.sample import acclaim_walk, sample_files
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",

@@ -1,0 +1,254 @@
+"""Read the streams of groups of one segment.
+
+SPEC.md, "Codec 1: fast", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.coding.fast.lanes import Lanes, read_lanes
+from mcz.codecs.coding.forms.ids import WITH_UNIT, form_of_grid
+from mcz.codecs.coding.forms.units import parse_mapping
+from mcz.errors import FormatError
+from mcz.kernels import lacks_compiled_kernels
+from mcz.model.numbers import Grid
+
+Ints = NDArray[np.int64]
+Fetch = Callable[[int], bytes]  # a group -> its stream
+
+MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
+MOST_KNOWN = 64  # requests of which a shape keeps the columns
+SPARE = 16  # bytes behind the streams that a window may reach
+FAULTS = (
+    "it ends in the head",
+    "its kind is unknown",
+    "an ordinal is not as short as it can be",
+    "its runs are not the rows of the segment",
+    "its form is unknown",
+    "its greatest class is out of range",
+    "its first lead is out of range",
+    "its scale is out of range",
+    "its weight is out of range",
+    "an exception is not in the segment",
+    "bytes follow the heads",
+    "its parent or source does not exist",
+    "its parent is not another coded channel",
+    "its source is a copy",
+    "its group has parents in more than two others",
+)
+
+
+@cache
+def kernels() -> tuple[ModuleType, ...]:
+    """The compiled loops, imported on first use: of heads, columns, lanes, residuals and tails."""
+    from mcz.codecs.coding.fast import (
+        column_kernels,
+        head_kernels,
+        lane_kernels,
+        residual_kernels,
+        tail_kernels,
+    )
+
+    return head_kernels, column_kernels, lane_kernels, residual_kernels, tail_kernels
+
+
+class Shape:
+    """A signal as its decoder knows it: grids of its channels in CLIP, their forms, its groups."""
+
+    def __init__(self, grids: Sequence[Grid], groups: Sequence[Sequence[int]]) -> None:
+        self.grids, self.groups = grids, groups
+        forms = [form_of_grid(grid) for grid in grids]  # FAST-28
+        self.forms = np.array(forms, np.int64)
+        self._known: dict[tuple[int, ...], Columns] = {}
+
+    def columns(self, groups: tuple[int, ...]) -> Columns:
+        """The channels of groups, one group after the other; raises FormatError."""
+        found = self._known.get(groups)
+        if found is None:
+            if (most := max(groups, default=0)) >= max(1, len(self.groups)):  # FAST-27, FAST-34
+                raise FormatError(f"fast: group {most} of {len(self.groups)}")
+            channels = np.array([c for group in groups for c in self.groups[group]], np.int64)
+            firsts = np.cumsum([0, *(len(self.groups[group]) for group in groups)])
+            places = np.full(len(self.groups), -1)
+            places[list(groups)] = np.arange(len(groups))
+            found = Columns(
+                channels, self.forms[channels], firsts, np.array(groups, np.int64), places
+            )
+            if len(self._known) < MOST_KNOWN:
+                self._known[groups] = found
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """The channels of some groups: numbers in the signal, and forms.
+
+    ``firsts``: the first channel of each group, and the number of all; ``places``: where each
+    group of the signal is among ``groups``, or -1.
+    """
+
+    channels: Ints
+    forms: Ints
+    firsts: Ints
+    groups: Ints
+    places: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Heads:
+    """The heads of some groups of a segment, one after the other.
+
+    ``plans``: a row a channel, as head_kernels has it; ``parts``: where residuals, tails and what
+    follows them begin.
+    """
+
+    groups: tuple[int, ...]
+    columns: Columns
+    data: bytes  # their streams, and some more
+    plans: Ints
+    parts: Ints
+
+    def absent(self, kind: int) -> list[int]:
+        """The groups that are not here and that copies or, of coded channels, parents are of."""
+        own = kernels()[0]
+        named = self.plans[self.plans[:, own.KIND] == kind, own.GROUP]
+        return sorted(set(named[named >= 0].tolist()).difference(self.groups))
+
+    def fault(self, channel: int, fault: int) -> FormatError:
+        at = int(np.searchsorted(self.columns.firsts, channel, "right")) - 1
+        where = f"channel {channel - self.columns.firsts[at]} of group {self.groups[at]}"
+        return FormatError(f"fast: {where}: {FAULTS[fault]}")
+
+
+def check_size(n_rows: int, n_channels: int, n_frames: int) -> None:
+    """Raise FormatError for a segment that is larger than any."""
+    if (n_rows > MOST_ROWS and n_frames > 1) or n_rows * n_channels > MOST_VALUES:
+        raise FormatError(f"fast: a segment of {n_rows} rows and {n_channels} channels")  # FAST-18
+
+
+def read_heads(shape: Shape, groups: tuple[int, ...], fetch: Fetch, n_rows: int) -> Heads:
+    """The heads of groups; raises FormatError for what is none."""
+    own = kernels()[0]
+    columns = shape.columns(groups)
+    streams = [fetch(group) for group in groups]
+    bounds = np.cumsum([0, *map(len, streams)])
+    data = b"".join((*streams, bytes(SPARE)))
+    plans = np.zeros((len(columns.channels), own.PLAN_SIZE), np.int64)
+    parts = np.zeros((len(groups), 3), np.int64)
+    parts[:, 2] = bounds[1:]
+    found = Heads(groups, columns, data, plans, parts)
+    text = np.frombuffer(data, np.uint8)
+    channel, fault = own.read_heads(
+        text, bounds, columns.firsts, n_rows, columns.forms, plans, parts
+    )
+    if channel >= 0:
+        raise found.fault(channel, fault)
+    return found
+
+
+def read_heads_of(
+    shape: Shape, wanted: tuple[int, ...], fetch: Fetch, n_rows: int
+) -> tuple[Heads, int]:
+    """The heads of groups, then of those that copies name, then of those that have parents.
+
+    Also the number of groups before the last.
+    """
+    own = kernels()[0]
+    heads = read_heads(shape, wanted, fetch, n_rows)
+    if len(wanted) == len(shape.groups):
+        return heads, len(wanted)
+    if absent := heads.absent(own.COPY):
+        heads = read_heads(shape, (*wanted, *absent), fetch, n_rows)
+    n_whole = len(heads.groups)
+    if absent := heads.absent(own.CODED):
+        heads = read_heads(shape, (*heads.groups, *absent), fetch, n_rows)
+    return heads, n_whole
+
+
+class SegmentDecoder:
+    """Decodes some groups of a segment: heads first, then lanes, then what follows from these."""
+
+    def __init__(self, shape: Shape, wanted: tuple[int, ...], fetch: Fetch, out: Ints) -> None:
+        """``out``: (rows, channels of the groups ``wanted``). Raises FormatError."""
+        lane = kernels()[2]
+        heads, n_whole = read_heads_of(shape, wanted, fetch, len(out))
+        columns = heads.columns
+        channel, fault = lane.link(
+            heads.plans, columns.firsts, columns.groups, columns.places, len(wanted), n_whole
+        )
+        if channel >= 0:
+            raise heads.fault(channel, fault)
+        self.shape, self.heads, self.out = shape, heads, out
+        self.n_channels = int(columns.firsts[n_whole])
+        is_exact = self.n_channels == out.shape[1]
+        self.rows = out if is_exact else np.empty((len(out), self.n_channels), np.int64)
+        self.lanes = _lanes_of(heads, n_whole, self.rows)
+
+    def finish(self) -> None:
+        """Fill ``out``, after the lanes were decoded."""
+        self._map_units()
+        n_wanted = self.out.shape[1]
+        kernels()[1].fill_columns(self.lanes.data, self.heads.plans, n_wanted, self.rows)
+        if self.rows is not self.out:
+            self.out[:] = self.rows[:, :n_wanted]
+
+    def _map_units(self) -> None:
+        """Turn the leads of lanes with units into ordinals."""
+        own, _, _, residual, _ = kernels()
+        plans = self.heads.plans
+        n_whole = len(self.lanes.tails)
+        columns = self.lanes.columns[: self.lanes.starts[n_whole]]
+        forms = plans[columns, own.FORM]
+        for number in np.flatnonzero((forms >= WITH_UNIT[0]) & (forms <= WITH_UNIT[-1])).tolist():
+            plan, column = plans[columns[number]], self.rows[:, columns[number]]
+            grid = self.shape.grids[self.heads.columns.channels[columns[number]]]
+            at, form = int(plan[own.FIELDS]), int(plan[own.FORM])
+            mapping, has_rests, _ = parse_mapping(self.heads.data, at, form, grid)
+            assert mapping is not None
+            leads = self.lanes.leads[residual.BEHIND :, number].astype(np.int64)
+            ordinals = mapping(leads)  # FAST-48, FAST-51, FAST-54
+            column[:] = ordinals + column if has_rests else ordinals
+
+
+def _lanes_of(heads: Heads, n_whole: int, out: Ints) -> Lanes:
+    own, _, lane, residual, tail = kernels()
+    n_lanes = int(np.sum(heads.plans[:, own.KIND] == own.CODED))
+    starts, columns = np.empty(len(heads.groups) + 1, np.int64), np.empty(n_lanes, np.int64)
+    lattices = np.zeros((n_lanes, tail.LATTICE_SIZE), np.int64)
+    predictors = residual.predictors_of(n_lanes)
+    lane.fill_lanes(heads.plans, heads.columns.firsts, starts, predictors, lattices, columns)
+    leads = np.empty((residual.BEHIND + len(out), n_lanes), np.int32)
+    bits = 8 * heads.parts
+    data = np.frombuffer(heads.data, np.uint8)
+    return Lanes(
+        data, bits[:, :2], bits[:n_whole, 1:], starts, columns, predictors, lattices, leads, out
+    )
+
+
+def read_segments(segments: Sequence[SegmentDecoder]) -> None:
+    """Fill the rows of segments, several at a time; raises FormatError for bad bytes."""
+    if lacks_compiled_kernels():
+        from mcz.codecs.coding.fast.numpy_decoder import read_all  # where it is needed alone
+
+        read_all([segment.lanes for segment in segments])
+    else:
+        for segment in segments:
+            read_lanes(segment.lanes)
+    for segment in segments:
+        segment.finish()
+
+
+def read_alone(shape: Shape, stream: bytes, n_rows: int) -> Ints:
+    """The ordinals of the only group of a signal in a segment; raises FormatError."""
+    n_channels = len(shape.grids)
+    check_size(n_rows, n_channels, n_rows)
+    out = np.empty((n_rows, n_channels), np.int64)
+    read_segments([SegmentDecoder(shape, (0,), lambda group: stream, out)])
+    return out

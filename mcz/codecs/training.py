@@ -1,0 +1,308 @@
+"""Training sets: the positions of clips from which bases are learned, and the learning of them.
+
+``mcz train`` and ``tools/train_lsdt.py`` are thin over this module. Positions are in centimeters
+where the unit of every clip is known, else in the common unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.basis_models import build_bases
+from mcz.codecs.gaps import fill_gaps
+from mcz.codecs.transforms.dct import dct_matrix
+from mcz.codecs.transforms.lsdt import GROWTH, ITERATIONS, SPARSITY, Learned, learn_bases
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics import point_names, positions
+from mcz.model.motion import Motion
+from mcz.model.skeleton import column_of
+from mcz.model.types import JsonObject
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+KINDS = ("frames", "steps", "windows")
+STEP_FRAMES = 8  # of a step: short against a movement, long against the noise of a capture
+WINDOW_FRAMES, WINDOW_KEPT = 120, 12  # of a window; its later coefficients hold next to nothing
+SIDES = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingSet:
+    """Clips of one set of points, each float64 (n_frames, J, 3), without missing points.
+
+    ``up`` is "x" to "-z"; ``unit`` is "cm", or "" where the clips do not say theirs.
+    ``n_filled`` counts the frames in which a point was missing; it lies on a straight line there,
+    as the codecs fill gaps.
+    """
+
+    names: tuple[str, ...]
+    clips: tuple[Floats, ...]
+    up: str
+    unit: str
+    n_filled: int = 0
+
+    @property
+    def n_frames(self) -> int:
+        return sum(map(len, self.clips))
+
+
+def training_set(motions: Iterable[Motion]) -> TrainingSet:
+    """The positions of ``motions``.
+
+    Raises MotionError where their points, their up axes or what is known of their units differ,
+    where a motion has no positions, and where no position is known.
+    """
+    first: tuple[str, TrainingSet] | None = None
+    clips: list[Floats] = []
+    n_filled = 0
+    for motion in motions:
+        found = _of_one(motion)
+        if first is None:
+            first = motion.name, found
+        _check_alike(first, (motion.name, found))
+        clips.extend(found.clips)
+        n_filled += found.n_filled
+    if first is None:
+        raise MotionError("training needs at least one clip")
+    if not any(clip.any() for clip in clips):
+        raise MotionError("training needs at least one frame with points")
+    return replace(first[1], clips=tuple(clips), n_filled=n_filled)
+
+
+def _of_one(motion: Motion) -> TrainingSet:
+    skeleton = motion.skeleton
+    points = positions(motion)
+    if not points.shape[1]:
+        raise MotionError(f"motion {motion.name!r} has no points to train on")
+    rows = points.reshape(len(points), 3 * points.shape[1])
+    known = np.isfinite(rows)
+    filled = fill_gaps(rows, known, np.full(rows.shape[1], np.nan))
+    clip = filled.reshape(points.shape) * (skeleton.unit_cm or 1.0)
+    n_filled = int((~known.all(axis=1)).sum())
+    unit = "cm" if skeleton.unit_cm else ""
+    return TrainingSet(point_names(skeleton), (clip,), skeleton.up_axis or "y", unit, n_filled)
+
+
+def _check_alike(first: tuple[str, TrainingSet], other: tuple[str, TrainingSet]) -> None:
+    (name_a, a), (name_b, b) = first, other
+    names = f"motions {name_a!r} and {name_b!r}"
+    if len(a.names) != len(b.names):
+        raise MotionError(f"{names} have {len(a.names)} and {len(b.names)} points; one set is due")
+    if a.names != b.names:
+        at = next(
+            i for i, pair in enumerate(zip(a.names, b.names, strict=True)) if len({*pair}) > 1
+        )
+        raise MotionError(f"{names} differ in point {at}: {a.names[at]!r} and {b.names[at]!r}")
+    if a.up != b.up:
+        raise MotionError(f"{names} have the up axes {a.up} and {b.up}")
+    if a.unit != b.unit:
+        raise MotionError(f"of {names} one has a length unit, the other has none")
+
+
+def mirrored(found: TrainingSet) -> TrainingSet:
+    """``found`` and its mirror image: left points become right ones, x is negated (z if x is up).
+
+    Raises OptionError where no two points have names that differ in their side alone.
+    """
+    order = mirror_order(found.names)
+    if order == list(range(len(order))):
+        raise OptionError("no two points have names that differ in left and right alone")
+    axis = 2 if column_of(found.up) == 0 else 0
+    images = []
+    for clip in found.clips:
+        image = clip[:, order]
+        image[:, :, axis] *= -1
+        images.append(image)
+    return replace(found, clips=(*found.clips, *images))
+
+
+def mirror_order(names: Sequence[str]) -> list[int]:
+    """Counterpart of each point on the other side, itself for none.
+
+    >>> mirror_order(["root", "lfoot", "rfoot", "lowerback", "LeftHand", "RightHand"])
+    [0, 2, 1, 3, 5, 4]
+    """
+    index = {name: i for i, name in enumerate(names)}
+    order = list(range(len(names)))
+    for left, right in SIDES:
+        for i, name in enumerate(names):
+            if name.startswith(left) and (other := right + name[len(left) :]) in index:
+                order[i], order[index[other]] = index[other], i
+    return order
+
+
+def turned(found: TrainingSet, n_turns: int) -> TrainingSet:
+    """``found`` in ``n_turns`` headings, 180 / ``n_turns`` degrees apart about the up axis.
+
+    Half a turn negates the coordinates, which no basis minds, so half a circle holds all headings.
+    """
+    if n_turns < 1:
+        raise OptionError(f"{n_turns} headings; at least one is needed")
+    up = column_of(found.up)
+    a, b = (up + 1) % 3, (up + 2) % 3
+    clips = []
+    for turn in range(n_turns):
+        angle = np.pi * turn / n_turns
+        for clip in found.clips:
+            image = clip.copy()
+            image[:, :, a] = np.cos(angle) * clip[:, :, a] - np.sin(angle) * clip[:, :, b]
+            image[:, :, b] = np.sin(angle) * clip[:, :, a] + np.cos(angle) * clip[:, :, b]
+            clips.append(image)
+    return replace(found, clips=tuple(clips))
+
+
+def frames_of(found: TrainingSet, every: int = 1) -> Floats:
+    """All frames of the clips, or every so many of each, (N, J, 3)."""
+    if every < 1:
+        raise OptionError(f"every {every} frames; 1 means all of them")
+    return np.concatenate([clip[::every] for clip in found.clips])
+
+
+def window_coefficients(found: TrainingSet, n_frames: int, n_kept: int) -> Floats:
+    """The first ``n_kept`` DCT coefficients of windows of ``n_frames``, as frames (N, J, 3).
+
+    What is left of a clip behind its last whole window is a window of its own, scaled by its own
+    length; of fewer frames than ``n_kept`` it has as many coefficients.
+    """
+    if n_frames < 1 or n_kept < 1:
+        raise OptionError(f"windows of {n_frames} frames, {n_kept} coefficients of each")
+    parts = []
+    for clip in found.clips:
+        for start in range(0, len(clip), n_frames):
+            window = clip[start : start + n_frames]
+            parts.append(np.einsum("kf,fja->kja", dct_matrix(len(window))[:n_kept], window))
+    return np.concatenate(parts)
+
+
+def steps(found: TrainingSet, n_frames: int, every: int = 1) -> Floats:
+    """Displacements of points in ``n_frames``, from every frame or every so many, (N, J, 3)."""
+    if n_frames < 1 or every < 1:
+        raise OptionError(f"steps of {n_frames} frames from every {every} frames")
+    return np.concatenate([(clip[n_frames:] - clip[:-n_frames])[::every] for clip in found.clips])
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """Options of learning a basis; ``learn_basis`` has the first four.
+
+    ``kind``, one of ``KINDS``, is what is to become sparse: "frames" as they are, "steps" from one
+    to a later one, DCT coefficients of "windows". ``mirror`` and ``headings`` add mirrored and
+    turned copies of the clips; ``every`` takes every so many frames, or steps, alone.
+
+    Why steps? A codec codes what changes: differences of frames, or windows of which all but one
+    coefficient in time are of movement. Bases learned from steps take fewer bits there at equal
+    error than those of the positions themselves, whose energy is where the figure stands.
+    """
+
+    sparsity: int = SPARSITY
+    iterations: int = ITERATIONS
+    growth: int = GROWTH
+    start: str = "dct"
+    kind: str = "steps"
+    mirror: bool = False
+    headings: int = 1
+    every: int = 1
+
+    def vectors(self, found: TrainingSet) -> Floats:
+        """Training vectors, (N, J, 3); raises OptionError for too short clips."""
+        if self.mirror:
+            found = mirrored(found)
+        found = turned(found, self.headings)
+        if self.kind == "steps":
+            vectors = steps(found, STEP_FRAMES, self.every)
+        elif self.kind == "windows":
+            vectors = window_coefficients(found, WINDOW_FRAMES, WINDOW_KEPT)
+        elif self.kind == "frames":
+            vectors = frames_of(found, self.every)
+        else:
+            raise OptionError(f"kind {self.kind!r} is not one of {', '.join(KINDS)}")
+        if not len(vectors):
+            raise OptionError(f"no clip is long enough for training on {self.kind}")
+        return vectors
+
+    def learn(self, found: TrainingSet, progress: Progress | None = None) -> Trained:
+        """The bases of x, y and z; raises OptionError as ``learn_basis`` does."""
+        vectors = self.vectors(found)
+
+        def told(done: int, at_most: int) -> None:
+            if progress is not None:
+                progress(done, at_most, f"learning from {len(vectors):,} vectors")
+
+        learned = learn_bases(
+            vectors,
+            sparsity=self.sparsity,
+            iterations=self.iterations,
+            growth=self.growth,
+            start=self.start,
+            progress=told,
+        )
+        return Trained(found, len(vectors), learned)
+
+
+# Of the bases of this package, for which tools/train_lsdt.py tries several starts and growths.
+SHIPPED = Recipe(kind="steps", mirror=True, headings=2, every=2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trained:
+    """Bases, one a coordinate, and what they were learned from."""
+
+    source: TrainingSet
+    n_vectors: int
+    learned: tuple[Learned, ...]
+
+    @property
+    def data(self) -> bytes:
+        """The bases in integers, as the data of a model of SPEC.md, "Bases"."""
+        return build_bases([found.basis for found in self.learned])
+
+    def better(self, other: Trained) -> Trained:
+        """Choose the better basis of each coordinate; raises OptionError if they do not compare.
+
+        Minima differ, even with growth, by some percent, and once in a while by more; which one is
+        reached hangs on the last digit of the start. So several are tried where it matters.
+        """
+        if self.n_vectors != other.n_vectors or self.source.names != other.source.names:
+            raise OptionError("bases that were learned from other vectors cannot be compared")
+        pairs = zip(self.learned, other.learned, strict=True)
+        best = (min(pair, key=lambda learned: float(learned.objective[-1])) for pair in pairs)
+        return replace(self, learned=tuple(best))
+
+    def left_out(self, found: Learned) -> Floats:
+        """Rms residual of a point with the start and after each iteration, in units."""
+        size = max(1, self.n_vectors * len(self.source.names))
+        rms: Floats = np.sqrt(found.objective / size)
+        return rms
+
+    def document(self) -> JsonObject:
+        """For JSON and people; ``left_out`` is rms, at the start and after each iteration."""
+        return {
+            "bytes": len(self.data),
+            "n_points": len(self.source.names),
+            "n_clips": len(self.source.clips),
+            "n_frames": self.source.n_frames,
+            "n_filled": self.source.n_filled,
+            "n_vectors": self.n_vectors,
+            "unit": self.source.unit or "length units",
+            "coordinates": [
+                {
+                    "iterations": found.n_iterations,
+                    "start": float(self.left_out(found)[0]),
+                    "end": float(self.left_out(found)[-1]),
+                    "left_out": self.left_out(found).tolist(),
+                }
+                for found in self.learned
+            ],
+        }
+
+
+def train(
+    motions: Iterable[Motion], recipe: Recipe | None = None, progress: Progress | None = None
+) -> Trained:
+    """Bases from ``motions``; raises MotionError and OptionError."""
+    return (recipe or Recipe()).learn(training_set(motions), progress)

@@ -1,0 +1,211 @@
+"""Learned spatial decorrelation: orthogonal bases that make the frames of a motion sparse.
+
+Algorithm 1 of J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, "Low-latency compression of mocap
+data using learned spatial decorrelation transform", CAGD 2016. A basis B (J, J) holds its vectors
+as rows; the coefficients of a frame m (J,) are B m. What is sought is the B for which the squares
+of all but the P largest coefficients of every frame sum to the least.
+
+The problem is not convex. Started as published, from DCT or Haar and with the final P, the
+algorithm stops in minima that differ by up to a factor of two; it is the start that decides which.
+So P grows here from 1 to its final value, some iterations each: the strongest directions are found
+first, and then the start matters much less (``mcz.codecs.training.Trained.better`` takes the
+best of several). ``growth`` 0 is the algorithm as published.
+
+Only encoders learn: a basis travels in a file, or is known by its hash, as integers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.transforms.dct import dct_matrix
+from mcz.errors import OptionError
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int], None]  # iterations done, iterations at most
+
+SPARSITY = 8  # coefficients kept of each frame of 31 points; the paper's best, Fig. 4
+ITERATIONS = 300
+GROWTH = 40  # iterations with each smaller sparsity, before these
+SETTLED = 1e-9  # smallest relative gain, over PATIENCE iterations, that is worth going on for
+PATIENCE = 10
+HAAR_LEVELS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learned:
+    """A basis, and how it was found.
+
+    ``basis`` float64 (J, J), orthogonal, its rows by falling energy of their coefficients over the
+    training frames, the entry of greatest magnitude of each positive. ``objective`` (K + 1,): the
+    squares that are left out, in squared units of the frames, summed over all frames, with the
+    start and after each of K iterations, always for the final sparsity.
+    """
+
+    basis: Floats
+    objective: Floats
+    n_growth: int  # of the first iterations, while P grew: only from there on nothing ever rises
+
+    @property
+    def n_iterations(self) -> int:
+        return len(self.objective) - 1
+
+
+def learn_basis(
+    frames: Floats,
+    *,
+    sparsity: int = SPARSITY,
+    iterations: int = ITERATIONS,
+    growth: int = GROWTH,
+    start: str | Floats = "dct",
+    progress: Progress | None = None,
+) -> Learned:
+    """A basis for ``frames``, float64 (N, J): N frames of one coordinate of J points.
+
+    ``sparsity`` is the paper's P, the number of coefficients kept of each frame, 1 to J; ``start``
+    is "dct", "haar" or an orthogonal matrix (J, J) with basis vectors as rows. At most
+    ``iterations`` with that sparsity, fewer where the objective has settled, after ``growth`` with
+    each smaller one. The same input gives the same bytes on the same machine. Raises OptionError
+    where there is no frame or a value is not finite, and for a sparsity, a number or a start that
+    does not fit.
+    """
+    from mcz.codecs.transforms.lsdt_kernels import truncate
+
+    rows = _checked_frames(frames)
+    n_points = rows.shape[1]
+    _check_options(sparsity, iterations, growth, n_points)
+    basis = start_basis(start, n_points)
+    columns = np.ascontiguousarray(rows.T)
+    products = np.empty((n_points, n_points))
+    kept = [n for n in range(1, sparsity) for _ in range(growth)]
+    n_growth, at_most = len(kept), len(kept) + iterations
+    kept += [sparsity] * (iterations + 1)
+    objective: list[float] = []
+    for done, n_kept in enumerate(kept):
+        objective.append(truncate(columns, rows, basis, n_kept, sparsity, products))
+        if progress is not None:
+            progress(done, at_most)
+        if done == at_most or has_converged(objective[n_growth:]):
+            break
+        basis = procrustes(products)
+    return Learned(order_basis(basis, rows), np.array(objective), n_growth)
+
+
+def learn_bases(
+    positions: Floats,
+    *,
+    sparsity: int = SPARSITY,
+    iterations: int = ITERATIONS,
+    growth: int = GROWTH,
+    start: str | Floats = "dct",
+    progress: Progress | None = None,
+) -> tuple[Learned, ...]:
+    """A basis for each coordinate of ``positions``, float64 (N, J, D); D is 3 for x, y and z.
+
+    ``progress`` counts the iterations of all. Otherwise as ``learn_basis``.
+    """
+    if positions.ndim != 3:
+        raise OptionError(f"positions have shape {positions.shape}, not (frames, points, axes)")
+    n_axes = positions.shape[2]
+    bases: list[Learned] = []
+    while len(bases) < n_axes:
+
+        def told(done: int, at_most: int, before: int = len(bases)) -> None:
+            if progress is not None:
+                progress(before * at_most + done, n_axes * at_most)
+
+        bases.append(
+            learn_basis(
+                positions[:, :, len(bases)],
+                sparsity=sparsity,
+                iterations=iterations,
+                growth=growth,
+                start=start,
+                progress=told,
+            )
+        )
+    return tuple(bases)
+
+
+def procrustes(products: Floats) -> Floats:
+    """The orthogonal B (J, J) for which the sum of |B m - e|^2 is the least.
+
+    ``products`` (J, J) is the sum of e m^T over the frames. With its decomposition V S U^T, which
+    is that of equation 10 transposed, B is V U^T (equation 11).
+    """
+    left, _, right = np.linalg.svd(products)
+    return np.ascontiguousarray(left @ right)
+
+
+def has_converged(objective: Sequence[float]) -> bool:
+    """Return True if the last ``PATIENCE`` iterations gained next to nothing."""
+    if len(objective) <= PATIENCE:
+        return False
+    before = objective[-1 - PATIENCE]
+    return before - objective[-1] <= SETTLED * before
+
+
+def order_basis(basis: Floats, frames: Floats) -> Floats:
+    """``basis`` with its rows by falling energy over ``frames`` (N, J), and with fixed signs.
+
+    The entry of greatest magnitude of a row, the first of equal ones, becomes positive.
+    """
+    energy = np.einsum("ki,ij,kj->k", basis, frames.T @ frames, basis)
+    basis = basis[np.argsort(-energy, kind="stable")]
+    peaks = np.take_along_axis(basis, np.abs(basis).argmax(axis=1)[:, None], axis=1)
+    return np.ascontiguousarray(np.where(peaks < 0, -basis, basis))
+
+
+def start_basis(start: str | Floats, n_points: int) -> Floats:
+    """The orthogonal matrix (J, J) that ``start`` names or is."""
+    if not isinstance(start, str):
+        matrix = np.ascontiguousarray(start, np.float64)
+        if matrix.shape != (n_points, n_points):
+            raise OptionError(f"start has shape {matrix.shape}, not {n_points} x {n_points}")
+        if not np.abs(matrix @ matrix.T - np.eye(n_points)).max(initial=0.0) <= 1e-6:
+            raise OptionError("start is not an orthogonal matrix")
+        return matrix
+    if start not in STARTS:
+        raise OptionError(f"start {start!r} is not one of {', '.join(STARTS)}")
+    return STARTS[start](n_points)
+
+
+def haar_basis(n_points: int) -> Floats:
+    """The orthonormal Haar transform of three levels, (J, J), for any number of points.
+
+    A level turns neighbors a, b into (a + b) / sqrt(2) and (a - b) / sqrt(2); where the number is
+    odd, the last goes on to the next level as it is. Rows: what is left after the last level, then
+    the differences from the last level to the first. Fewer levels where one point is left.
+    """
+    approx: list[Floats] = list(np.eye(n_points))
+    details: list[Floats] = []
+    for _ in range(HAAR_LEVELS):
+        pairs = list(zip(approx[::2], approx[1::2], strict=False))
+        odd = approx[2 * len(pairs) :]
+        approx = [(a + b) / np.sqrt(2) for a, b in pairs] + odd
+        details = [(a - b) / np.sqrt(2) for a, b in pairs] + details
+    return np.array(approx + details)
+
+
+STARTS: dict[str, Callable[[int], Floats]] = {"dct": dct_matrix, "haar": haar_basis}
+
+
+def _check_options(sparsity: int, iterations: int, growth: int, n_points: int) -> None:
+    if not 1 <= sparsity <= n_points:
+        raise OptionError(f"sparsity {sparsity} is not 1 to {n_points}, the number of points")
+    if iterations < 0 or growth < 0:
+        raise OptionError(f"iterations {iterations} and growth {growth} must not be negative")
+
+
+def _checked_frames(frames: Floats) -> Floats:
+    """``frames`` as float64 (N, J) in row order; raises OptionError where they cannot be used."""
+    if frames.ndim != 2 or not frames.size:
+        raise OptionError(f"frames have shape {frames.shape}; at least one of one point is needed")
+    rows = np.ascontiguousarray(frames, np.float64)
+    if not np.isfinite(rows).all():
+        raise OptionError("a value of the training frames is not finite")
+    return rows

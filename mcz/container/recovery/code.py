@@ -1,0 +1,111 @@
+"""A Reed-Solomon erasure code over GF(2^16): any lost blocks from as many recovery blocks.
+
+Recovery block i is the sum over the data blocks j of ``weight(j) / (i + M + j)`` times block j,
+where M is the least power of two that is not below the number of recovery blocks, + is exclusive or
+between the brackets' first two terms, and the rest is SPEC.md's, "RECV". The same blocks come of
+polynomials through runs of M data blocks, which is how they are computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from mcz.container.recovery.galois_field import ORDER, Ints, log_of_product, logarithms, skews
+from mcz.model.threads import in_force, in_order
+
+LANE = 8  # bytes of a lane: blocks are that many, or a multiple
+MOST_POINTS = 1 << 16
+
+Read = Callable[[int, int], Ints]  # data blocks start <= j < stop, (stop - start, lanes)
+
+
+def runs_of(n_recovery: int) -> int:
+    """M, the number of data blocks that one polynomial goes through."""
+    return 1 << max(0, n_recovery - 1).bit_length()
+
+
+def encoded(read: Read, n_blocks: int, n_recovery: int, lanes: int) -> Ints:
+    """The recovery blocks (n_recovery, lanes) of ``n_blocks`` that ``read`` gives."""
+    from mcz.container.recovery.kernels import to_coefficients, to_values
+
+    size = runs_of(n_recovery)
+    levels = size.bit_length() - 1
+    total = np.zeros((size, lanes), np.int64)
+    for start in range(0, n_blocks, size):
+        stop = min(start + size, n_blocks)
+        run = np.zeros((size, lanes), np.int64)
+        run[: stop - start] = read(start, stop)
+        _by_columns(to_coefficients, run, levels, size + start)
+        total ^= run
+    _by_columns(to_values, total, levels, 0)
+    return total[:n_recovery]
+
+
+def _by_columns(transform: Callable[..., int], blocks: Ints, levels: int, offset: int) -> None:
+    """Apply a transform, columns shared out among threads."""
+    lanes = blocks.shape[1]
+    parts = max(1, min(in_force(), lanes // 64))
+    edges = [lanes * part // parts for part in range(parts + 1)]
+
+    def work(part: int) -> int:
+        own = blocks[:, edges[part] : edges[part + 1]]
+        return transform(own, levels, offset, skews(), np.zeros(512, np.int64))
+
+    for _ in in_order(work, range(parts), parts):
+        pass
+
+
+def recovered(rest: Ints, lost: Sequence[int], rows: Sequence[int], n_recovery: int) -> Ints:
+    """The blocks ``lost``, from as many recovery blocks, the ``rows``.
+
+    ``rest`` (len(rows), lanes): each of these, from which what the blocks that are there add to it
+    was taken away.
+    """
+    from mcz.container.recovery.kernels import add_product
+
+    size = runs_of(n_recovery)
+    exp, _ = logarithms()
+    inverse = _cauchy_inverse(np.array(rows, np.int64), size + np.array(lost, np.int64))
+    weights = log_weights(np.array(lost, np.int64), size)
+    found = np.zeros((len(lost), rest.shape[1]), np.int64)
+
+    def solve(at: int) -> None:
+        table = np.zeros(512, np.int64)
+        for row in range(len(rows)):
+            factor = int(exp[(inverse[at, row] - weights[at]) % ORDER])
+            add_product(found[at], rest[row], factor, table)
+
+    for _ in in_order(solve, range(len(lost)), in_force()):
+        pass
+    return found
+
+
+def log_weights(blocks: Ints, size: int) -> Ints:
+    """The logarithm of the weight of each data block: prod (M + j + l) / prod l, l below M."""
+    points = size + blocks
+    own = np.array([int(log_of_product(point ^ np.arange(size))) for point in points], np.int64)
+    common = int(log_of_product(np.arange(1, size))) if size > 1 else 0
+    return (own - common) % ORDER
+
+
+def _cauchy_inverse(x: Ints, y: Ints) -> Ints:
+    """Logarithms of the inverse of the matrix 1 / (x_i + y_j); entry [j, i]."""
+    _, log = logarithms()
+    between = log[x[:, None] ^ y[None, :]]  # [i, j]
+    rows = between.sum(1)  # prod over j of x_i + y_j
+    columns = between.sum(0)
+    among_x = _log_differences(x)
+    among_y = _log_differences(y)
+    inverse = rows[None, :] + columns[:, None] - between.T - among_x[None, :] - among_y[:, None]
+    return np.asarray(inverse % ORDER)
+
+
+def _log_differences(points: Ints) -> Ints:
+    """Logarithm of the product of each point's differences from the others."""
+    _, log = logarithms()
+    found = np.zeros(len(points), np.int64)
+    for at, point in enumerate(points):
+        found[at] = log[point ^ np.delete(points, at)].sum()
+    return found

@@ -1,0 +1,86 @@
+"""A motion for another format: the same points over time, said in its words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+from mcz.errors import OptionError
+from mcz.exchange.conversion.acclaim import to_amc
+from mcz.exchange.conversion.counted_times import COUNTING, with_counted_times
+from mcz.exchange.conversion.hierarchy import to_bvh
+from mcz.exchange.conversion.losses import held, left_out
+from mcz.exchange.conversion.marker_fit import Fit, from_positions
+from mcz.exchange.conversion.markers import to_c3d
+from mcz.exchange.conversion.tables import needs_rate, to_storage, to_trc
+from mcz.files.reading.source_files import SourceOptions
+from mcz.hints import Hint
+from mcz.kinematics import point_set
+from mcz.model.clock import Timeline
+from mcz.model.motion import Motion
+from mcz.sources import FORMATS
+
+__all__ = [
+    "TARGETS",
+    "Fit",
+    "convert",
+    "converted_files",
+    "from_positions",
+    "left_out",
+]
+
+TARGETS = {
+    "bvh": to_bvh,
+    "amc": to_amc,
+    "c3d": to_c3d,
+    "trc": to_trc,
+    "sto": to_storage,
+    "mot": to_storage,
+}
+
+
+def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Motion:
+    """``motion`` on a skeleton that files of the format ``to`` can hold: a key of ``TARGETS``.
+
+    Its points are at the same positions, in the same order wherever both formats have the same
+    points, to 1e-9 of the skeleton's size; numbers that are computed have a grid of 6 decimals,
+    which they are rounded to when they are printed. It has no source: it prints plainly.
+    ``rate`` is the frame rate, in place of the motion's own.
+
+    Raises MotionError, with the reason, where that format cannot say what the motion says, and
+    OptionError for an unknown format or a frame rate that is needed and unknown.
+    """
+    if to not in TARGETS:
+        scene = "; mcz.to_glb writes scenes" if to in ("glb", "gltf") else ""
+        raise OptionError(f"no conversion to {to!r}, but to {', '.join(TARGETS)}{scene}")
+    motion = SourceOptions(rate=rate).applied_to(motion)
+    same = to == "c3d" and point_set(motion.skeleton) == "markers"
+    same = same or (FORMATS[to].is_table and not needs_rate(motion, to))
+    if to != "amc" and not same and motion.frame_rate is None:
+        raise OptionError(
+            f"its frame rate is unknown, and {to.upper()} states one",
+            clip=motion.name,
+            hint=Hint.RATE,
+        )
+    timeline = motion.timeline
+    if timeline is not None and FORMATS[to].is_table:  # prints what the source prints
+        timeline = Timeline(timeline.times, timeline.rate)
+    made = replace(TARGETS[to](held(motion, to)), source=None).at_times(timeline)
+    return with_counted_times(made, to) if to in COUNTING else made
+
+
+def converted_files(
+    motion: Motion,
+    to: str,
+    rate: Fraction | float | None = None,
+    with_skeleton: bool = False,
+) -> dict[str, bytes]:
+    """The plain file of ``convert``, under ``to``, and with an AMC its ASF under "asf" if wanted.
+
+    Raises MotionError and OptionError as ``convert`` does.
+    """
+    converted = convert(motion, to, rate)
+    files: dict[str, bytes] = {to: FORMATS[to].write(converted)}
+    if with_skeleton and to == "amc":
+        files["asf"] = FORMATS["asf"].write(converted.skeleton)
+    return files

@@ -1,0 +1,290 @@
+"""A motion as a scene: nodes that hang on each other, turned and moved over time, in meters.
+
+Nodes are the joints and, below them, the ends of bones at which no joint begins. What stretches a
+bone moves the nodes at its other end, so that no node is scaled: scales of glTF and USD would be
+inherited, and those of a motion are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.exchange.conversion.hierarchy import loose_tails, moves, stretches
+from mcz.exchange.conversion.losses import first_gap, left_out
+from mcz.hints import Hint
+from mcz.kinematics import point_set
+from mcz.kinematics.chain import Chain, Floats, multiply_matrices
+from mcz.kinematics.frames import frame_poses_of
+from mcz.kinematics.poses.conversions import from_matrices
+from mcz.kinematics.retargeting.sides import sides_of
+from mcz.model.clock import Timeline
+from mcz.model.motion import TURNING_KINDS, Motion, check_poses
+
+CM_PER_M = 100.0
+NEAR = 1e-6  # frames: a time code that is off by less is a whole number
+SAMPLED_FRAMES = 500  # by which the size of a set of markers is judged
+UNSIZED = 1.0  # m, the size of a scene that has none
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Node:
+    """A joint, the end of a bone, or a marker.
+
+    ``parent`` counts among the nodes, -1: none. ``rest`` (3,) is where it is at rest, from its
+    parent. ``turns`` (n_frames, 4) are unit quaternions, x y z w, from its parent, neighbors near
+    each other; None: never turned. ``shifts`` (n_frames, 3) is where it is from its parent; None:
+    at ``rest``. ``places`` (n_frames, 3) is where it is in the world, NaN where unknown.
+    ``side`` is "left", "right" or "" as its name says.
+    """
+
+    name: str
+    parent: int
+    rest: Floats
+    turns: Floats | None
+    shifts: Floats | None
+    places: Floats
+    side: str
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """In which frames its place is known, (n_frames,)."""
+        return ~np.isnan(self.places[:, 0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """The nodes, parents before children; lengths in meters, or units where these are unknown.
+
+    ``up_axis`` is "x" to "-z"; ``size`` that of the figure; ``times`` (n_frames,) in seconds
+    from the first frame on, float32 numbers as float64; ``start``: the time of the first frame;
+    ``codes`` (n_frames,): the times on the clock of the recording, in frames of ``rate``. ``notes``
+    say in words what is unknown and what was left out.
+    """
+
+    name: str
+    nodes: tuple[Node, ...]
+    times: Floats
+    start: float
+    codes: Floats
+    rate: Fraction
+    up_axis: str
+    size: float
+    has_unit: bool
+    is_markers: bool
+    notes: tuple[str, ...]
+
+    @property
+    def rest_places(self) -> Floats:
+        """Places of the nodes at rest in the world, (n_nodes, 3)."""
+        found = np.zeros((len(self.nodes), 3))
+        for number, node in enumerate(self.nodes):
+            found[number] = node.rest
+            if node.parent >= 0:
+                found[number] += found[node.parent]
+        return found
+
+    @property
+    def children(self) -> list[list[int]]:
+        """Children of every node."""
+        below: list[list[int]] = [[] for _ in self.nodes]
+        for number, node in enumerate(self.nodes):
+            if node.parent >= 0:
+                below[node.parent].append(number)
+        return below
+
+
+def scene_of(motion: Motion) -> Scene:
+    """The scene of ``motion``, whose times are known.
+
+    Raises MotionError where its skeleton has no kinematics, where a joint of a skeleton is missing
+    in a frame, and where frames are so many that float32 cannot tell their times apart.
+    """
+    skeleton, timeline = motion.skeleton, motion.timeline
+    assert timeline is not None
+    rate = _rate(motion, timeline)
+    check_poses(motion.name, motion.signals[0])
+    if not skeleton.joints:
+        raise MotionError("a skeleton without joints is no scene", clip=motion.name)
+    scale = 1.0 if skeleton.unit_cm is None else skeleton.unit_cm / CM_PER_M
+    is_markers = point_set(skeleton) == "markers"
+    nodes = tuple(_markers(motion, scale) if is_markers else _joints(motion, scale))
+    return Scene(
+        motion.name,
+        nodes,
+        _times(motion.name, timeline, rate),
+        float(timeline.even[0]) if motion.n_frames else 0.0,
+        _codes(timeline, rate),
+        rate,
+        skeleton.up_axis or "y",
+        _marker_size(nodes) if is_markers else _size(nodes),
+        skeleton.unit_cm is not None,
+        is_markers,
+        tuple(_notes(motion)),
+    )
+
+
+def _rate(motion: Motion, timeline: Timeline) -> Fraction:
+    """The frame rate, or the usual one of irregular times."""
+    if motion.frame_rate is not None:
+        return motion.frame_rate
+    usual = 1.0 / timeline.period if timeline.period else 1.0
+    return Fraction(usual).limit_denominator(1000) or Fraction(1)
+
+
+def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
+    even = timeline.even
+    seconds = (even - even[:1]).astype(np.float32).astype(np.float64)
+    if (np.diff(seconds) <= 0).any() or not np.isfinite(seconds).all():
+        raise MotionError(
+            f"{len(seconds)} frames at {float(rate):g} a second have "
+            "times that float32 cannot tell apart",
+            clip=name,
+            hint=Hint.FRAMES,
+        )
+    return seconds
+
+
+def _codes(timeline: Timeline, rate: Fraction) -> Floats:
+    found = timeline.even * float(rate)
+    near = np.rint(found)
+    return np.where(np.abs(found - near) < NEAR, near, found)
+
+
+def _notes(motion: Motion) -> Iterator[str]:
+    skeleton = motion.skeleton
+    if skeleton.unit_cm is None:
+        yield "its length unit is unknown: a unit became a meter"
+    if not skeleton.up_axis:
+        yield "the axis that points up is unknown: taken for y"
+    yield from left_out(motion, "glb")
+
+
+def _markers(motion: Motion, scale: float) -> Iterator[Node]:
+    """A node a marker, somewhere on its way while it is missing."""
+    values = np.asarray(motion.values, np.float64).reshape(
+        motion.n_frames, motion.skeleton.n_joints, 3
+    )
+    kinds = [channel.kind for channel in motion.skeleton.channels]
+    names = motion.skeleton.addresses()
+    for number, (name, side) in enumerate(zip(names, sides_of(names), strict=True)):
+        order = np.argsort(kinds[3 * number : 3 * number + 3])  # tx, ty, tz
+        joint = motion.skeleton.joints[number]
+        places = values[:, number, order] * scale
+        if joint.adds_to_offset:
+            places += np.array(joint.offset) * scale
+        places[~np.isfinite(places).all(axis=1)] = np.nan
+        seen = np.flatnonzero(~np.isnan(places[:, 0]))
+        if not len(seen):
+            yield Node(name, -1, np.zeros(3), None, None, places, side)
+            continue
+        frames = np.arange(len(places))
+        way = np.stack([np.interp(frames, seen, places[seen, axis]) for axis in range(3)], axis=1)
+        yield Node(name, -1, way[0], None, way, places, side)
+
+
+def _joints(motion: Motion, scale: float) -> Iterator[Node]:
+    """The joints in their order, each followed by the ends of its bones."""
+    skeleton, values = motion.skeleton, np.asarray(motion.values, np.float64)
+    used = [column for column, channel in enumerate(skeleton.channels) if channel.kind]
+    if gap := first_gap(motion, used):
+        raise MotionError(f"joints cannot be left out of frames, but {gap}", clip=motion.name)
+    placed = _Placed(motion, values, scale)
+    names = skeleton.addresses()
+    starts = accumulate((1 + len(tails) for tails in placed.tails), initial=0)
+    numbers = list(starts)  # of each joint among the nodes
+    for index, (name, side) in enumerate(zip(names, sides_of(names), strict=True)):
+        joint = skeleton.joints[index]
+        parent = numbers[joint.parent] if joint.parent >= 0 else -1
+        shifts = placed.shifts.get((index, -1))
+        rest = np.array(joint.offset) * scale
+        if parent >= 0 and shifts is not None and len(shifts) and not rest.any():
+            rest = shifts[0]  # at rest it would lie on its parent, and its bone could not be seen
+        turns, places = _turns(motion, values, index), placed.places[index, -1]
+        yield Node(name, parent, rest, turns, shifts, places, side)
+        for number, tail in placed.tails[index]:
+            end = f"{name} end" + (f" {number + 1}" if number else "")
+            key = index, number
+            at = np.array(tail) * scale
+            yield Node(
+                end, numbers[index], at, None, placed.shifts.get(key), placed.places[key], side
+            )
+
+
+class _Placed:
+    """Places of joints (tail -1) and of the loose ends of their bones, (n_frames, 3) in meters.
+
+    ``shifts`` has those that do not stay where they are on their parent, along its axes.
+    """
+
+    def __init__(self, motion: Motion, values: Floats, scale: float) -> None:
+        self.chain = Chain(motion.skeleton)
+        skeleton = motion.skeleton
+        self.tails = [
+            [(joint.tails.index(tail), tail) for tail in loose_tails(skeleton, index)]
+            for index, joint in enumerate(skeleton.joints)
+        ]
+        keys = [(j, t) for j, tails in enumerate(self.tails) for t in (-1, *(k for k, _ in tails))]
+        loose = [
+            (j, t)
+            for j, t in keys
+            if (moves(skeleton, j) if t < 0 else stretches(skeleton.joints[j]))
+        ]
+        self.places = {key: np.empty((motion.n_frames, 3)) for key in keys}
+        self.shifts = {key: np.empty((motion.n_frames, 3)) for key in loose}
+        for rows, columns, pose in self.chain.poses(values):
+            for j, t in keys:
+                place = pose.origins[j] if t < 0 else self.chain.tail(j, t, columns, pose)
+                self.places[j, t][rows] = place.T * scale
+            for j, t in loose:
+                arm = pose.arms[j] if t < 0 else self.chain.links[j].tails[t][:, None]
+                self.shifts[j, t][rows] = self._shift(j, t, arm, columns).T * scale
+
+    def _shift(self, joint: int, tail: int, arm: Floats, columns: Floats) -> Floats:
+        """``arm``, along the local axes of the joint it begins at, along its axes at rest."""
+        holder = self.chain.links[joint].parent if tail < 0 else joint
+        if holder < 0:
+            return arm
+        link = self.chain.links[holder]
+        if tail >= 0:
+            arm = self.chain.apply_lengths(link, arm, columns)
+        arm = self.chain.apply_scales(link, arm, columns)
+        own = self.chain.turned[holder]
+        return arm if own is None else multiply_matrices(own[:, :, None], arm[:, None])[:, 0]
+
+
+def _turns(motion: Motion, values: Floats, index: int) -> Floats | None:
+    """Turns of a joint from its parent, x y z w; None if nothing turns it."""
+    if not any(channel.kind in TURNING_KINDS for channel in motion.skeleton.joints[index].channels):
+        return None
+    matrices = frame_poses_of(motion.skeleton).local(values, [index])
+    if not np.isfinite(matrices).all():
+        name = motion.skeleton.addresses()[index]
+        raise MotionError(f"joint {name!r}: a quaternion of length 0 turns nothing")
+    return np.roll(from_matrices(matrices, "quat")[:, 0], -1, axis=1)
+
+
+def _size(nodes: tuple[Node, ...]) -> float:
+    """The greatest distance of a node from its root at rest."""
+    rests = np.zeros((len(nodes), 3))
+    for number, node in enumerate(nodes):
+        if node.parent >= 0:
+            rests[number] = rests[node.parent] + node.rest
+    return float(np.sqrt((rests**2).sum(axis=1).max(initial=0.0))) or UNSIZED
+
+
+def _marker_size(nodes: tuple[Node, ...]) -> float:
+    """The diagonal of the box around all markers of a frame, the median of it."""
+    step = max(1, len(nodes[0].places) // SAMPLED_FRAMES)
+    places = np.stack([node.places[::step] for node in nodes], axis=1)
+    places = places[~np.isnan(places).all(axis=(1, 2))]
+    if not len(places):
+        return UNSIZED
+    boxes = np.nanmax(places, axis=1) - np.nanmin(places, axis=1)
+    return float(np.median(np.sqrt((boxes**2).sum(axis=1)))) or UNSIZED

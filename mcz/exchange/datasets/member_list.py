@@ -1,0 +1,238 @@
+"""``dataset``: which clips there are, and whether they go together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from mcz.errors import MczError, OptionError
+from mcz.exchange.datasets.caches import to_size
+from mcz.exchange.datasets.fields import chosen_fields, names_of
+from mcz.exchange.datasets.members import Member
+from mcz.exchange.datasets.sources import MOST_OPEN, Recipe
+from mcz.exchange.datasets.windows import Dataset, Settings
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.fields import Where
+from mcz.files.reading.file import File, is_source, open
+from mcz.kinematics.poses.resampling import (
+    MOST_VALUES,
+    count_resampled_frames,
+    frames_within,
+    too_many_frames_error,
+)
+from mcz.model.clock import Timeline
+from mcz.model.motion import frame_rate_of
+from mcz.model.skeleton import Joints
+from mcz.model.types import JsonObject
+
+Target = str | os.PathLike[str] | File
+
+
+def dataset(
+    target: Target | Iterable[Target],
+    fields: str | Iterable[str] = "rot6d,positions,root",
+    *,
+    rate: Fraction | float | None = None,
+    window: int | None = None,
+    stride: int | None = None,
+    where: Where | None = None,
+    joints: Joints = None,
+    unit: str | None = None,
+    dtype: DTypeLike = "float32",
+    source_rate: Fraction | float | None = None,
+    cache: int | str = "64 MB",
+    folder: str | os.PathLike[str] | None = None,
+    across_gaps: bool = False,
+) -> Dataset:
+    """Windows of the clips of MCZ files, as arrays: a ``Dataset``.
+
+    ``target``: an archive, a folder (all ``.mcz`` below it, by name), an open File, or several.
+    ``fields``: names, with commas or as a list: channels, positions, velocities, accelerations,
+    root, rot6d, quat, rotvec, matrix, and the last four as world_rot6d and so on; ``docs`` has
+    their shapes. ``rate``: all are resampled to it, exactly where every n-th frame will do;
+    ``source_rate`` is that of clips that do not say theirs. ``window`` frames each, every
+    ``stride`` (as many, where None); None: whole clips. ``where`` chooses clips: an expression as
+    of ``File.find``, or a function of a Clip. ``joints`` and ``unit`` as of ``positions``.
+    ``cache``: bytes to keep in memory, or in ``folder``, across runs: "64 MB".
+
+    Where frames are missing, the parts between are clips of their own, so that no window spans a
+    gap, unless ``across_gaps``. Clips too short for a window are listed in ``Dataset.skipped``.
+    Raises OptionError where clips do not go together: other joints, rates or units; MotionError and
+    FormatError where one cannot be used.
+    """
+    recipe = _recipe(fields, rate, joints, unit, dtype)
+    window, stride = _cut(window, stride)
+    given: dict[str, File] = {}
+    size = to_size(cache)
+    settings = Settings(recipe, window, stride, size, None if folder is None else Path(folder))
+    assumed = None if source_rate is None else frame_rate_of(source_rate, "source_rate")
+    agreement = _Agreement(recipe)
+    members: list[Member] = []
+    skipped: list[Member] = []
+    with ExitStack() as stack:
+        opened: dict[str, File] = {}
+        for file, name in _files(target, given):
+            if name not in given:
+                stack.enter_context(file)
+                opened[name] = file
+            for clip in _chosen(file, where):
+                for member in _members(clip, name, recipe, assumed, across_gaps):
+                    if member.n_frames < (window or 1):
+                        skipped.append(member)
+                        continue
+                    agreement.check(clip, member)
+                    members.append(member)
+            if len(opened) > MOST_OPEN:
+                opened.pop(name).close()
+        if not members:
+            wanted = "" if window is None else f" of at least {window} frames"
+            raise OptionError(f"no clip{wanted} in what was given")
+        stack.pop_all()
+    made = Dataset(settings, members, given, skipped)
+    made.adopt(opened)
+    return made
+
+
+def _recipe(
+    fields: str | Iterable[str],
+    rate: Fraction | float | None,
+    joints: Joints,
+    unit: str | None,
+    dtype: DTypeLike,
+) -> Recipe:
+    kind = np.dtype(dtype)
+    if kind not in (np.float16, np.float32, np.float64):
+        raise OptionError(f"dtype {kind}: float16, float32 or float64")
+    exact = None if rate is None else frame_rate_of(rate, "rate")
+    names = joints if joints is None or isinstance(joints, (str, int)) else tuple(joints)
+    return Recipe(chosen_fields(fields), exact, names, unit, kind)
+
+
+def _cut(window: int | None, stride: int | None) -> tuple[int | None, int]:
+    if window is not None and window < 1:
+        raise OptionError(f"window of {window} frames")
+    if stride is not None and (stride < 1 or window is None):
+        raise OptionError(f"stride of {stride} frames, of windows of {window}")
+    return window, stride or window or 1
+
+
+def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterator[tuple[File, str]]:
+    """The files, each with what ``mcz.open`` takes for it; those that were open go to ``given``."""
+    several = isinstance(target, Iterable) and not isinstance(target, (str, os.PathLike, File))
+    for one in target if several else [target]:  # type: ignore[union-attr]
+        if isinstance(one, File):
+            name = one.name if one.name not in given else f"{one.name} ({len(given) + 1})"
+            given[name] = one
+            yield one, name
+            continue
+        path = os.fspath(one)  # type: ignore[arg-type]
+        paths = [path]
+        if Path(path).is_dir():
+            paths = sorted(str(found) for found in Path(path).rglob("*.mcz"))
+            if not paths:
+                raise OptionError("a folder without .mcz files (mcz pack makes one)", path=path)
+        for name in paths:
+            if is_source(name):
+                raise OptionError(f"{name}: a data set is made of .mcz files; mcz pack makes one")
+            yield open(name, threads=1), name
+
+
+def _chosen(file: File, where: Where | None) -> list[Clip]:
+    return list(file.clips.values()) if where is None else file.find(where)
+
+
+def _members(
+    clip: Clip, target: str, recipe: Recipe, assumed: Fraction | None, across_gaps: bool
+) -> Iterator[Member]:
+    """The parts of a clip between gaps, at the rate of the data set."""
+    own, timeline = clip.frame_rate or assumed, clip.timeline_at(assumed)
+    runs = [(0, clip.n_frames)] if timeline is None or across_gaps else timeline.runs
+    for start, stop in runs or [(0, 0)]:
+        n_frames = stop - start
+        member = Member(target, clip.name, n_frames, own, n_frames, start)
+        part = timeline.cut(slice(start, stop)) if timeline is not None and n_frames else None
+        if part is not None and timeline is not None:
+            is_even = part.places is not None and bool((np.diff(part.places) == 1).all())
+            time = float(timeline.even[start])
+            member = replace(member, time=time, is_even=is_even)
+        if recipe.rate is not None:
+            member = replace(member, n_frames=_resampled_frames(member, part, recipe.rate))
+        yield member
+
+
+def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> int:
+    """The number of frames at ``rate`` of the clip whose times are ``part``."""
+    if part is not None and not member.is_even:
+        frames, _ = frames_within(part, rate, (0, member.n_source))
+        if frames.stop > MOST_VALUES:
+            raise too_many_frames_error(part, rate)
+        return len(frames)
+    if member.source_rate is None:
+        raise OptionError(
+            "its frame rate is unknown; say it with source_rate=",
+            path=member.target,
+            clip=member.clip,
+        )
+    return count_resampled_frames(member.n_source, member.source_rate, rate)
+
+
+class _Agreement:
+    """Facts of the first clip that all others must share."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self._recipe = recipe
+        self._first: tuple[Member, JsonObject] | None = None
+        self._known: set[tuple[object, ...]] = set()
+
+    def check(self, clip: Clip, member: Member) -> None:
+        """Raises OptionError where ``clip`` differs from the first."""
+        key = member.target, clip.skeleton_id, member.source_rate, member.time is None
+        if key in self._known:
+            return
+        self._known.add(key)
+        found = self._facts(clip, member)
+        if self._first is None:
+            self._first = member, found
+            return
+        first, facts = self._first
+        for what, advice in ADVICE.items():
+            if facts[what] != found[what]:
+                raise OptionError(
+                    f"{member.label} has {_short(found[what])}, {first.label} has "
+                    f"{_short(facts[what])}: {what} differ; {advice}"
+                )
+
+    def _facts(self, clip: Clip, member: Member) -> JsonObject:
+        recipe = self._recipe
+        try:
+            subject = recipe.subject(clip, member)
+        except MczError as error:
+            error.add(path=member.target, clip=member.clip)
+            raise
+        lengths = any(field.lengths for field in recipe.fields)
+        return {
+            "frame rates": None if recipe.rate else member.source_rate,
+            "length units": clip.skeleton.unit_cm if lengths and recipe.unit is None else None,
+            "joints": [names_of(field, subject) for field in recipe.fields],
+        }
+
+
+ADVICE = {
+    "frame rates": "give one to resample to with rate=",
+    "length units": "give one with unit=",
+    "joints": "choose those that all have with joints=, or clips with where=",
+}
+
+
+def _short(fact: object) -> str:
+    if isinstance(fact, list):
+        names = [name for each in fact for name in each]
+        return f"{len(names)} names ({', '.join(names[:3])} ...)"
+    return "none" if fact is None else str(fact)

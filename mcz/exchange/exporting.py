@@ -1,0 +1,114 @@
+"""``export``: every clip of a file in another format, a file a clip."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path, PurePosixPath
+
+from mcz.errors import FormatError, MczError, OptionError
+from mcz.exchange.conversion import TARGETS, converted_files, left_out
+from mcz.exchange.conversion.scenes import WRITERS, to_scene
+from mcz.files.editing.batch_report import Outcome, Report, failed
+from mcz.files.editing.safe_names import Folder, PortableNames
+from mcz.files.editing.unpacking import safe_path
+from mcz.files.jobs import limited
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.fields import Where
+from mcz.files.reading.file import File, open, suffixes_of
+from mcz.files.reading.parallel_clips import shared_out
+from mcz.files.reading.source_files import SourceOptions
+from mcz.files.tables.files import EXPORTS, table_of
+from mcz.model.motion import Motion
+from mcz.model.types import JsonObject, Target
+
+Progress = Callable[[int, int, str], None]
+FORMS = (*EXPORTS, *TARGETS, *WRITERS)
+
+
+def export(
+    target: Target,
+    directory: str | os.PathLike[str],
+    to: str,
+    *,
+    clips: Sequence[str] | None = None,
+    where: Where | None = None,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    key_error_mm: float | None = None,
+    force: bool = False,
+    max_decoded: int | None = None,
+    threads: int | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Write every clip of an MCZ file below ``directory`` as another format.
+
+    ``to`` is "npz", "csv", "glb", "usda" or a format of ``mcz.convert``.
+    A clip "day1/walk" becomes "day1/walk.npz"; with an AMC comes its ASF. ``clips`` and ``where``:
+    of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them;
+    ``key_error_mm`` is that of ``to_glb``.
+    A clip that the format cannot hold, or whose file is there and not ``force``, is reported as
+    failed and the others are written. Files appear when they are whole; no link below ``directory``
+    is followed. ``jobs`` processes may work at once, by default one. Raises OptionError and what
+    ``mcz.open`` raises.
+    """
+    if to not in FORMS:
+        raise OptionError(f"to {to!r}: one of {', '.join(FORMS)}")
+    folder, report, written = Folder(Path(directory)), Report(), set[str]()
+    portable = PortableNames()
+    options: JsonObject = {"max_decoded": max_decoded, "threads": threads, "verify": True}
+    with limited(jobs), open(target, **options) as file:
+        chosen = file.chosen(clips, where)
+        called = [clip.name for clip in chosen]
+        with shared_out(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
+            for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
+                try:
+                    for own, data, notes in converted():
+                        path = portable(str(safe_path(own)))
+                        if path in written:
+                            raise FormatError(f"another clip becomes {path}, too")
+                        folder.write(path, data, target, force=force)
+                        written.add(path)
+                        report.outcomes.append(Outcome(path, "written", len(data), notes=notes))
+                except (MczError, OSError) as error:
+                    report.outcomes.append(failed(name, error))
+                if progress is not None:
+                    progress(done + 1, len(called), name)
+    return report
+
+
+Made = tuple[str, bytes, tuple[str, ...]]  # the name of a file, its content, what is to be said
+
+
+def _converted(
+    shared: tuple[File, tuple[str, Fraction | float | None, str | None, float | None]], name: str
+) -> list[Made]:
+    """The files that the clip ``name`` becomes."""
+    file, (to, rate, unit, key_error) = shared
+    clip = file.clips[name]
+    motion = SourceOptions(rate=rate, unit=unit).completing(clip.motion())
+    return list(_files(clip, to, motion, key_error))
+
+
+def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Made]:
+    """The files that a clip becomes: an ASF before the AMC that needs it."""
+    if to in EXPORTS:
+        yield _named(clip, to), EXPORTS[to](table_of(motion)), left_out(motion, to)
+        return
+    if to in WRITERS:
+        scene = to_scene(motion, to, key_error_mm=key_error)
+        yield _named(clip, to), scene.data, scene.notes
+        return
+    files = converted_files(motion, to, None, True)
+    for suffix in sorted(files, reverse=True):
+        notes = left_out(motion, to) if suffix == to else ()
+        yield _named(clip, suffix), files[suffix], notes
+
+
+def _named(clip: Clip, to: str) -> str:
+    """The clip's name with the suffix of the format ``to``, unless it has one."""
+    suffixes = suffixes_of(to)
+    own = PurePosixPath(clip.name).suffix.lower()
+    return clip.name if own in suffixes else f"{clip.name}{suffixes[0]}"

@@ -1,0 +1,292 @@
+"""Archives: many files into one, and more files into it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import chain
+from pathlib import Path
+
+from mcz.container import payloads
+from mcz.container.limits import profile_named
+from mcz.container.metadata import Record
+from mcz.errors import MczError, OptionError, SourceError, remark_of
+from mcz.files.editing.appending import growing
+from mcz.files.editing.batch_report import Outcome, Report
+from mcz.files.editing.chunk_copier import UNPROTECTED
+from mcz.files.editing.coded_parts import Far, ahead
+from mcz.files.editing.file_times import stamp
+from mcz.files.editing.folders import (
+    files_below,
+    left_out,
+    motion_files,
+    not_kept,
+    size_of,
+    sources_named,
+)
+from mcz.files.editing.merging import add_files
+from mcz.files.editing.protecting import redundancy_of, still_protect
+from mcz.files.editing.safe_names import notes_on
+from mcz.files.editing.stored_files import Content, stored_files
+from mcz.files.editing.superseding import superseding
+from mcz.files.reading.file import File
+from mcz.files.reading.source_files import SourceOptions
+from mcz.files.writing.atomic import refuse_inputs, replacing
+from mcz.files.writing.source_encoder import SourceEncoder, WritingOptions, encoding_options
+from mcz.files.writing.write_transaction import WriteTransaction, check_name
+from mcz.hints import split_hint
+from mcz.model.types import Params, Progress, Target
+from mcz.sources import wants_skeleton
+
+
+def pack(
+    directory: str | os.PathLike[str],
+    target: Target,
+    *,
+    codec: str | None = None,
+    effort: str | None = None,
+    params: Params | None = None,
+    rate: float | None = None,
+    force_rate: bool = False,
+    unit: str | None = None,
+    up: str | None = None,
+    arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
+    verbatim: bool = False,
+    keep_all: bool = False,
+    force: bool = False,
+    profile: str = "base",
+    copies: bool = True,
+    mtimes: bool = False,
+    threads: int | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Pack every motion file below ``directory`` into one MCZ file.
+
+    A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
+    ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
+    relative to ``directory``. ``rate`` is that of files that state none, with ``force_rate`` of
+    all. ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``,
+    ``copies`` and ``threads`` are those of ``mcz.write``;
+    ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
+    when each file was last changed as metadata of its clip, so that the same files give other
+    bytes later. An earlier MCZ file of the target's name is no part of the new one; any other file
+    that the target would replace is refused, even with ``force``.
+    """
+    root = Path(directory)
+    if not root.is_dir():
+        raise OptionError("not a folder", path=root)
+    paths, others = files_below(root, target)
+    if not keep_all:
+        paths, left = motion_files(paths)
+        others += [left_out(path, root) for path in left]
+    options = SourceOptions(
+        rate=rate,
+        force_rate=force_rate,
+        unit=unit,
+        up=up,
+        arrays=arrays,
+        model=model,
+        verbatim=verbatim or keep_all,
+        flat=True,
+    )
+    encoding = encoding_options(codec, effort, params)
+    writing = WritingOptions(force, profile_named(profile), copies, threads, jobs)
+    named = [(path, path.relative_to(root).as_posix()) for path in paths]
+    entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
+    inputs = (*paths, *encoding.params.values())
+    with writing.in_force(), replacing(target, force=force, inputs=inputs) as stream:
+        transaction = WriteTransaction(stream, writing.profile, copies=writing.copies)
+        report = _write_entries(transaction, entries, progress)
+        refuse_inputs(target, _inputs_of(entries))
+        if mtimes:
+            _note_times(transaction, entries)
+        transaction.finish()
+    report.size = transaction.writer.offset
+    report.left_out += not_kept(root, paths, with_times=mtimes)
+    report.note(notes_on(entry.name for entry in entries))
+    report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
+    return report
+
+
+def _note_times(transaction: WriteTransaction, entries: Sequence[SourceEncoder]) -> None:
+    """Say of each clip that was written when its file was last changed."""
+    records = []
+    for entry in entries:
+        if entry.name in transaction.clips:
+            with suppress(OSError):
+                records.append(Record(transaction.clips[entry.name], {"mtime": stamp(entry.path)}))
+    with transaction.step():
+        transaction.writer.metadata(records)
+
+
+def _inputs_of(entries: Sequence[SourceEncoder]) -> Iterator[Path]:
+    """The files that entries were made of, their skeletons among them."""
+    return chain.from_iterable(entry.inputs for entry in entries)
+
+
+def append(
+    sources: Sequence[str | os.PathLike[str]],
+    target: str | os.PathLike[str],
+    *,
+    codec: str | None = None,
+    effort: str | None = None,
+    params: Params | None = None,
+    skeleton: str | os.PathLike[str] | None = None,
+    rate: float | None = None,
+    force_rate: bool = False,
+    unit: str | None = None,
+    up: str | None = None,
+    arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
+    verbatim: bool = False,
+    root: str | os.PathLike[str] | None = None,
+    salvage: bool = False,
+    force: bool = False,
+    rename: bool = False,
+    skip_identical: bool = False,
+    replace: bool = False,
+    copies: bool | None = None,
+    threads: int | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
+
+    Each is stored under its path relative to ``root``, or without one under its name alone; of a
+    folder every motion file below it, under its path relative to the folder. A file that the target
+    restores already under the same path is left out as "present", another one under a path that is
+    taken is refused, and one whose content is there under another name is an alias. Of an MCZ file
+    all that it holds is carried over, nothing coded anew; ``rename`` and ``skip_identical`` are
+    those of ``mcz.merge``, ``rate`` and ``force_rate`` of ``mcz.pack``. When a source cannot be
+    added, nothing is. What is added to a file with recovery data gets its own. ``replace``: a file
+    takes the place of another one that came from the same path, for which the whole archive is
+    rewritten; what was said of that one's clip stays.
+
+    A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
+    lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
+    them. Where its end is damaged, one of the two has to be given. ``arrays`` is that of
+    ``mcz.read``. ``threads`` is that of
+    ``mcz.write``, and so is ``copies``, of all that has none yet; None: where the file has some.
+    ``jobs`` is that of ``mcz.pack``.
+    Raises AccessError while another process is appending, OptionError where the target is a source
+    itself.
+    """
+    refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
+    options = SourceOptions(
+        skeleton=skeleton,
+        rate=rate,
+        force_rate=force_rate,
+        unit=unit,
+        up=up,
+        arrays=arrays,
+        model=model,
+        verbatim=verbatim,
+    )
+    encoding = encoding_options(codec, effort, params)
+    writing = WritingOptions(threads=threads, jobs=jobs)
+    held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
+    files = [source for source in sources if source not in held]
+    named, others = sources_named(files, root, target)
+    entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
+    with (
+        writing.in_force(),
+        superseding(Path(target), named if replace else ()) as grown,
+        growing(grown, salvage=salvage, force=force) as growth,
+    ):
+        container = growth.container
+        paths, seen = stored_files(container)
+        wanted = bool(container.copies()) if copies is None else copies
+        transaction = WriteTransaction(
+            growth.added,
+            container.profile,
+            container.directory,
+            paths,
+            copies=wanted,
+            uncopied=container.uncopied() if wanted else (),
+        )
+        before = File(container) if held else None  # as it is before anything is added
+        report = _write_entries(transaction, entries, progress, seen)
+        if report.failures:
+            words, hints = zip(*(split_hint(o.message) for o in report.failures), strict=True)
+            raise SourceError("; ".join(words), hint=hints[0] if len(set(hints)) == 1 else None)
+        refuse_inputs(target, _inputs_of(entries))
+        if before is not None:
+            added = add_files(held, before, transaction, rename, skip_identical, progress)
+            report.outcomes += added.outcomes
+            report.left_out += added.left_out
+        redundancy = None
+        if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
+            redundancy = redundancy_of(container)
+            transaction.finish()
+    if still_protect(target, redundancy):
+        report.left_out = [text for text in report.left_out if not text.endswith(UNPROTECTED)]
+    report.size = Path(target).stat().st_size
+    report.note(notes_on(transaction.paths, {outcome.path for outcome in report.outcomes}))
+    report.outcomes += others
+    tail = growth.tail
+    text = "it lay whole behind the last FOOT of a file whose writing was cut short"
+    result = "salvaged" if tail.kept else "dropped"
+    report.outcomes += [Outcome(name, result, 0, text) for name in tail.names]
+    return report
+
+
+def _write_entries(
+    transaction: WriteTransaction,
+    entries: Sequence[SourceEncoder],
+    progress: Progress | None,
+    seen: Content | None = None,
+) -> Report:
+    """Write the files; ``seen``: what the target holds already, by content."""
+    report = Report()
+    seen = {} if seen is None else seen
+    with ahead(entries, transaction, seen) as in_turn:
+        write_in_turn(transaction, in_turn, len(entries), report, progress, seen)
+    return report
+
+
+def write_in_turn(
+    transaction: WriteTransaction,
+    entries: Iterable[SourceEncoder],
+    total: int,
+    report: Report,
+    progress: Progress | None,
+    seen: Content,
+) -> None:
+    """Write one file after the other; ``report`` learns what becomes of each."""
+    for done, entry in enumerate(entries):
+        size = entry.size if isinstance(entry, Far) else size_of(entry.path)
+        try:
+            result = _write_entry(transaction, entry, seen)
+            notes = tuple(filter(None, (entry.remark, *entry.notes)))
+            report.outcomes.append(Outcome(entry.name, result, size, entry.reason, notes))
+        except MczError as error:
+            report.outcomes.append(
+                Outcome(entry.name, "failed", size, remark_of(error, path=entry.name))
+            )
+        if progress is not None:
+            progress(done + 1, total, entry.name)
+
+
+def _write_entry(transaction: WriteTransaction, entry: SourceEncoder, seen: Content) -> str:
+    """Write one file, or only its name where the same bytes are there already."""
+    digest = entry.digest()
+    depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
+    writer = transaction.writer
+    if digest in seen and not depends and not transaction.holds(entry.name, digest):
+        check_name(entry.name)
+        with transaction.step():
+            writer.alias(entry.name, *seen[digest])
+        transaction.paths[entry.name] = digest
+        return "alias"
+    clips, attachments = len(writer.directory.clips), len(writer.directory.attachments)
+    result = entry.write(transaction)
+    if len(writer.directory.clips) > clips:
+        name = next(reversed(writer.directory.clips))
+        seen[digest] = (payloads.OF_CLIP, name.encode())
+        transaction.clips[entry.name] = name
+    elif len(writer.directory.attachments) > attachments:
+        seen[digest] = (payloads.OF_ATTACHMENT, entry.name.encode())
+    return result

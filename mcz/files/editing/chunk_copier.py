@@ -1,0 +1,232 @@
+"""Chunks of an open file carried over to another one as they are: nothing is coded anew.
+
+What is shared is named by its hash, so that it needs no new number and is written once. SPEC.md,
+"Chunks" and "Grammar", are normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import takewhile
+
+from mcz.container import payloads
+from mcz.container.chunks import Chunk, ChunkFlag, ChunkType, read_chunk
+from mcz.container.dictionary_deflate import chunk_id, parse_skel
+from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
+from mcz.container.grammar import CLIP
+from mcz.container.index import segment_rows
+from mcz.container.index_reader import parse_segments
+from mcz.container.metadata import Record, as_one
+from mcz.container.parser_drivers import chunks
+from mcz.container.reader import Container
+from mcz.container.writer import Writer
+from mcz.errors import ChecksumError, FormatError
+from mcz.model.schema import build, parse, parse_until
+
+UNPROTECTED = "its recovery data, which are of the old file: mcz protect makes others"
+BLOCK = 1 << 20  # bytes of an open DATA that are copied at once
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Changes of a clip that is copied; None: unchanged.
+
+    ``name`` of the clip, ``path`` of its source, ``rate`` in frames a second, ``metadata`` of CLIP.
+    """
+
+    name: str | None = None
+    path: str | None = None
+    rate: Fraction | None = None
+    metadata: Mapping[str, str] | None = None
+
+
+SAME = Change()
+
+
+class ChunkCopier:
+    """Carries chunks of ``container`` over to ``writer``; ``left_out`` says which may not be.
+
+    Every checksum is compared on the way; raises FormatError where one is wrong.
+    """
+
+    def __init__(self, container: Container, writer: Writer) -> None:
+        self.container, self.writer = container, writer
+        self.left_out: list[str] = []
+
+    def stored(self, kind: bytes, id_: bytes) -> bytes:
+        """The payload of the SKEL, MODL or SRCE with this id, its hash checked."""
+        chunk = self.container.directory.shared.get((kind, id_))
+        if chunk is None:
+            raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
+        payload = self.container.payload(chunk)
+        if chunk_id(kind, payload, self.container.profile) != id_:
+            raise ChecksumError(f"its id is not {id_.hex()}", where=f"chunk {chunk.label}")
+        return payload
+
+    def shared(self, kind: bytes, id_: bytes) -> None:
+        """Carry a MODL or SRCE over, unless it is there."""
+        if (kind, id_) not in self.writer.directory.shared:
+            self.writer.shared(kind, self.stored(kind, id_))
+
+    def skeleton(self, id_: bytes) -> bytes:
+        """Carry a SKEL over after its bases and their templates, unless it is there; its id."""
+        chain: list[bytes] = []
+        wanted: bytes | None = id_
+        while wanted and (ChunkType.SKEL, wanted) not in self.writer.directory.shared:
+            payload = self.stored(ChunkType.SKEL, wanted)
+            fields = parse_skel(payload, "SKEL", self.container.profile)
+            if fields.source is not None:
+                self.shared(ChunkType.SRCE, fields.source.template)
+            chain.append(payload)
+            wanted = fields.base
+        for payload in reversed(chain):
+            self.writer.shared(ChunkType.SKEL, payload)
+        return id_
+
+    def attachment(self, name: str, as_name: str | None = None) -> None:
+        """Carry an attached file over, perhaps under another name."""
+        row = self.container.directory.attachments[name]
+        parts = [self.container.payload(part) for part in row.parts]
+        if as_name not in (None, name):
+            parts = [_renamed(part, as_name) for part in parts]
+        self.writer.attachment_parts(as_name or name, row.size, parts)
+
+    def before_clips(self) -> None:
+        """Carry over the ancillary chunks before the first clip, to which they do not belong."""
+        clips = self.container.directory.clips.values()
+        first = min((row.clip.offset for row in clips), default=0)
+        for chunk, _ in chunks(self.container.source):
+            if chunk.offset >= first:
+                break
+            if chunk.flags and chunk.type != ChunkType.INDX:
+                self.ancillary(chunk)
+
+    def ancillary(self, chunk: Chunk) -> bool:
+        """Carry an ancillary chunk over where that is safe; return whether it was.
+
+        META is not: it may speak of other clips, see ``metadata_records``.
+        """
+        if chunk.type == ChunkType.META:
+            return False
+        if chunk.flags & ChunkFlag.SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
+            self.writer.ancillary(chunk.type, self.container.payload(chunk))
+            return True
+        if chunk.type == ChunkType.RECV:
+            if UNPROTECTED not in self.left_out:  # there is one more for each part that was added
+                self.left_out.append(UNPROTECTED)
+        elif chunk.type != ChunkType.COPY:  # those are made anew where they are wanted
+            self.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
+        return False
+
+    def clip(self, name: str, change: Change = SAME) -> None:
+        """Carry a clip over: its skeleton and template, CLIP to CEND, and what belongs to it."""
+        row = self.container.directory.clips[name]
+        payload = self.container.payload(row.clip)
+        head = parse_until(payloads.Clip, payload, row.clip.label, "signals")
+        if head.name != name or head.skeleton != row.skeleton:
+            raise FormatError(f"{row.clip.label}: clip {head.name!r}, the index says {name!r}")
+        if head.source is not None:
+            self.shared(ChunkType.SRCE, head.source.template)
+        self.skeleton(row.skeleton)
+        if change != SAME:
+            payload = _changed(payload, row.clip.label, change)
+        rate = change.rate
+        new = PackedClipRow(
+            change.name or name,
+            row.skeleton,
+            row.n_frames,
+            row.rate_numerator if rate is None else rate.numerator,
+            row.rate_denominator if rate is None else rate.denominator,
+            row.signals,
+            row.clip,
+        )
+        self.writer.begin_carried(new, payload)
+        self._body(row, new)
+        self.writer.end_carried()
+        self.behind(row)
+
+    def behind(self, row: ClipRow, *, but: bytes = b"") -> None:
+        """Carry over the ancillary chunks behind CEND, those of the type ``but`` apart."""
+        for chunk in row.ancillary:
+            found = read_chunk(self.container.source, chunk.offset)
+            if found.type != chunk.type:
+                raise FormatError(f"{found.label} is {chunk.label} in the index")
+            if found.type != but:
+                self.ancillary(found)
+
+    def inside(self, row: ClipRow) -> None:
+        """Carry over the ancillary chunks between CLIP and CEND."""
+        for chunk, _ in self._walk(row):
+            if chunk.flags:
+                self.ancillary(chunk)
+
+    def _walk(self, row: ClipRow) -> Iterator[tuple[Chunk, int]]:
+        """The chunks between CLIP and CEND, and where each ends."""
+        if row.cend is None:  # of a damaged file
+            raise FormatError(f"clip {row.name!r} has no CEND")
+        at, stop = row.clip.stop, row.cend.offset
+        found = chunks(self.container.source, at, CLIP)
+        for chunk, at in takewhile(lambda one: one[0].offset < stop, found):
+            yield chunk, at
+        if at != row.cend.offset:
+            raise FormatError(f"{row.cend.label} is not where the index says", clip=row.name)
+
+    def _body(self, row: ClipRow, new: PackedClipRow) -> None:
+        """Copy the chunks from behind CLIP up to CEND; ``new`` records their places."""
+        packed = segment_rows(row)
+        moved: list[tuple[int, int]] = []  # from where on how many bytes less lie before
+        less = 0
+        for chunk, end in self._walk(row):
+            if chunk.length is None:  # an open DATA, packets and all
+                for at in range(chunk.offset, end, BLOCK):
+                    self.writer.raw(self.container.source.read(at, min(BLOCK, end - at)))
+            elif not chunk.flags:
+                self.writer.chunk(chunk.type, self.container.payload(chunk))
+            elif not self.ancillary(chunk):
+                less += chunk.size
+                moved.append((end, less))
+        assert row.cend is not None
+        new.cend = self.writer.chunk(ChunkType.CEND, self.container.payload(row.cend))
+        if moved:
+            shift = new.clip.stop - row.clip.stop
+            new.segments = [_moved(segment, shift, moved) for segment in row.segments]
+        else:
+            new.keep_packed(lambda: packed, parse_segments)
+
+
+def metadata_records(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
+    """META records of the file, and of clips by their old and new names."""
+    pairs = [("", ""), *names]
+    said = ((new, container.metadata_records(old)) for old, new in pairs)
+    return [as_one(new, records) for new, records in said if records]
+
+
+def _moved(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:
+    less = max((size for start, size in moved if segment.offset >= start), default=0)
+    told = segment.told and _moved(segment.told, shift, moved)
+    return replace(segment, offset=segment.offset + shift - less, told=told)
+
+
+def _renamed(part: bytes, name: str) -> bytes:
+    return build(replace(parse(payloads.Atta, part, "ATTA"), name=name), "ATTA")
+
+
+def _changed(payload: bytes, where: str, change: Change) -> bytes:
+    """The CLIP ``payload`` with what ``change`` says."""
+    record = parse(payloads.Clip, payload, where)
+    if change.name is not None:
+        record.name = change.name
+    if change.path is not None and record.source:
+        record.source.path = change.path
+    if change.metadata is not None:
+        record.metadata = payloads.metadata_records(dict(sorted(change.metadata.items())))
+    if change.rate is not None:
+        base, rate = record.time_base, record.rate_numerator
+        if base is not None and base.first_time is not None and rate:
+            base.first_time *= float(rate / change.rate / record.rate_denominator)
+        record.rate_numerator = change.rate.numerator
+        record.rate_denominator = change.rate.denominator
+        record.flags &= ~payloads.ROUNDED_RATE
+    return build(record, where)

@@ -1,0 +1,191 @@
+"""Files of an archive that are read and coded ahead, by other processes: each becomes a part.
+
+A part is an MCZ file of one file, whose chunks are carried over. Whatever depends on what the
+archive holds already (a name that is taken, the same file twice, a skeleton that is there) is
+decided where the parts are joined, in the order of the files; so the archive has the bytes that
+one process would write.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcz.container.directory import Directory
+from mcz.container.limits import Profile
+from mcz.errors import MczError, WorkerError
+from mcz.files.editing.chunk_copier import Change
+from mcz.files.editing.folders import size_of
+from mcz.files.editing.rewriting import ALIAS, CLIP, SKELETON, carry, whole
+from mcz.files.editing.stored_files import Content
+from mcz.files.jobs import ONE, Answer, useful
+from mcz.files.jobs.pool import answers
+from mcz.files.reading.file import open
+from mcz.files.reading.parallel_clips import only_own
+from mcz.files.reading.source_files import SourceOptions
+from mcz.files.writing.source_encoder import EncodingOptions, SourceEncoder
+from mcz.files.writing.write_transaction import WriteTransaction, check_name, clip_name
+from mcz.sources import wants_skeleton
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One file, read and coded: ``data`` is an MCZ file of it alone.
+
+    ``digest`` is the SHA-256 of the file that was read, the rest what ``SourceEncoder`` says of it.
+    """
+
+    digest: bytes
+    data: bytes
+    result: str
+    reason: str
+    remark: str
+    notes: tuple[str, ...]
+    inputs: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """A file that is to be coded, for a file of which limits."""
+
+    path: Path
+    name: str
+    options: SourceOptions
+    encoding: EncodingOptions
+    profile: Profile
+
+
+def ask_of(entry: SourceEncoder, profile: Profile) -> Ask:
+    """The request by which ``entry`` can be joined."""
+    return Ask(entry.path, entry.name, entry.options, entry.encoding, profile)
+
+
+def coded(state: object, ask: Ask) -> Part:
+    """The part of a file; raises as ``SourceEncoder.write`` does."""
+    entry, sink = SourceEncoder(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
+    transaction = WriteTransaction(sink, ask.profile)
+    result = entry.write(transaction)
+    transaction.finish()
+    digest = transaction.paths[ask.name]
+    assert isinstance(digest, bytes)
+    inputs = tuple(entry.inputs)
+    return Part(digest, sink.getvalue(), result, entry.reason, entry.remark, entry.notes, inputs)
+
+
+class Joined(SourceEncoder):
+    """A SourceEncoder whose part another process has encoded; it takes the part over."""
+
+    can_be_read = True  # here, too
+
+    def __init__(self, entry: SourceEncoder, answer: Answer[Part]) -> None:
+        super().__init__(entry.path, entry.name, entry.options, entry.encoding)
+        self.inputs = entry.inputs  # which its owner asks for
+        self._answer = answer
+
+    def write(self, transaction: WriteTransaction, progress: object = None) -> str:
+        """Write the file as ``SourceEncoder.write`` does; raises WorkerError if a process died."""
+        part = self._part()
+        if part is None or part.digest != self.digest():
+            return super().write(
+                transaction
+            )  # it fails, or has changed: with the words of one process
+        name = clip_name(self.name, transaction.writer.directory)
+        if (
+            self.can_be_read
+            and part.result == "verbatim"
+            and name != clip_name(self.name, Directory())
+        ):
+            return super().write(transaction)  # the reason may name the clip
+        check_name(self.name)
+        if transaction.holds(self.name, part.digest):
+            return "present"
+        with transaction.step():
+            join(part, transaction, name)
+        self.reason, self.remark, self.notes = part.reason, part.remark, part.notes
+        self.inputs[:] = part.inputs
+        transaction.paths[self.name] = part.digest
+        return part.result
+
+    def _part(self) -> Part | None:
+        try:
+            return self._answer()
+        except WorkerError:
+            raise
+        except MczError:
+            return None
+
+
+class Far(Joined):
+    """One whose file lies where only those can read it that made the part, ``size`` bytes."""
+
+    can_be_read = False
+
+    def __init__(self, entry: SourceEncoder, answer: Answer[Part], size: int) -> None:
+        super().__init__(entry, answer)
+        self.size = size
+        self._made: Part | None = None
+
+    def _part(self) -> Part:
+        if self._made is None:
+            self._made = self._answer()
+        return self._made
+
+    def digest(self) -> bytes:
+        return self._part().digest
+
+
+def join(part: Part, transaction: WriteTransaction, clip: str) -> None:
+    """Carry the chunks of ``part`` over; its clip is called ``clip`` from now on."""
+    held = transaction.writer.directory
+    with open(part.data) as file:
+        plan = whole(file)
+        for kind, name in list(plan.things):
+            if kind == CLIP and name != clip:
+                plan.things[kind, name] = Change(clip)
+            elif kind == ALIAS and name in held.aliases and file.alias_of(name).kind == SKELETON:
+                del plan.things[kind, name]
+        carry(file, transaction.writer, plan, lambda name: None)
+
+
+def asks(
+    entries: Iterable[SourceEncoder], transaction: WriteTransaction, seen: Content
+) -> Iterator[Ask | None]:
+    """Yield the sources to encode ahead; None for one that may turn out to be there already."""
+    sent: set[bytes] = set()
+    for entry in entries:
+        try:
+            digest = entry.digest()
+        except MczError:
+            yield None
+            continue
+        depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
+        is_there = not depends and (digest in seen or digest in sent)
+        if is_there or entry.name in transaction.paths:
+            yield None
+            continue
+        sent.add(digest)
+        yield ask_of(entry, transaction.writer.profile)
+
+
+@contextmanager
+def ahead(
+    entries: Sequence[SourceEncoder], transaction: WriteTransaction, seen: Content
+) -> Iterator[Iterator[SourceEncoder]]:
+    """The entries in order, those ahead in work by other processes where that is worth it."""
+    jobs = useful(len(entries), sum(size_of(entry.path) for entry in entries))
+    if jobs == ONE or not only_own():
+        yield iter(entries)
+        return
+    with answers(coded, asks(entries, transaction, seen), jobs) as found:
+        yield joined(entries, found)
+
+
+def joined(
+    entries: Iterable[SourceEncoder], found: Iterable[Answer[Part] | None]
+) -> Iterator[SourceEncoder]:
+    """The entries, with the parts that were made of them."""
+    for entry, answer in zip(entries, found, strict=True):
+        yield entry if answer is None else Joined(entry, answer)

@@ -1,0 +1,400 @@
+"""``extract``: frames, joints and coarser resolutions cut out of the stored bytes of a file.
+
+Streams are copied byte for byte, SPEC.md, "Cutting without re-encoding"; only where a caller allows
+it is what cannot be cut coded anew (``reencode.py``).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import BinaryIO
+
+from mcz.container import payloads
+from mcz.container.chunks import ChunkType
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.segments import SegmentHeader
+from mcz.container.value_hash import ValueDigest, value_hash
+from mcz.errors import FormatError, MotionError, OptionError
+from mcz.files.editing.chunk_copier import ChunkCopier, metadata_records
+from mcz.files.editing.cutting import (
+    WITHOUT_SOURCE,
+    ClipCut,
+    SignalCut,
+    clip_record,
+    cut_quality,
+    cut_segment,
+    cut_skeleton,
+    note_source,
+    plan_cut,
+    recoded_quality,
+)
+from mcz.files.editing.reencode import (
+    OF_JOINTS,
+    check_anew,
+    joints_alone,
+    settings_of,
+    settings_of_joints,
+    with_own_source,
+)
+from mcz.files.editing.rewriting import writer_like
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.fields import Where
+from mcz.files.reading.file import File, open
+from mcz.files.reading.signal_reader import SignalReader
+from mcz.files.reading.source_info import stating_rate
+from mcz.files.writing.atomic import replacing_file
+from mcz.files.writing.clip_writer import Amend, check_values
+from mcz.files.writing.planning import prepare
+from mcz.files.writing.quality import CHUNK
+from mcz.files.writing.tuning import write_motion
+from mcz.model.motion import Motion
+from mcz.model.schema import build, parse
+from mcz.model.skeleton import Joints
+from mcz.model.text_format import brief
+from mcz.model.types import Params, Progress, Target
+from mcz.sources import FORMATS
+
+
+@dataclass(frozen=True, slots=True)
+class ExtractedClip:
+    """An extracted clip: frames a <= f < b, joints (None: all), finest resolutions.
+
+    ``stored_frames`` are those whose bytes were copied; the two sizes are of whole DATA payloads.
+    ``recoded``: it was decoded and coded anew.
+    """
+
+    name: str
+    frames: tuple[int, int]
+    joints: tuple[str, ...] | None
+    resolution: int
+    stored_frames: int
+    data_bytes: int
+    data_bytes_before: int
+    recoded: bool = False
+
+    __repr__ = brief
+
+
+@dataclass(slots=True)
+class Extraction:
+    """The outcome of ``extract``, and parts of the source file that it left out uncut.
+
+    ``damage`` is what salvage found wrong.
+    """
+
+    clips: list[ExtractedClip] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    size: int = 0
+
+    __repr__ = brief
+
+
+def extract(
+    source: Target,
+    target: Target,
+    *,
+    resolution: int = 0,
+    joints: Joints = None,
+    frames: tuple[int, int | None] | None = None,
+    clip: str | Sequence[str] | None = None,
+    where: Where | None = None,
+    salvage: bool = False,
+    force: bool = False,
+    max_decoded: int | None = None,
+    copies: bool | None = None,
+    recode: bool = False,
+    progress: Progress | None = None,
+) -> Extraction:
+    """Write what is left of the MCZ file ``source`` when all else is cut, without re-encoding.
+
+    ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
+    are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
+    ``clip``: take out this clip, or these, alone; otherwise all are cut, and attachments kept.
+    ``where``: take out those alone that it takes, see ``File.find``.
+    ``salvage``: the file may be damaged, but not in what is taken out.
+    ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
+    ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
+    ``recode``: a clip is decoded and coded anew, as it was, where joints are coded in one group
+    with others, which are refused by default, or where frames that are cut off would stay in the
+    file, since those that are left need them.
+    Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
+    FormatError for bad bytes; nothing is left under the target's name then.
+    """
+    alone = clip is not None or where is not None
+    if not resolution and joints is None and frames is None and not alone:
+        raise OptionError("nothing to extract: give a resolution, joints, frames or a clip")
+    with open(source, salvage=salvage, max_decoded=max_decoded) as opened:
+        file = File(opened.container.strictly())
+        names = [clip] if isinstance(clip, str) else clip
+        clips = file.chosen(names, where)
+        if not clips:
+            raise OptionError("it has no clip to extract from", path=file.name)
+        cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
+        for cut in cuts:
+            if cut.anew:
+                check_anew(cut.clip, whole=cut.joints is None)
+        with replacing_file(target, force=force, inputs=(source,)) as stream:
+            copier = Copier(Copying(file, stream, progress, copies))
+            copier.run(cuts, alone=alone)
+            check_values(stream, [cut.clip.name for cut in cuts if not copier.is_same(cut)])
+            size = copier.writer.offset
+            return Extraction(copier.clips, copier.left_out, list(opened.damage), size)
+
+
+@dataclass(frozen=True, slots=True)
+class Copying:
+    """A file and where it is copied to; ``copies`` None: where it has some."""
+
+    file: File
+    stream: BinaryIO
+    progress: Progress | None = None
+    copies: bool | None = None
+
+
+class Copier(ChunkCopier):
+    """Copies what is left of a file."""
+
+    def __init__(self, copying: Copying) -> None:
+        file = copying.file
+        super().__init__(file.container, writer_like(copying.stream, [file], copying.copies))
+        self.file, self.progress = file, copying.progress
+        self.clips: list[ExtractedClip] = []
+        self.done = self.total = 0  # segments
+
+    def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> None:
+        """Write the new file; ``alone``: these clips and what they need, nothing else."""
+        self.total = sum(len(part.rows) for cut in cuts for part in cut.signals)
+        for (kind, _), chunk in self.container.directory.shared.items():
+            if kind == ChunkType.MODL:  # which one a clip needs, its codec alone knows
+                self.writer.shared(kind, self.container.payload(chunk))
+        if not alone:
+            self.skeletons()
+            self.before_clips()
+            self.attachments()
+        for cut in cuts:
+            if cut.anew:
+                self.write_anew(cut)
+            else:
+                self.write(cut)
+        self.aliases({cut.clip.name: cut for cut in cuts}, alone)
+        if cuts:
+            names = ((cut.clip.name, self.name_of(cut)) for cut in cuts)
+            self.writer.metadata(metadata_records(self.container, names))
+        self.writer.finish()
+
+    def skeletons(self) -> None:
+        """Copy every skeleton, also those that no clip has."""
+        for kind, id_ in self.container.directory.shared:
+            if kind == ChunkType.SKEL:
+                self.skeleton(id_)
+
+    def attachments(self) -> None:
+        for name in self.container.directory.attachments:
+            self.attachment(name)
+
+    def is_same(self, cut: ClipCut) -> bool:
+        """Return True if the clip is unchanged."""
+        return cut.is_whole and not cut.anew
+
+    def write(self, cut: ClipCut) -> None:
+        """Write one clip from its stored bytes."""
+        clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
+        record = self.record_of(cut)
+        skeleton = self.skeleton(clip.skeleton_id)
+        if cut.joints is not None:
+            payload = self.stored(ChunkType.SKEL, skeleton)
+            payload = cut_skeleton(payload, skeleton, cut.joints, self.container.profile)
+            skeleton = self.writer.shared(ChunkType.SKEL, payload)
+        whole = replace(record, skeleton=skeleton)
+        new = whole if cut.is_whole else clip_record(cut, skeleton, record)
+        source, hashes = self.finish_record(cut, new)
+        new.name = self.name_of(cut)
+        self.writer.begin_clip(new)
+        self.inside(row)
+        rows = [(own, part) for part in cut.signals for own in part.rows]
+        for own, part in sorted(rows, key=lambda pair: pair[0].offset):
+            self.writer.segment(*self.segment(cut, part, own, noted=bool(new.source)))
+            self.done += 1
+            if self.progress is not None:
+                self.progress(self.done, self.total, clip.name)
+        cend = self.container.cend(row)
+        extension = b"" if cend is None else bytes(cend.extension)
+        missing = cend.missing if cend is not None and cut.is_whole else []
+        self.writer.end_clip(cut.n_frames, source, hashes, extension, missing)
+        self.quality(cut, row)
+        self.note(cut)
+
+    def segment(
+        self, cut: ClipCut, part: SignalCut, row: SegmentRow, *, noted: bool
+    ) -> tuple[SegmentHeader, list[bytes], bytes]:
+        """Header, streams and extension of what is left of a segment."""
+        return cut_segment(self.container, part, row, noted=noted)
+
+    def write_anew(self, cut: ClipCut) -> None:
+        """Write what is left of a clip, decoded and coded anew."""
+        clip, old = cut.clip, cut.clip.stored_quality or {}
+        motion = replace(joints_alone(cut), name=self.name_of(cut))
+        settings = settings_of(clip) if cut.joints is None else settings_of_joints(clip)
+        record = self.recode(clip, motion, settings, partial(recoded_quality, cut, old))
+        for name in OF_JOINTS:
+            if f"param.{name}" in old and f"param.{name}" not in record:
+                self._leave_out(cut, f"its {name}, which other joints have a part in")
+        if clip.source is not None and cut.joints is not None:
+            self._leave_out(cut, "its source file, as joints were cut")
+        self.note(cut)
+
+    def _leave_out(self, cut: ClipCut, text: str) -> None:
+        self.left_out.append(f"clip {cut.clip.name}: {text}")
+
+    def recode(self, clip: Clip, motion: Motion, settings: Params, amend: Amend) -> dict[str, str]:
+        """Write ``motion``, coded anew, in the place of ``clip``; return its quality record.
+
+        ``amend`` makes that from the one of this coding; a lossless codec has none.
+        """
+        row, codec = self.container.directory.clips[clip.name], clip.signals[0].codec
+        self.skeleton(clip.skeleton_id)
+        motion, left_out = with_own_source(motion, clip)
+        if left_out is not None:
+            self.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
+        prepared = prepare(motion, codec, settings)
+        record = write_motion(self.writer, prepared, codec, settings, self.progress, amend=amend)
+        self.inside(row)
+        self.behind(row, but=CHUNK)
+        return record or {}
+
+    def record_of(self, cut: ClipCut) -> payloads.Clip:
+        """The CLIP that is cut."""
+        return self.container.clip(self.container.directory.clips[cut.clip.name])
+
+    def name_of(self, cut: ClipCut) -> str:
+        """New name of the clip."""
+        return cut.clip.name
+
+    def finish_record(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
+        """Source and metadata of the new CLIP; return the hashes of the source and the signals."""
+        if cut.is_whole:
+            cend = self.container.whole_cend(self.container.directory.clips[cut.clip.name])
+            source, hashes = cend.source_sha256 or b"", list(cend.value_sha256)
+        else:
+            source, hashes = self._decoded(cut, new)
+            if new.source is None:
+                self._without_units(cut, new)
+        if new.source is not None:
+            self.shared(ChunkType.SRCE, new.source.template)
+        return source, hashes
+
+    def _without_units(self, cut: ClipCut, new: payloads.Clip) -> None:
+        """Words whose meaning only the source told are words, and not in the unit of that."""
+        for info, signal in zip(cut.clip.signals, new.signals, strict=True):
+            if cut.clip.is_scaled(info.index):
+                signal.channels = [replace(own, unit="") for own in signal.channels or ()]
+                note_source(new, f"{info.name}: words as they were stored")
+                words = f"the words of its signal {info.name}"
+                self._leave_out(cut, f"what {words} mean, as its source file was cut")
+
+    def _decoded(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
+        """The hashes of what is left, decoded once, and the source file that it has now."""
+        held = new.source
+        if held and cut.joints is not None:
+            new.source = None
+            note_source(new, WITHOUT_SOURCE)
+            self._leave_out(cut, "its source file, as joints were cut")
+        elif held:
+            motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
+            hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
+            if motion.source is None:  # of a damaged file; the template may say why
+                self.container.template(held.template, held.format)
+                raise FormatError("it cannot be put together")
+            return self.put_source(cut, new, motion), hashes
+        return b"", [self._value_hash(cut, part) for part in cut.signals]
+
+    def put_source(self, cut: ClipCut, new: payloads.Clip, motion: Motion) -> bytes:
+        """Let the source of a clip be that of ``motion``; its hash, b"" where it cannot be."""
+        held, changed = new.source, stating_rate(motion, cut.clip.frame_numbers)
+        assert held is not None and changed.source is not None
+        if changed is not motion:
+            template = self.writer.template(held.format, changed.source.template)
+            held = replace(held, template=template)
+        try:
+            data = FORMATS[changed.source.format].write(changed)
+        except MotionError as error:
+            new.source = None
+            text = f"the source file was left out: {error}"
+            note_source(new, text, None if cut.is_whole else cut)
+            self._leave_out(cut, f"its source file, as {error}")
+            return b""
+        new.source = replace(held, size=len(data))
+        return hashlib.sha256(data).digest()
+
+    def _value_hash(self, cut: ClipCut, part: SignalCut) -> bytes:
+        """The hash of what is left of a signal, a few segments in memory at a time."""
+        info, digest = part.info, ValueDigest()
+        reader = SignalReader(self.container, info, part.groups, part.dropped, cut.clip.name)
+        for block in reader.blocks(cut.start + info.skip, cut.stop + info.skip):
+            digest.update(block.values, block.mask)
+        return digest.digest()
+
+    def quality(self, cut: ClipCut, row: ClipRow) -> None:
+        """The quality record, another one where the clip is, and the other ancillary chunks."""
+        if self.is_same(cut):
+            self.behind(row)
+            return
+        records = [chunk for chunk in row.ancillary if chunk.type == CHUNK]
+        record = payloads.Qual(entries=[])
+        if records:
+            payload = self.container.payload(records[0])
+            record = parse(payloads.Qual, payload, records[0].label)
+        old = {entry.key: entry.value for entry in record.entries}
+        now = self.entries(cut, old if records else None)
+        if now is not None:
+            record.entries = payloads.metadata_records(now)
+            self.writer.ancillary(CHUNK, build(record, "quality record"))
+        self.behind(row, but=CHUNK)
+
+    def entries(self, cut: ClipCut, old: Mapping[str, str] | None) -> dict[str, str] | None:
+        """Entries of the quality record from those of before; None: there is no record."""
+        return cut_quality(cut, old or {})
+
+    def note(self, cut: ClipCut) -> None:
+        """Keep what was written."""
+        written = self.writer.directory.clips[self.name_of(cut)].segments
+        before = [row for info in cut.clip.signals for row in info.rows]
+        stored = cut.n_frames
+        if not cut.anew:
+            stored += cut.signals[0].skip + cut.signals[0].spare
+            n_frames = sum(row.header.n_frames for part in cut.signals for row in part.rows)
+            assert n_frames == sum(row.header.n_frames for row in written)
+        self.clips.append(
+            ExtractedClip(
+                cut.clip.name,
+                (cut.start, cut.stop),
+                cut.names,
+                cut.resolution,
+                stored,
+                sum(row.size for row in written),
+                sum(row.size for row in before),
+                cut.anew,
+            )
+        )
+
+    def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
+        """Copy the aliases of what is here and as it was."""
+        for name, (of, target) in self.file.aliases.items():
+            if of == payloads.OF_CLIP:
+                cut = cuts.get(target.decode("utf-8", "replace"))
+                if cut is None:
+                    continue  # of a clip that was not chosen
+                if not self.is_same(cut):
+                    text = f"{name}, a file identical to that of clip {cut.clip.name} before"
+                    self.left_out.append(text)
+                    continue
+            elif of == payloads.OF_SKELETON:
+                if (ChunkType.SKEL, bytes(target)) not in self.writer.directory.shared:
+                    continue
+            elif alone:
+                continue
+            self.writer.alias(name, of, target)

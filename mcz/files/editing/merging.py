@@ -1,0 +1,228 @@
+"""Several MCZ files in one: chunks are carried over as they are, what they share is written once.
+
+Nothing is re-encoded (``chunk_copier.py``). Two different things under one name are never mixed:
+that is refused, or the later one is renamed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import count
+from pathlib import PurePosixPath
+
+from mcz.container import payloads
+from mcz.container.writer import Writer
+from mcz.errors import OptionError
+from mcz.files.editing.batch_report import Outcome, Report
+from mcz.files.editing.chunk_copier import UNPROTECTED, Change
+from mcz.files.editing.protecting import protect_written, redundancy_of
+from mcz.files.editing.rewriting import (
+    ALIAS,
+    ATTACHMENT,
+    CLIP,
+    SKELETON,
+    Plan,
+    Thing,
+    carry,
+    path_of,
+    steps,
+    things_in,
+    whole,
+    writer_like,
+)
+from mcz.files.reading.clips import listed
+from mcz.files.reading.file import File, open
+from mcz.files.writing.atomic import replacing_file
+from mcz.files.writing.write_transaction import WriteTransaction
+from mcz.model.schema import parse
+from mcz.model.text_format import counted, shown
+from mcz.model.types import Progress, Target
+
+
+def merge(
+    sources: Sequence[str | os.PathLike[str]],
+    target: Target,
+    *,
+    rename: bool = False,
+    skip_identical: bool = False,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Put all that several MCZ files hold into one, clips in the order of the files.
+
+    A name that two of them have, or a path that both restore, is refused. ``skip_identical``: one
+    that means the same content in both is taken once. ``rename``: the later one is put below the
+    name of its file, "walk" of day2.mcz becomes "day2/walk", and so is its source. The own files
+    of skeletons that are the same under one name are always taken once. Raises OptionError, which
+    names what is double; nothing is left under the target's name then.
+
+    Recovery data are of one file. Where all files have some, the new one has its own, in the
+    greatest share of theirs; where only some have, the report says so.
+    """
+    if not sources:
+        raise OptionError("nothing to merge: name MCZ files")
+    merging = Merging(rename, skip_identical)
+    with (
+        merging.plans(sources) as plans,
+        replacing_file(target, force=force, inputs=sources) as stream,
+    ):
+        report, files = merging.report, [file for file, _ in plans]
+        writer = writer_like(stream, files)
+        merging.carry(plans, writer, progress)
+        writer.finish()
+        if share := _share_of_all(files):
+            protect_written(stream, share)
+            report.left_out = [t for t in report.left_out if not t.endswith(UNPROTECTED)]
+        report.size = stream.tell()
+    return report
+
+
+def _share_of_all(files: Sequence[File]) -> float | None:
+    """The greatest share of recovery data that a file has; None where not all have some."""
+    shares = [redundancy_of(file.container) for file in files]
+    known = [share for share in shares if share is not None]
+    return max(known) if len(known) == len(shares) else None
+
+
+def add_files(
+    sources: Sequence[str | os.PathLike[str]],
+    before: File,
+    transaction: WriteTransaction,
+    rename: bool,
+    skip_identical: bool,
+    progress: Progress | None,
+) -> Report:
+    """Carry what MCZ files hold over to ``transaction``, which adds to the file ``before``.
+
+    Raises as ``merge`` does.
+    """
+    # Content that was written just now is like no other: it cannot be read yet.
+    there: dict[Thing, Callable[[], object]] = dict.fromkeys(
+        things_in(transaction.writer.directory), object
+    )
+    merging = Merging(rename, skip_identical, there)
+    merging.things |= {thing: _content(before, thing) for thing in things_in(before)}
+    merging.paths.update(transaction.paths)
+
+    def kept(done: int, total: int, name: str) -> None:
+        transaction.keep()
+        if progress is not None:
+            progress(done, total, name)
+
+    with merging.plans(sources) as plans:
+        merging.carry(plans, transaction.writer, kept)
+    return merging.report
+
+
+@dataclass(slots=True)
+class Merging:
+    """Files that are put into one, and what the new file holds so far.
+
+    ``things`` have what tells the content of each, ``paths`` are those of all files that it
+    restores. ``rename`` and ``skip_identical`` are those of ``merge``.
+    """
+
+    rename: bool
+    skip_identical: bool
+    things: dict[Thing, Callable[[], object]] = field(default_factory=dict)
+    paths: set[str] = field(default_factory=set)
+    report: Report = field(default_factory=Report)
+
+    @contextmanager
+    def plans(self, sources: Sequence[str | os.PathLike[str]]) -> Iterator[list[tuple[File, Plan]]]:
+        """The files, and what of each goes into the new one; raises OptionError as ``merge``."""
+        with ExitStack() as stack:
+            files = [stack.enter_context(open(source)) for source in sources]
+            double: list[str] = []
+            found = [(file, self._plan(file, double)) for file in files]
+            if double:
+                raise OptionError(
+                    f"{listed(double)}: {counted(len(double), 'name')} in more than one file; "
+                    "rename the later ones, or skip those of identical content"
+                )
+            yield found
+
+    def _plan(self, file: File, double: list[str]) -> Plan:
+        """The parts of ``file`` that go into the new file; ``double`` learns those that cannot."""
+        plan = whole(file)
+        for thing in list(plan.things):
+            kind, name = thing
+            there = self.things.get(thing)
+            of_skeleton = kind == ALIAS and file.alias_of(name).kind == SKELETON
+            may_skip = there is not None and (self.skip_identical or of_skeleton)
+            new = ""
+            if there is not None and may_skip and there() == _content(file, thing)():
+                del plan.things[thing]  # aliases lead to what is there
+                new, result = "the same content", "present"
+            elif there is None and path_of(file, thing) not in self.paths:
+                result = "copied"
+            elif self.rename:
+                new, result = self._free(file, thing), "renamed"
+                path = path_of(file, thing) if kind == CLIP else ""
+                plan.things[thing] = Change(new, new.removesuffix(name) + path if path else None)
+            else:
+                double.append(f"{kind} {shown(name)}")
+                continue
+            self.report.outcomes.append(Outcome(name, result, 0, new))
+        for thing, change in plan.things.items():
+            self.things[thing[0], change.name or thing[1]] = _content(file, thing)
+            if path := path_of(file, thing, change):
+                self.paths.add(path)
+        return plan
+
+    def _free(self, file: File, thing: Thing) -> str:
+        """A name below that of the file, that nothing has."""
+        kind, name = thing
+        stem = PurePosixPath(file.name.replace("\\", "/")).stem or "file"
+        folders = (stem if n == 1 else f"{stem}~{n}" for n in count(1))
+        return next(
+            new
+            for new in (f"{folder}/{name}" for folder in folders)
+            if (kind, new) not in self.things and new not in self.paths
+        )
+
+    def carry(
+        self, plans: Sequence[tuple[File, Plan]], writer: Writer, progress: Progress | None
+    ) -> None:
+        """Write what the plans say of their files."""
+        step = steps(progress, sum(len(plan.of(CLIP)) for _, plan in plans))
+        for file, plan in plans:
+            left_out = carry(file, writer, plan, step)
+            self.report.left_out += [f"{file.name}: {text}" for text in left_out]
+
+
+def _content(file: File, thing: Thing) -> Callable[[], object]:
+    """A finder of the content of a thing, the same in two that can stand for each other."""
+    kind, name = thing
+    if kind == ALIAS:
+        return _of_alias(file, name)
+    return partial(_of_clip if kind == CLIP else _of_attachment, file, name)
+
+
+def _of_clip(file: File, name: str) -> object:
+    clip = file.clips[name]
+    hashes = clip.container.whole_cend(clip.container.directory.clips[name])
+    digests = [hashes.source_sha256, *hashes.value_sha256]
+    path = clip.source.path if clip.source is not None else ""
+    return clip.skeleton_id, clip.frame_rate, path, dict(clip.metadata), digests
+
+
+def _of_attachment(file: File, name: str) -> tuple[int, bytes]:
+    part = file.container.directory.attachments[name].parts[0]
+    fields = parse(payloads.Atta, file.container.payload(part), part.label)
+    return fields.size, bytes(fields.sha256)
+
+
+def _of_alias(file: File, alias: str) -> Callable[[], object]:
+    """The content of what an alias stands for; of a skeleton's file its id."""
+    kind, name = file.alias_of(alias)
+    if kind == CLIP and name in file.clips.rows:
+        source = file.clips[name].source
+        return lambda: None if source is None else source.sha256
+    if kind == ATTACHMENT and name in file.attachments:
+        return lambda: _of_attachment(file, name)[1]
+    return lambda: (kind, name)

@@ -1,0 +1,326 @@
+"""The streams of one joint with other values, coded as the clip was; nothing is written here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcz.codecs.contract import Codec, RecodeRequest, Request
+from mcz.codecs.parameters import TARGETS
+from mcz.errors import MotionError, OptionError
+from mcz.files.editing.cutting import coded_together, groups_of
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.signal_info import SignalInfo
+from mcz.files.reading.signal_reader import SignalReader
+from mcz.files.writing.quality import with_values
+from mcz.files.writing.signal_source import MAX_INTEGER, MemorySource, settle
+from mcz.model.motion import Motion, Signal
+from mcz.model.types import Settings
+
+Streams = dict[tuple[int, int], tuple[bytes, ...]]  # (segment, group) -> by stored resolution
+
+
+@dataclass(frozen=True, slots=True)
+class Recoded:
+    """One joint of a clip with other values, coded.
+
+    ``given`` is the motion as it was asked for, ``decoded`` as a reader has it now. The sizes are
+    those of the joint's own streams.
+    """
+
+    info: SignalInfo
+    joint: int
+    groups: tuple[int, ...]
+    streams: Streams
+    size: int
+    size_before: int
+    max_error: float
+    given: Motion
+    decoded: Motion
+    source: MemorySource
+
+    def beside(self, start: int, stop: int) -> tuple[dict[int, bytes], dict[int, bytes]]:
+        """Group notes and masks of the joint's groups for the segment start <= f < stop."""
+        if self.info.codec.domain == "ordinals":
+            self.source.ordinals(start, stop)  # finds the exceptions
+        found = self.source.group_notes(start, stop), self.source.masks(start, stop)
+        notes, masks = (
+            {group: streams[group] if streams else b"" for group in self.groups}
+            for streams in found
+        )
+        return notes, masks
+
+
+def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Recoded:
+    """Code the joint anew, and decode it again.
+
+    Raises OptionError for what cannot be edited, MotionError for values that do not suit.
+    """
+    info = clip.signals[0]
+    groups = _groups_of(clip, info, joint)
+    edited = edit(clip, joint, values, on_grid)
+    columns, motion = list(clip.skeleton.columns(edited.joint)), edited.motion
+    signal = motion.signals[0]
+    source = _source_of(clip, info, signal)
+    reader = SignalReader(clip.container, info, tuple(range(len(info.layout.groups))), 0, clip.name)
+    coded = groups if info.codec.subset is None else reader.groups
+    streams = _streams(clip, info, source, coded, reader)
+    decoded = _decoded(info, signal, source, streams, groups, reader)
+    n_segments = range(len(info.rows))
+    n_resolutions = range(info.counts.n_resolutions)
+    with np.errstate(invalid="ignore"):  # infinities
+        difference = np.abs(decoded.masked()[:, columns] - edited.given)
+    return Recoded(
+        info=info,
+        joint=edited.joint,
+        groups=groups,
+        streams=streams,
+        size=sum(len(s) for g in groups for i in n_segments for s in streams[i, g]),
+        size_before=sum(
+            len(reader.fetch(i, r, g)) for i in n_segments for r in n_resolutions for g in groups
+        ),
+        max_error=float(np.nanmax(difference, initial=0.0)),
+        given=replace(motion, signals=(with_values(signal, signal.values), *motion.signals[1:])),
+        decoded=replace(motion, signals=(decoded, *motion.signals[1:])),
+        source=source,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Edited:
+    """A decoded clip, one joint of which has other values; ``given`` are these as they came."""
+
+    joint: int
+    motion: Motion
+    given: NDArray[np.float64]
+
+
+def edit(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Edited:
+    """A clip with other values for one joint; raises as ``recode_joint`` does."""
+    index = _editable(clip, joint)
+    columns = list(clip.skeleton.columns(index))
+    before = clip.motion()
+    for info, signal in zip(clip.signals, before.signals, strict=True):
+        clip.check_hash(info, signal.stored, signal.mask)
+    given = _checked(clip, columns, values)
+    signal = _edited(clip, before, columns, given, on_grid)
+    return Edited(index, replace(before, signals=(signal, *before.signals[1:])), given)
+
+
+def _editable(clip: Clip, joint: int | str) -> int:
+    """The joint's index, of a clip that may be edited."""
+    if clip.container.salvage:
+        raise OptionError("a file that is salvaged cannot be edited", clip=clip.name)
+    if not clip.signals[0].has_poses:
+        raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
+    index = clip.skeleton.find(joint)
+    if not clip.skeleton.joints[index].channels:
+        name = clip.skeleton.addresses()[index]
+        raise OptionError(f"joint {name} has no channels", clip=clip.name)
+    return index
+
+
+def is_coded_with_others(clip: Clip, joint: int | str) -> bool:
+    """Return True if a group has channels of this joint and of another."""
+    return groups_of(clip, (_editable(clip, joint),))[1] is not None
+
+
+def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...]:
+    """The joint's groups, which hold no channel of another joint."""
+    groups, mixed = groups_of(clip, (_editable(clip, joint),))
+    if mixed is not None:
+        text = f"replaced alone, codec {info.codec.name} codes its channels"
+        raise coded_together(clip, *mixed, text)
+    if info.codec.recode is None:
+        raise OptionError(f"codec {info.codec.name} cannot code one joint anew")
+    return groups
+
+
+def _checked(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDArray[np.float64]:
+    """The values that were given as an array (rows, channels)."""
+    try:
+        given = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise MotionError("the new values are not numbers", clip=clip.name) from None
+    shape = clip.n_frames * clip.signals[0].layout.samples_per_frame, len(columns)
+    if given.ndim == 1 and shape[1] == 1:
+        given = given[:, None]
+    if given.shape != shape:
+        raise MotionError(f"new values of shape {given.shape}, not {shape}", clip=clip.name)
+    return given
+
+
+def _edited(
+    clip: Clip,
+    before: Motion,
+    columns: Sequence[int],
+    given: NDArray[np.float64],
+    on_grid: bool,
+) -> Signal:
+    """The motion signal with the new values; NaN is invalid, what lies beneath stays."""
+    old = before.signals[0]
+    valid = ~np.isnan(given)
+    was_valid = np.ones(old.values.shape, np.bool_) if old.mask is None else old.mask
+    differs = valid != was_valid[:, columns]
+    if before.source is not None and differs.any():
+        row, at = np.argwhere(differs)[0].tolist()
+        now = "NaN" if not valid[row, at] else repr(float(given[row, at]))
+        raise MotionError(
+            f"frame {row // old.samples_per_frame} of "
+            f"{clip.skeleton.channel_addresses()[columns[at]]} is {now}; its source file says "
+            f"{'valid' if was_valid[row, columns[at]] else 'invalid'}",
+            clip=clip.name,
+        )
+    new, mask = old.values.copy(), was_valid.copy()
+    if new.dtype == np.int64:
+        given = np.where(valid, given, 0.0)
+        whole = np.rint(given)
+        if (np.abs(whole) > MAX_INTEGER).any() or (not on_grid and (whole != given).any()):
+            raise MotionError("its values are integers up to 2^53", clip=clip.name)
+        given = whole
+    new[:, columns] = np.where(valid, given, new[:, columns])
+    mask[:, columns] = valid
+    signal = replace(old, values=new, mask=None if mask.all() else mask)
+    if clip.signals[0].codec.domain == "values" or new.dtype == np.int64:
+        return signal
+    return _placed(clip, old, signal, on_grid)
+
+
+def _placed(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
+    """The signal, its new values on their grids where that is wanted or must be."""
+    ordinals, exact = signal.to_ordinals()
+    changed = signal.values.view(np.int64) != old.values.view(np.int64)
+    stray = changed & ~exact
+    if not stray.any():
+        return signal
+    values = signal.values.copy()
+    for rows, columns, grid in signal.grid_blocks():
+        block = stray[rows][:, columns]
+        if not block.any() or (grid.is_text and not on_grid):
+            continue
+        row, at = np.argwhere(block)[0].tolist()
+        what = (
+            f"clip {clip.name!r}: frame {(row + rows.start) // signal.samples_per_frame} of "
+            f"{clip.skeleton.channel_addresses()[columns[at]]}: its grid {grid.kind.name} does not "
+            f"hold {values[row + rows.start, columns[at]]!r}"
+        )
+        if not on_grid:
+            raise MotionError(f"{what}; on_grid takes the nearest that it holds")
+        found = ordinals[rows][:, columns]
+        nearest = grid.values(found)
+        given = values[rows][:, columns]
+        beyond = (np.abs(found) >= grid.limit) | ~np.isfinite(nearest) | ~np.isfinite(given)
+        if (beyond & block).any():
+            raise MotionError(f"{what}, nor one that is near")
+        values[rows, columns] = np.where(block, nearest, given)
+    return replace(signal, values=values)
+
+
+def _source_of(clip: Clip, info: SignalInfo, signal: Signal) -> MemorySource:
+    """Source for the codec: all stored frames, of which ``signal`` has those shown."""
+    if info.skip or info.spare:
+        signal = _with_hidden(clip, info, signal)
+    motion = Motion(clip.skeleton, (signal,), name=clip.name)
+    source = MemorySource(motion, 0, info.codec, info.layout.segment_bytes)
+    source.layout = info.layout
+    return source
+
+
+def _with_hidden(clip: Clip, info: SignalInfo, shown: Signal) -> Signal:
+    """``shown`` among the frames that are stored and not shown.
+
+    A lossy codec may be unable to decode those behind: there the last frame is held.
+    """
+    per_frame, n_stored = info.layout.samples_per_frame, info.layout.n_frames
+    start, stop = info.skip, n_stored - info.spare
+    known = n_stored if info.codec.lossless else stop
+    groups = tuple(range(len(info.layout.groups)))
+    reader = SignalReader(clip.container, info, groups, 0, clip.name)
+    stored = reader.signal(0, known)
+    rows = slice(start * per_frame, stop * per_frame)
+    values = stored.values
+    values[rows] = shown.values
+    valid = np.ones(values.shape, np.bool_) if stored.mask is None else stored.mask
+    valid[rows] = True if shown.mask is None else shown.mask
+    n_held = n_stored - known
+    values, valid = (
+        np.concatenate([held, *([held[-per_frame:]] * n_held)]) for held in (values, valid)
+    )
+    return replace(
+        shown,
+        values=values,
+        mask=None if valid.all() else valid,
+        exceptions=stored.exceptions,
+        grid_changes=stored.grid_changes,
+        ordinals=stored.ordinals if shown.ordinals is not None else None,
+    )
+
+
+def _streams(
+    clip: Clip,
+    info: SignalInfo,
+    source: MemorySource,
+    groups: tuple[int, ...],
+    reader: SignalReader,
+) -> Streams:
+    """The streams of ``groups`` in all segments."""
+    assert info.codec.recode is not None
+    spans, options = info.spans, recorded_options(info.codec, clip.quality or {})
+    coded = info.codec.recode(
+        RecodeRequest(info.header, source, groups, spans, options, reader.fetch)
+    )
+    return {
+        (number, group): streams[at :: len(groups)]
+        for number, streams in enumerate(coded)
+        for at, group in enumerate(groups)
+    }
+
+
+def recorded_options(codec: Codec, quality: Mapping[str, str]) -> Settings:
+    """The parameters of a codec as a quality record has them; what makes no sense is left out."""
+    aims = {target.name for target in TARGETS}
+    options = codec.options({})
+    for parameter in codec.parameters:
+        text = quality.get(f"param.{parameter.name}")
+        if text is None or parameter.name in aims:
+            continue
+        try:
+            options[parameter.name] = parameter.parse(text)
+        except OptionError:
+            continue
+    return options
+
+
+def _decoded(
+    info: SignalInfo,
+    signal: Signal,
+    source: MemorySource,
+    streams: Streams,
+    groups: tuple[int, ...],
+    reader: SignalReader,
+) -> Signal:
+    """The motion signal as a reader of the new streams has it."""
+
+    def fetch(segment: int, resolution: int, group: int) -> bytes:
+        coded = streams.get((segment, group))
+        return reader.fetch(segment, resolution, group) if coded is None else coded[resolution]
+
+    start, stop = info.skip, info.layout.n_frames - info.spare
+    request = Request(start, stop, groups)
+    found = info.codec.decode(info.header, info.layout, info.spans, request, fetch)
+    columns = [column for group in groups for column in info.layout.groups[group]]
+    if info.codec.domain == "values":
+        values = signal.values.copy()
+        values[:, columns] = found
+        return replace(signal, values=values)
+    per_frame = signal.samples_per_frame
+    for span in info.spans:
+        a, b = max(start, span.first), min(stop, span.stop)
+        wanted = source.ordinals(span.first, span.stop)[:, columns]
+        wanted = wanted[(a - span.first) * per_frame : (b - span.first) * per_frame]
+        if (found[(a - start) * per_frame : (b - start) * per_frame] != wanted).any():
+            raise AssertionError(f"codec {info.codec.name}: the joint does not come back")
+    return signal if signal.values.dtype == np.int64 else settle(signal)[1]

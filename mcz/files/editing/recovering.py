@@ -1,0 +1,341 @@
+"""A damaged file made whole again by its recovery data, to the byte.
+
+SPEC.md, "RECV", is normative. Blocks are looked for where they belong, and where the packets that
+were found say that bytes were inserted or cut off before them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain as chain_from
+from itertools import product, takewhile
+from typing import BinaryIO
+
+import numpy as np
+
+from mcz.container.recovery.code import LANE, encoded, recovered
+from mcz.container.recovery.encoder import Step, computed, encode_packets
+from mcz.container.recovery.layout import HASH, Shape
+from mcz.container.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
+from mcz.container.source import ByteSource
+from mcz.errors import FormatError
+from mcz.files.editing.protecting import chunk_bytes
+from mcz.files.reading.file import open_bytes
+from mcz.model.indexing import merged_ranges
+from mcz.model.text_format import brief
+from mcz.model.types import Progress, Target
+
+MOST_SHIFTS = 16
+MOST_SETS = 4  # that may protect the same bytes
+FEW = 8  # ranges that are named
+SLACK = BLOCK = 1 << 20
+
+
+@dataclass(slots=True)
+class Recovery:
+    """Result of a recovery: bad blocks of all, and the bytes of the file that they cover.
+
+    ``possible``: no more blocks are bad than there are recovery blocks. ``behind``: bytes behind
+    the last that is protected, taken as they are.
+    """
+
+    n_blocks: int = 0
+    n_recovery: int = 0
+    bad_blocks: int = 0
+    bad_recovery: int = 0
+    bad_bytes: list[tuple[int, int]] = field(default_factory=list)
+    behind: int = 0
+    possible: bool = True
+
+    __repr__ = brief
+
+    def told(self) -> list[str]:
+        """Lines on bad blocks; none for an intact file."""
+        if not (self.bad_blocks or self.bad_recovery):
+            return []
+        of = f"{self.bad_blocks:,} of {self.n_blocks:,} blocks are bad"
+        can = f"of {self.n_recovery:,} recovery blocks {self.bad_recovery:,} are bad, too"
+        ranges = merged_ranges(self.bad_bytes)
+        places = ", ".join(f"{start:,} to {stop:,}" for start, stop in ranges[:FEW])
+        more = f" and {len(ranges) - FEW:,} more ranges" if len(ranges) > FEW else ""
+        where = [f"bytes {places}{more}"] if ranges else []
+        return [f"recovery data: {of}; {can}", *where]
+
+
+@dataclass(slots=True)
+class _Set:
+    """One RECV as far as it was found, and where its blocks are."""
+
+    key: Key
+    sections: dict[int, bytes] = field(default_factory=dict)
+    blocks: dict[int, int] = field(default_factory=dict)  # where their bodies lie
+    shifts: dict[int, None] = field(default_factory=dict)  # in the order of being found
+
+    @property
+    def shape(self) -> Shape:
+        return self.key.shape
+
+    @property
+    def distance(self) -> int:
+        """The distance of its packets from their place, of the nearest of them."""
+        return min(map(abs, self.shifts), default=0)
+
+
+def recovery_sets(source: ByteSource) -> dict[int, list[_Set]]:
+    """The recovery data left in a file, by the offset of the range that they protect.
+
+    A file may hold some of other files, whole ones that were attached or put behind it: those
+    whose packets lie where they belong come first, and few of the others count.
+    """
+    found: dict[Key, _Set] = {}
+    places: dict[Key, dict[tuple[int, int], int]] = {}
+    for key, packet in find_packets(source):
+        if key.shape.stop > 2 * source.size + SLACK:
+            continue  # more than half of the file is gone, or it never was its own
+        one = found.setdefault(key, _Set(key))
+        place = places.setdefault(key, {(k, i): at for k, i, at in key.shape.packets()})
+        _keep(one, packet, place.get((packet.kind, packet.index)))
+    starts: dict[int, list[_Set]] = {}
+    for one in sorted(found.values(), key=lambda one: (one.distance, -len(one.blocks))):
+        starts.setdefault(one.shape.start, []).append(one)
+    return {start: sets[:MOST_SETS] for start, sets in starts.items()}
+
+
+def _keep(one: _Set, packet: Packet, place: int | None) -> None:
+    if place is None:
+        return
+    if packet.kind:
+        one.blocks[packet.index] = packet.offset + BODY_AT
+    else:
+        one.sections[packet.index] = packet.body
+    shift = packet.offset - place
+    if len(one.shifts) < MOST_SHIFTS:
+        one.shifts[shift] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """One RECV, and of each data block that is there by how much its pieces are shifted."""
+
+    set: _Set
+    there: dict[int, tuple[int, ...]]
+
+    @property
+    def n_bad(self) -> int:
+        return self.set.shape.n_blocks - len(self.there)
+
+    @property
+    def is_possible(self) -> bool:
+        """True if what is bad can be computed: no more blocks than there are recovery blocks."""
+        return self.n_bad <= len(self.set.blocks)
+
+    @property
+    def shift(self) -> int:
+        """By how much the end of what is protected is shifted, as far as it is known."""
+        return self.there[max(self.there)][-1] if self.there else 0
+
+
+def _examined(source: ByteSource, one: _Set) -> Examined:
+    """Find the data blocks; those that are not there are bad."""
+    shape = one.shape
+    table = _table(one)
+    there: dict[int, tuple[int, ...]] = {}
+    shifts = [0, *one.shifts]
+    hint = 0
+    for block in range(shape.n_blocks):
+        pieces = shape.pieces(block)
+        wanted = None if table is None else table[HASH * block : HASH * (block + 1)]
+        order = dict.fromkeys([hint, *shifts])
+        for tried in product(order, repeat=len(pieces)):
+            data = _read(source, pieces, tried)
+            if data is None:
+                continue
+            padded = data.ljust(shape.block_size, b"\0")
+            if wanted is None or short_hash(padded) == wanted:
+                there[block] = tried
+                hint = tried[0]
+                break
+    return Examined(one, there)
+
+
+def _read(
+    source: ByteSource, pieces: list[tuple[int, int]], shifts: tuple[int, ...]
+) -> bytes | None:
+    parts = []
+    for (offset, size), shift in zip(pieces, shifts, strict=True):
+        at = offset + shift
+        if at < 0 or at + size > source.size:
+            return None
+        parts.append(source.read(at, size))
+    return b"".join(parts)
+
+
+def _table(one: _Set) -> bytes | None:
+    """The hashes of the blocks; None where too few sections are left."""
+    shape = one.shape
+    n, size = shape.n_sections, shape.section_size
+    lost = [index for index in range(n) if index not in one.sections]
+    rows = [index - n for index in sorted(one.sections) if index >= n][: len(lost)]
+    if len(rows) < len(lost):
+        return None
+    own = np.zeros((n, size // LANE), np.int64)
+    for index in range(n):
+        if index in one.sections:
+            own[index] = np.frombuffer(one.sections[index], "<i8")
+    if lost:
+        rest = encoded(lambda a, b: own[a:b], n, shape.n_parities, size // LANE)[rows]
+        for at, row in enumerate(rows):
+            rest[at] ^= np.frombuffer(one.sections[n + row], "<i8")
+        own[lost] = recovered(rest, lost, rows, shape.n_parities)
+    return own.astype("<i8").tobytes()
+
+
+class Restorer:
+    """Writes a file as it was protected to ``out``, which can be read again."""
+
+    def __init__(self, source: ByteSource, out: BinaryIO, step: Step | None) -> None:
+        self.source, self.out, self.step = source, out, step
+
+    def restore(self, one: _Set, there: dict[int, tuple[int, ...]]) -> None:
+        """Write what one RECV protects, and itself; raises FormatError where it is not that."""
+        shape = one.shape
+        for block, shifts in there.items():
+            data = _read(self.source, shape.pieces(block), shifts)
+            assert data is not None
+            self._write(shape, block, data)
+        self._solve(one, there)
+        self._recv(one)
+
+    def _write(self, shape: Shape, block: int, data: bytes, first: int = 0) -> None:
+        """Write what a block has from its byte ``first`` on; the padding is no part of the file."""
+        at, stop = 0, first + len(data)
+        for offset, size in shape.pieces(block):
+            begin, end = max(first, at), min(stop, at + size)
+            if begin < end:
+                self.out.seek(offset + begin - at)
+                self.out.write(data[begin - first : end - first])
+            at += size
+
+    def _solve(self, one: _Set, there: dict[int, tuple[int, ...]]) -> None:
+        """Write the bad blocks, of large ones some columns at a time."""
+        shape = one.shape
+        lost = [block for block in range(shape.n_blocks) if block not in there]
+        rows = sorted(one.blocks)[: len(lost)]
+
+        def read(block: int) -> bytes:
+            data = _read(self.source, shape.pieces(block), there[block]) if block in there else b""
+            return (data or b"").ljust(shape.block_size, b"\0")
+
+        for start, whole in computed(shape, read, self.step) if lost else ():
+            rest = whole[rows]
+            for at, row in enumerate(rows):
+                place = one.blocks[row] + LANE * start
+                rest[at] ^= np.frombuffer(self.source.read(place, rest[at].nbytes), "<i8")
+            found = recovered(rest, lost, rows, shape.n_recovery).astype("<i8")
+            for at, block in enumerate(lost):
+                self._write(shape, block, found[at].tobytes(), LANE * start)
+
+    def _recv(self, one: _Set) -> None:
+        """The RECV chunk, made anew of what was written around it; raises NotThatError."""
+        shape = one.shape
+
+        def read(offset: int, size: int) -> bytes:
+            self.out.seek(offset)
+            return self.out.read(size)
+
+        key, packets = encode_packets(shape, lambda block: shape.block(block, read), self.step)
+        if key != one.key:
+            raise NotThatError("what recovery data give is not what they were made of")
+        at = shape.chunk_offset
+        for data in chunk_bytes(shape, packets):  # which reads meanwhile
+            self.out.seek(at)
+            self.out.write(data)
+            at += len(data)
+
+    def rest(self, last: _Set, size: int) -> None:
+        """Copy the bytes behind all protected ones."""
+        stop = self.source.size
+        self.out.seek(last.shape.stop)
+        for at in range(stop - size, stop, BLOCK):
+            self.out.write(self.source.read(at, min(BLOCK, stop - at)))
+        self.out.truncate(last.shape.stop + size)
+
+
+def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
+    """Examine a file by its recovery data: bad blocks, and their places."""
+    starts, chain, at = recovery_sets(source), list[Examined](), 0
+    while at in starts:
+        tried = map(partial(_examined, source), starts[at])
+        fallback = next(tried)
+        every = chain_from((fallback,), tried)
+        chain.append(next((one for one in every if one.is_possible), fallback))
+        at = chain[-1].set.shape.stop
+    found = Recovery(possible=all(one.is_possible for one in chain))
+    for one in chain:
+        shape = one.set.shape
+        found.n_blocks += shape.n_blocks
+        found.n_recovery += shape.n_recovery
+        found.bad_blocks += one.n_bad
+        found.bad_recovery += shape.n_recovery - len(one.set.blocks)
+        bad = (block for block in range(shape.n_blocks) if block not in one.there)
+        found.bad_bytes += [(at, at + size) for block in bad for at, size in shape.pieces(block)]
+    if chain:
+        found.behind = _behind(source, chain[-1])
+    return found, chain
+
+
+def _behind(source: ByteSource, last: Examined) -> int:
+    """Bytes behind what one RECV protects."""
+    return max(0, source.size - last.set.shape.stop - last.shift)
+
+
+def checked(target: Target) -> Recovery | None:
+    """Check a file by its recovery data; None for a file without any.
+
+    Raises AccessError where it cannot be read.
+    """
+    source = open_bytes(target)
+    try:
+        found, sets = examine(source)
+    finally:
+        source.close()
+    return found if sets else None
+
+
+def recover(
+    source: ByteSource, out: BinaryIO, progress: Progress | None
+) -> tuple[Recovery | None, int]:
+    """Write the file as it was protected to ``out``, which can be read again, as far as possible.
+
+    Also returns where that ends; what lies behind is in ``out`` as it was. Zero, and nothing is
+    written, where nothing can be restored; no Recovery where there are no recovery data.
+    """
+    found, sets = examine(source)
+    restorer = Restorer(source, out, None if progress is None else _steps(progress))
+    done: Examined | None = None
+    for one in takewhile(lambda one: one.is_possible, sets):
+        try:
+            restorer.restore(one.set, one.there)
+        except NotThatError:
+            found.possible = False
+            break
+        done = one
+    if done is None:
+        out.seek(0)
+        out.truncate()
+        return (found if sets else None), 0
+    restorer.rest(done.set, _behind(source, done))
+    out.flush()
+    return found, done.set.shape.stop
+
+
+class NotThatError(FormatError):
+    """The recovered bytes are not the protected ones."""
+
+
+def _steps(progress: Progress) -> Step:
+    def step(done: int, total: int) -> None:
+        progress(done + 1, total, "recovery data")
+
+    return step

@@ -1,0 +1,323 @@
+"""Clips taken out of a file, renamed, put in another order, or spread over several files.
+
+Nothing is coded anew (``rewriting.py``). What is deleted is in no byte of the new file, nor is what
+was there for its sake alone: skeletons, templates, models, what is said of it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+
+from mcz.container import payloads
+from mcz.container.chunks import ChunkType
+from mcz.errors import ExistsError, OptionError
+from mcz.files.editing.batch_report import Outcome, Report
+from mcz.files.editing.chunk_copier import SAME, Change
+from mcz.files.editing.rewriting import (
+    ALIAS,
+    ATTACHMENT,
+    CLIP,
+    KINDS,
+    SKELETON,
+    Plan,
+    Rewriting,
+    Thing,
+    path_of,
+    rewriting,
+    steps,
+    things_in,
+    used_by,
+    used_by_skeleton,
+    whole,
+)
+from mcz.files.editing.safe_names import PortableNames
+from mcz.files.queries import Value
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.clips import clips_meant, listed
+from mcz.files.reading.fields import Where, getter_of
+from mcz.files.reading.file import File, open
+from mcz.files.writing.write_transaction import check_name
+from mcz.hints import Hint
+from mcz.model.text_format import counted, nearest, shown
+from mcz.model.types import Progress, Target
+
+FOLDER = "folder"  # split by the first part of the names
+
+
+def delete_clips(
+    target: Target,
+    names: str | Iterable[str] = (),
+    *,
+    where: Where | None = None,
+    aliases: bool = False,
+    output: Target | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Take clips, attachments and aliases out of an MCZ file, and their bytes with them.
+
+    ``names``: those of clips, attachments or aliases; ``where``: also the clips that it takes, see
+    ``File.find``. What only they needed goes, too: skeletons and the files of these, templates,
+    models. A further name of the same content would keep it: with ``aliases`` it is deleted as
+    well, without it is refused. ``output``: the new file, for which ``force`` is; None: it takes
+    the place of the old one once it is whole. Raises OptionError for a name that is not there, and
+    where nothing is named.
+    """
+    with rewriting(target, output, force=force) as job:
+        file = job.file
+        named = [_named(file, name) for name in ([names] if isinstance(names, str) else names)]
+        if where is not None:
+            named += [(CLIP, clip.name) for clip in file.find(where)]
+        if not named:
+            raise OptionError("nothing to delete; name clips or say where", path=file.name)
+        gone = dict.fromkeys(named)
+        others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in gone]
+        missed = [alias for _, alias in others if (ALIAS, alias) not in gone]
+        if missed and not aliases:
+            raise OptionError(
+                f"{listed(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
+                "under another name, which would go, too; name it, or say aliases",
+                path=file.name,
+            )
+        gone |= dict.fromkeys(others)
+        plan = _without(file, gone)
+        what = {thing: thing[0] for kind in KINDS for thing in gone if thing[0] == kind}
+        for thing in things_in(file):
+            if thing not in plan.things:  # with the clips that had the skeleton
+                what.setdefault(thing, "the file of a skeleton that no other clip has")
+        report = Report([Outcome(name, "deleted", 0, said) for (_, name), said in what.items()])
+        return _finish(job, plan, report, progress)
+
+
+def _named(file: File, name: str) -> Thing:
+    """The clip, attachment or alias of this name."""
+    tables: tuple[Container[str], ...] = (file.clips.rows, file.attachments, file.aliases)
+    for kind, table in zip(KINDS, tables, strict=True):
+        if name in table:
+            return kind, name
+    clips = clips_meant(file.clips, name)
+    if len(clips) == 1:
+        return CLIP, clips[0]
+    if clips:
+        raise OptionError(f"{name!r} may be {listed(clips)}; choose one", path=file.name)
+    near = nearest(name, [other for _, other in things_in(file)])
+    said = f"; did you mean {near}?" if near else ""
+    raise OptionError(f"nothing is called {name!r}{said}", path=file.name)
+
+
+def _without(file: File, gone: Collection[Thing]) -> Plan:
+    """Plan a file without ``gone`` and without anything that only these need."""
+    plan = whole(file)
+    plan.things = {thing: SAME for thing in plan.things if thing not in gone}
+    needed = used_by(file, plan.of(CLIP))
+    lost = used_by(file, [name for kind, name in gone if kind == CLIP])
+    of_skeleton = {
+        alias: (ChunkType.SKEL, target)
+        for alias, (of, target) in file.aliases.items()
+        if of == payloads.OF_SKELETON
+    }
+    for alias, skeleton in of_skeleton.items():
+        if (ALIAS, alias) in gone:
+            lost |= used_by_skeleton(file.container, skeleton[1])
+        elif skeleton not in lost:
+            needed |= used_by_skeleton(file.container, skeleton[1])
+    lost -= needed
+    plan.shared = [key for key in plan.shared if key not in lost]
+    for alias, skeleton in of_skeleton.items():
+        if skeleton in lost:
+            plan.things.pop((ALIAS, alias), None)
+    return plan
+
+
+def rename_clips(
+    target: Target,
+    names: Mapping[str, str],
+    *,
+    output: Target | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Call clips, attachments and aliases of an MCZ file otherwise.
+
+    ``names``: from the old ones to the new. A clip's source, whose path was the clip's name and a
+    suffix, follows it, so that ``unpack`` gives it under the new name; so do what is said of it
+    and its aliases, which keep their own names. Names may be swapped. ``output`` and ``force`` are
+    those of ``delete_clips``. Raises OptionError for a name that is not there, and for one that is
+    taken.
+    """
+    with rewriting(target, output, force=force) as job:
+        file, report = job.file, Report()
+        plan = whole(file)
+        for old, new in names.items():
+            thing = _named(file, old)
+            check_name(new)
+            plan.things[thing] = _renamed(file, thing, new)
+            report.outcomes.append(Outcome(thing[1], "renamed", 0, new))
+        _refuse_equal(file, plan)
+        return _finish(job, plan, report, progress)
+
+
+def _renamed(file: File, thing: Thing, new: str) -> Change:
+    """The change that names a thing ``new``: the path of a clip's source may follow."""
+    path = path_of(file, thing) if thing[0] == CLIP else ""
+    suffix = PurePosixPath(path).suffix
+    return Change(new, new + suffix if path and path == thing[1] + suffix else None)
+
+
+def _refuse_equal(file: File, plan: Plan) -> None:
+    """Raise OptionError where two things would have one name that have not got one now."""
+    names = Counter((kind, change.name or name) for (kind, name), change in plan.things.items())
+    for (kind, name), number in names.items():
+        if number > 1:
+            kinds = "aliases" if kind == ALIAS else f"{kind}s"
+            raise OptionError(f"two {kinds} would be called {shown(name)}", path=file.name)
+    before = Counter(path_of(file, thing) for thing in plan.things)
+    after = Counter(path_of(file, thing, change) for thing, change in plan.things.items())
+    for path, number in after.items():
+        if path and number > 1 and number > before[path]:
+            raise OptionError(f"two files would be restored as {shown(path)}", path=file.name)
+
+
+def reorder_clips(
+    target: Target,
+    names: Sequence[str] = (),
+    *,
+    by: str | None = None,
+    output: Target | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Put the clips of an MCZ file in another order.
+
+    Those called ``names`` come first, in this order; the others follow in the order that they had
+    or, with ``by``, sorted by a field or metadata key ("-n_frames": descending), those without it
+    last. Names are sorted as people do: "take2" before "take10". ``output`` and ``force`` are
+    those of ``delete_clips``.
+    """
+    if isinstance(names, str):
+        names = [names]
+    if not names and by is None:
+        raise OptionError("no order: name clips, or say by what they are sorted")
+    with rewriting(target, output, force=force) as job:
+        file = job.file
+        rest = list(file) if by is None else in_order(file, list(file), by)
+        clips = dict.fromkeys((CLIP, clip.name) for clip in (*file.clips_called(names), *rest))
+        plan = whole(file)
+        plan.things = dict.fromkeys([*clips, *plan.things], SAME)
+        report = Report([Outcome(name, "moved") for _, name in clips])
+        return _finish(job, plan, report, progress)
+
+
+def in_order(file: File, clips: Sequence[Clip], by: str) -> list[Clip]:
+    """``clips`` sorted by a field or metadata key, "-" before it: descending; those without last.
+
+    Raises OptionError for a name that is neither.
+    """
+    get = getter_of(by.removeprefix("-"), file.clips.values())
+    found = [(get(clip), clip) for clip in clips]
+    having = [(value, clip) for value, clip in found if value is not None]
+    having.sort(key=lambda pair: natural(pair[0]), reverse=by.startswith("-"))
+    return [clip for _, clip in having] + [clip for value, clip in found if value is None]
+
+
+def natural(value: Value) -> tuple[object, ...]:
+    """Sort key that takes numbers within texts as numbers: "take2" before "take10"."""
+    if isinstance(value, str):
+        parts = re.split(r"([0-9]+)", value)
+        return 1, [(int(part), part) if part.isdigit() else (-1, part.casefold()) for part in parts]
+    return 0, value
+
+
+def split(
+    target: Target,
+    directory: str | os.PathLike[str],
+    *,
+    by: str = FOLDER,
+    rest: str | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Spread the clips of an MCZ file over files below ``directory``, one for each value of ``by``.
+
+    ``by``: a field or metadata key, or "folder", the first part of the clips' names. Each file is
+    called like the value and has the skeletons, templates and aliases of its clips. Clips without
+    a value, attachments, and skeletons that no clip has, are for the file called ``rest``; without
+    it an OptionError says that there are some. ``target`` stays as it is.
+    """
+    folder, report = Path(directory), Report()
+    with open(target) as file:
+        groups = _groups(file, by, rest)
+        portable = PortableNames()
+        outputs = {v: folder / portable(f"{v.replace('/', '_')}.mcz") for v in groups}
+        _check_outputs(outputs.values(), force)
+        folder.mkdir(parents=True, exist_ok=True)
+        step = steps(progress, len(file.clips))
+        for value, names in groups.items():
+            plan, part = _part(file, names, with_rest=value == rest), Report()
+            Rewriting(target, outputs[value], force, file).write(plan, part, step)
+            said = counted(len(names), "clip")
+            report.outcomes.append(Outcome(str(outputs[value]), "written", part.size or 0, said))
+    return report
+
+
+def _groups(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
+    """The names of the clips for each file."""
+    get = _folder if by == FOLDER else getter_of(by, file.clips.values())
+    groups: dict[str, list[str]] = {}
+    without = []
+    for clip in file:
+        value = get(clip)
+        if value is None or value == "":
+            without.append(clip.name)
+        else:
+            groups.setdefault(_text(value), []).append(clip.name)
+    kept = used_by(file, file.clips)
+    others = [key for key in file.container.directory.shared if key not in kept]
+    if rest is not None:
+        groups.setdefault(rest, []).extend(without)
+    elif without or file.attachments or others:
+        left = [(len(without), "clip"), (len(file.attachments), "attachment")]
+        left.append((sum(kind == ChunkType.SKEL for kind, _ in others), "skeleton"))
+        said = ", ".join(counted(n, word) for n, word in left if n)
+        if said:
+            raise OptionError(f"{said} without {by}; name a file for the rest", path=file.name)
+    return groups
+
+
+def _folder(clip: Clip) -> Value:
+    return clip.name.partition("/")[0] if "/" in clip.name else None
+
+
+def _text(value: Value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _check_outputs(outputs: Iterable[Path], force: bool) -> None:
+    for path in outputs:
+        if not force and os.path.lexists(path):
+            raise ExistsError("it exists", path=path, hint=Hint.FORCE)
+
+
+def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
+    """Plan the file of these clips; ``with_rest``: with all that is no clip's."""
+    needed = used_by(file, names)
+    if with_rest:
+        needed |= set(file.container.directory.shared) - used_by(file, file.clips)
+    shared = [key for key in file.container.directory.shared if key in needed]
+    plan = Plan(dict.fromkeys(((CLIP, name) for name in names), SAME), shared)
+    if with_rest:
+        plan.things |= dict.fromkeys(((ATTACHMENT, name) for name in file.attachments), SAME)
+    kept = {*plan.things}
+    kept |= {(SKELETON, id_.hex()) for kind, id_ in shared if kind == ChunkType.SKEL}
+    others = [(ALIAS, alias) for alias in file.aliases if file.alias_of(alias) in kept]
+    plan.things |= dict.fromkeys(others, SAME)
+    return plan
+
+
+def _finish(job: Rewriting, plan: Plan, report: Report, progress: Progress | None) -> Report:
+    job.write(plan, report, steps(progress, len(plan.of(CLIP))))
+    return report

@@ -1,0 +1,280 @@
+"""Rewriting of files: chunks are copied, not encoded.
+
+``chunk_copier.py`` copies chunks, this module plans. The old file keeps its name until the new one
+is whole and was walked from end to end. ``protect``, which may rewrite a file, is here as well.
+"""
+
+from __future__ import annotations
+
+import builtins
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import BinaryIO
+
+from mcz.container import payloads
+from mcz.container.chunks import ChunkType
+from mcz.container.directory import Directory
+from mcz.container.limits import Profile
+from mcz.container.locks import lock
+from mcz.container.metadata import Record
+from mcz.container.reader import Container
+from mcz.container.recovery import encoder
+from mcz.container.recovery.layout import check_redundancy
+from mcz.container.source import path_of as named_path
+from mcz.container.writer import Writer
+from mcz.errors import (
+    AccessError,
+    FormatError,
+    OptionError,
+    reason_of,
+)
+from mcz.files.editing.batch_report import Report
+from mcz.files.editing.chunk_copier import SAME, UNPROTECTED, Change, ChunkCopier, metadata_records
+from mcz.files.editing.protecting import (
+    DEFAULT,
+    Protection,
+    add_recovery,
+    protect_written,
+    protection_of,
+    redundancy_of,
+)
+from mcz.files.reading.file import File, open
+from mcz.files.reading.sizes import models_used
+from mcz.files.writing.atomic import replacing_file
+from mcz.model.schema import parse
+from mcz.model.types import Progress, Target
+
+Shared = tuple[bytes, bytes]  # type and id of a SKEL, MODL or SRCE
+Step = Callable[[str], None]  # is told the name of each clip that was carried over
+
+
+def steps(progress: Progress | None, total: int) -> Step:
+    """A step that counts for ``progress``."""
+    numbers = count(1)
+
+    def step(name: str) -> None:
+        if progress is not None:
+            progress(next(numbers), total, name)
+
+    return step
+
+
+KINDS = CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"
+SKELETON = "skeleton"
+Thing = tuple[str, str]  # its kind and its name, of a skeleton its id in hex
+
+
+def things_in(held: File | Directory) -> Iterator[Thing]:
+    """All that a file has under a name, in order."""
+    names = (CLIP, held.clips), (ATTACHMENT, held.attachments), (ALIAS, held.aliases)
+    return ((kind, name) for kind, names_of in names for name in names_of)
+
+
+@dataclass(slots=True)
+class Plan:
+    """The parts of a file that go into a new one.
+
+    ``things`` are what has a name, clips in their new order, and what is said otherwise of them.
+    ``shared`` goes along, needed by a clip or not. ``purges``: no META is carried over, for the
+    clips have their metadata in CLIP.
+    """
+
+    things: dict[Thing, Change] = field(default_factory=dict)
+    shared: list[Shared] = field(default_factory=list)
+    purges: bool = False
+
+    def of(self, kind: str) -> dict[str, Change]:
+        """The things of one kind by name."""
+        return {name: change for (its, name), change in self.things.items() if its == kind}
+
+
+def whole(file: File) -> Plan:
+    """All of a file, as it is."""
+    return Plan(dict.fromkeys(things_in(file), SAME), list(file.container.directory.shared))
+
+
+def used_by(file: File, names: Iterable[str]) -> set[Shared]:
+    """The skeletons with their bases, the templates and the models that these clips need."""
+    container, used = file.container, set[Shared]()
+    has_models = any(kind == ChunkType.MODL for kind, _ in container.directory.shared)
+    for name in names:
+        row = container.directory.clips[name]
+        source = container.clip_head(row).source
+        if source is not None:
+            used.add((ChunkType.SRCE, source.template))
+        if (ChunkType.SKEL, row.skeleton) not in used:
+            used |= used_by_skeleton(container, row.skeleton)
+        for signal in file.clips[name].signals if has_models else ():
+            used |= {(ChunkType.MODL, id_) for id_ in models_used(signal)}
+    return used
+
+
+def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
+    """A skeleton, its bases, and the templates of their own files."""
+    found: set[Shared] = set()
+    wanted: bytes | None = id_
+    while wanted and (ChunkType.SKEL, wanted) not in found:
+        fields = container.skeleton_fields(wanted)
+        found.add((ChunkType.SKEL, wanted))
+        found |= {(ChunkType.SRCE, bytes(source.template)) for source in [fields.source] if source}
+        wanted = fields.base
+    return found
+
+
+def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
+    """Write what ``plan`` says of ``file``; return what may not be carried over."""
+    carrier = ChunkCopier(file.container, writer)
+    carrier.before_clips()
+    for kind, id_ in plan.shared:
+        if kind == ChunkType.SKEL:
+            carrier.skeleton(id_)
+        else:
+            carrier.shared(kind, id_)
+    for name, change in plan.of(ATTACHMENT).items():
+        carrier.attachment(name, change.name)
+    clips = plan.of(CLIP)
+    for name, change in clips.items():
+        carrier.clip(name, change)
+        step(name)
+    for name, change in plan.of(ALIAS).items():
+        of, target = file.aliases[name]
+        renamed = plan.things.get(file.alias_of(name), SAME).name
+        writer.alias(change.name or name, of, target if renamed is None else renamed.encode())
+    if plan.purges and file.metadata:
+        writer.metadata([Record("", file.metadata)])
+    elif clips and not plan.purges:
+        names = ((name, change.name or name) for name, change in clips.items())
+        writer.metadata(metadata_records(file.container, names))
+    return carrier.left_out
+
+
+def path_of(file: File, thing: Thing, change: Change = SAME) -> str:
+    """The path under which a thing is restored; "" where it is not."""
+    kind, name = thing
+    if kind != CLIP:
+        return change.name or name
+    source = file.container.clip_head(file.container.directory.clips[name]).source
+    return change.path or (source.path if source is not None else "")
+
+
+def writer_like(stream: BinaryIO, files: Iterable[File], copies: bool | None = None) -> Writer:
+    """A Writer of a new file that has what the first of ``files`` has, and holds what all hold.
+
+    ``copies`` None: where one of them has some.
+    """
+    files = list(files)
+    head = parse(payloads.Head, files[0].container.directory.head, "HEAD")
+    profiles: list[Profile] = [file.container.profile for file in files]
+    return Writer(
+        stream,
+        profile=max(profiles, key=lambda profile: profile.channels),
+        head_extension=bytes(head.extension),
+        copies=any(file.container.copies() for file in files) if copies is None else copies,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Rewriting:
+    """A file that is rewritten to ``output``, or in its own place where that is None."""
+
+    target: Target
+    output: Target | None
+    force: bool
+    file: File
+
+    def write(self, plan: Plan, report: Report, step: Step) -> None:
+        """Write what ``plan`` says; ``report`` learns the size, and what was left out."""
+        in_place = self.output is None
+        inputs = () if in_place else (self.target,)
+        path = disk_path(self.target) if self.output is None else self.output
+        with replacing_file(path, force=self.force or in_place, inputs=inputs) as stream:
+            left_out = self.written(stream, plan, step)
+            if in_place and UNPROTECTED in left_out:
+                left_out.remove(UNPROTECTED)
+                protect_written(stream, redundancy_of(self.file.container) or DEFAULT)
+            report.size = stream.tell()
+        report.left_out += left_out
+
+    def written(self, stream: BinaryIO, plan: Plan, step: Step) -> list[str]:
+        """Write what ``plan`` says to ``stream``; return what was left out."""
+        writer = writer_like(stream, [self.file])
+        left_out = carry(self.file, writer, plan, step)
+        writer.finish()
+        return left_out
+
+
+@contextmanager
+def rewriting(
+    target: Target, output: Target | None = None, *, force: bool = False
+) -> Iterator[Rewriting]:
+    """The file to be rewritten; where it is to take its own place, nobody appends meanwhile.
+
+    Raises AccessError where another process is appending to it.
+    """
+    with ExitStack() as stack:
+        if output is None:
+            hold(disk_path(target), stack)
+        yield Rewriting(target, output, force, stack.enter_context(open(target)))
+
+
+def disk_path(target: Target) -> Path:
+    """The path of a file that can be rewritten in place; raises OptionError for any other."""
+    if not isinstance(target, (str, os.PathLike)) or "://" in str(target):
+        raise OptionError(
+            "only a file on disk can be rewritten in place; name an output", path=named_path(target)
+        )
+    return Path(target).resolve()
+
+
+def hold(path: Path, stack: ExitStack) -> None:
+    """Keep others from appending to a file until ``stack`` ends; raises AccessError."""
+    try:
+        stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
+    except (OSError, ValueError) as error:
+        raise AccessError(reason_of(error), path=path) from None
+    if not lock(stack.enter_context(stream)):
+        raise AccessError("another process is appending to it", path=path)
+
+
+def protect(
+    target: str | os.PathLike[str],
+    redundancy: float = DEFAULT,
+    *,
+    anew: bool = False,
+    progress: encoder.Step | None = None,
+) -> list[Protection]:
+    """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
+
+    ``mcz.repair`` restores every byte of it as long as no more blocks are bad than there are
+    recovery blocks, wherever they lie: single bytes, a burst, the beginning, the end. Where the
+    file has some already, what was appended since gets its own; where nothing was, nothing is
+    done. ``anew``: what it has is left out, and all of the file gets recovery data together, for
+    which it is rewritten. Returns what there is of it then, in the order of the file. Raises
+    OptionError, FormatError where rewriting would lose a chunk that nobody here knows, AccessError
+    where another process is appending, and as ``mcz.append`` for a file cut short.
+    """
+    check_redundancy(redundancy)
+    if anew and (found := _protected_anew(target, redundancy, progress)) is not None:
+        return [found]
+    return add_recovery(target, redundancy, progress)
+
+
+def _protected_anew(
+    target: Target, redundancy: float, progress: encoder.Step | None
+) -> Protection | None:
+    """Rewrite a file with recovery data for all of it; None, and nothing done, where it has none.
+
+    The file has its old ones until it has the new ones.
+    """
+    with rewriting(target) as job:
+        if redundancy_of(job.file.container) is None:
+            return None
+        with replacing_file(disk_path(target), force=True) as stream:
+            left_out = job.written(stream, whole(job.file), lambda name: None)
+            if lost := [text for text in left_out if text != UNPROTECTED]:
+                raise FormatError(f"rewriting it would lose {lost[0]}", path=job.file.name)
+            return protection_of(protect_written(stream, redundancy, progress))

@@ -1,0 +1,205 @@
+"""All files of an archive out of it again, each under its path, and only when it is whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path, PurePosixPath
+
+from mcz.container.strict import check_path
+from mcz.errors import FormatError, MczError, OptionError
+from mcz.files.editing.batch_report import Outcome, Report, failed
+from mcz.files.editing.file_times import set_time
+from mcz.files.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
+from mcz.files.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
+from mcz.files.jobs import limited
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.clips import listed
+from mcz.files.reading.fidelity import RESTORED, fidelity_of
+from mcz.files.reading.fields import Where
+from mcz.files.reading.file import File, open
+from mcz.files.reading.parallel_clips import shared_out
+from mcz.files.reading.rate_notes import text_notes
+from mcz.model.types import Progress, Settings, Target
+
+NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
+
+
+def unpack(
+    target: Target,
+    directory: str | os.PathLike[str],
+    *,
+    clips: Sequence[str] | None = None,
+    where: Where | None = None,
+    salvage: bool = False,
+    force: bool = False,
+    names: str = "stored",
+    mtimes: bool = False,
+    max_decoded: int | None = None,
+    threads: int | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Write every source file and attachment of an MCZ file below ``directory``.
+
+    ``clips``: of these clips alone, and of their skeletons; ``where``: of those that it takes, see
+    ``File.find``. Each file appears under its name only when it is whole and its hash is right. No
+    symbolic link below ``directory`` is followed. Clips without a source are reported as skipped.
+    With ``salvage`` the file may be damaged: what is whole is written, the rest is reported as
+    damaged. ``max_decoded`` and ``threads`` are those of ``mcz.open``. ``jobs`` processes may
+    restore at once, by default one.
+
+    ``names`` decides about names that some system cannot hold, or not beside another: "stored"
+    writes them as they are, but for control characters and those that turn the direction of text,
+    of which the outcomes tell, and refuses what this system or disk cannot hold; "portable" gives
+    them others, which the outcomes tell; "strict" refuses them. One file never replaces another of
+    the same archive. ``mtimes``: files get the time of their last change that the metadata of
+    their clip has, where it has one (``mcz.pack(..., mtimes=True)``).
+    """
+    if names not in NAMES:
+        raise OptionError(f"names is {names!r}, not one of {', '.join(NAMES)}")
+    folder, report = Folder(Path(directory)), Report()
+    options: Settings = {"max_decoded": max_decoded, "threads": threads}
+    with limited(jobs), open(target, salvage=salvage, **options) as opened:
+        file = File(opened.container.strictly())
+        report.damage += opened.damage
+        timeless: list[str] = []  # files whose times the archive does not have
+        wanted, whole = file.chosen(clips, where), clips is None and where is None
+        stored = list(files_of(file, None if whole else wanted))
+        writing = _Writing(target, folder, force, names, [one.path for one in stored])
+        with shared_out(_restored, file, stored) as restoring:
+            for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
+                outcome = writing.outcome(one.path, restore)
+                if outcome.result == RESTORED:
+                    clip = file.clips[one.name] if one.kind == CLIP else None
+                    time = clip.metadata.get("mtime") if mtimes and clip is not None else None
+                    if mtimes and not set_time(writing.place, time):
+                        timeless.append(one.path)
+                    notes = () if clip is None else text_notes(clip)
+                    outcome = replace(outcome, result=_fidelity(file, one), notes=notes)
+                if salvage and writing.is_damaged:
+                    outcome = replace(outcome, result="damaged")
+                report.outcomes.append(outcome)
+                if progress is not None:
+                    progress(done + 1, len(stored), one.path)
+        if timeless:
+            report.left_out.append(f"times of files that are no clips: {listed(timeless)}")
+        report.outcomes += _without_file(wanted)
+    return report
+
+
+def _without_file(clips: Iterable[Clip]) -> Iterator[Outcome]:
+    """The clips that have no source file, or one without a name."""
+    for clip in clips:
+        with suppress(FormatError):  # it has failed already
+            if clip.source is None or not clip.source.path:
+                text = "it has no source file" if clip.source is None else "its file has no name"
+                yield Outcome(clip.name, "skipped", 0, text)
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A file that the archive holds under ``path``, as the ``kind`` of thing called ``name``."""
+
+    path: str
+    kind: str
+    name: str
+
+
+def files_of(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Stored]:
+    """Every file that the archive holds under a name; of ``clips`` their sources and skeletons."""
+    for clip in file if clips is None else clips:
+        try:
+            path = clip.source.path if clip.source is not None else ""
+        except FormatError:  # which is that of restoring it, and no other clip's
+            path = clip.name
+        if path:
+            yield Stored(path, CLIP, clip.name)
+    for name in file.attachments if clips is None else ():
+        yield Stored(name, ATTACHMENT, name)
+    skeletons = None if clips is None else {id_.hex() for id_ in file.skeleton_ids(clips)}
+    for name in file.aliases:
+        kind, target = file.alias_of(name)
+        if skeletons is None or (kind == SKELETON and target in skeletons):
+            yield Stored(name, ALIAS, name)
+
+
+def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
+    """Path and restoring function of every file that the archive holds under a name."""
+    for one in files_of(file):
+        yield one.path, partial(_restored, (file, None), one)
+
+
+def _meant(file: File, one: Stored) -> Thing:
+    """The thing that a file is, or that the alias which it is stands for."""
+    return file.alias_of(one.name) if one.kind == ALIAS else (one.kind, one.name)
+
+
+def _restored(shared: tuple[File, object], one: Stored) -> bytes:
+    """The bytes of a file; raises FormatError where they cannot be restored."""
+    file, _ = shared
+    kind, name = _meant(file, one)
+    if kind == SKELETON:
+        return file.skeleton_bytes(bytes.fromhex(name))
+    if one.kind == ALIAS and name not in (file.clips if kind == CLIP else file.attachments):
+        raise FormatError(f"alias {one.name!r} names {name!r}, which is not there")
+    return file.clips[name].source_bytes() if kind == CLIP else file.attachments[name].read()
+
+
+def _fidelity(file: File, one: Stored) -> str:
+    """The word for a file that was written: only of a clip it may be another than "restored"."""
+    kind, name = _meant(file, one)
+    clip = file.clips.get(name) if kind == CLIP else None
+    return RESTORED if clip is None else fidelity_of(clip)
+
+
+class _Writing:
+    """Writes files below a folder, no two to one place.
+
+    ``is_damaged``: the last one could not be restored, or may not be called what it is.
+    """
+
+    def __init__(
+        self, target: Target, folder: Folder, force: bool, names: str, paths: Sequence[str]
+    ) -> None:
+        self._target, self._folder, self._force = target, folder, force
+        self._names, self._notes, self._written = names, notes_on(paths), set[str]()
+        plain = (path for path in paths if not HIDDEN.search(path))
+        is_portable = names == "portable"
+        self._renamed = PortableNames() if is_portable else PortableNames(visible, plain)
+        self.is_damaged = False
+        self.place = Path()  # of the file that was written last
+
+    def outcome(self, path: str, restore: Callable[[], bytes]) -> Outcome:
+        """Write what ``restore`` gives to its place; what became of it."""
+        self.is_damaged = False
+        try:
+            size, as_path = self._write(path, restore)
+        except (MczError, OSError) as error:
+            self.is_damaged |= isinstance(error, FormatError)
+            return failed(path, error)
+        return Outcome(path, RESTORED, size, "" if as_path == path else f"as {as_path}")
+
+    def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:
+        as_path = str(safe_path(path))
+        if self._names == "portable" or HIDDEN.search(as_path):
+            as_path = self._renamed(as_path)
+        if self._names == "strict" and path in self._notes:
+            raise FormatError(self._notes[path])
+        if path in self._written:
+            raise FormatError("another file in the archive has the same path")  # PATH-06
+        self.is_damaged = True
+        data = restore()
+        self.is_damaged = False
+        self._written.add(path)
+        self.place = self._folder.write(as_path, data, self._target, force=self._force, name=path)
+        return len(data), as_path
+
+
+def safe_path(name: str) -> PurePosixPath:
+    """``name`` as a relative path; raises FormatError where it would leave the folder."""
+    check_path(name, "archive")
+    return PurePosixPath(name)

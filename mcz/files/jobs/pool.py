@@ -1,0 +1,188 @@
+"""Processes that work for this one: a function of each item, results in the order of the items.
+
+They are interpreters of their own, started without the caller's main module, so that a script
+needs no guard and threads that run are not forked. A process that dies takes nothing along: what
+it had in hand is done once more by another one.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing, contextmanager, suppress
+from queue import SimpleQueue
+from threading import Lock
+from typing import Any, BinaryIO, cast
+
+from mcz.errors import WorkerError
+from mcz.files.jobs import Answer, Item, Result, engine, threads_each
+from mcz.files.jobs.worker import receive, send
+from mcz.hints import Hint
+from mcz.model.types import Settings
+
+AHEAD = 2  # items in work or done, for each process: what waits is bounded
+TRIES = 2
+ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
+
+
+class Pool:
+    """``jobs`` processes that have ``state``; as a context it ends them, whatever they do."""
+
+    def __init__(self, jobs: int, state: object = None) -> None:
+        self.jobs = jobs
+        self._first = pickle.dumps(
+            (threads_each(jobs), pickle.dumps(state, pickle.HIGHEST_PROTOCOL))
+        )
+        self._free: SimpleQueue[Worker | None] = SimpleQueue()
+        for _ in range(jobs):
+            self._free.put(None)  # started when there is work for it
+        self._threads = ThreadPoolExecutor(jobs)
+        self._workers: set[Worker] = set()
+        self._closed, self._lock = False, Lock()
+
+    def __enter__(self) -> Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._closed = True
+            for worker in self._workers:
+                worker.process.kill()  # so that no thread waits for its reply any longer
+        self._threads.shutdown(cancel_futures=True)
+        for worker in self._workers:
+            worker.end()
+
+    @property
+    def pids(self) -> list[int]:
+        """Ids of the processes that have started."""
+        with self._lock:
+            return [worker.process.pid for worker in self._workers]
+
+    def in_order(
+        self, function: Callable[[Any, Item], Result], items: Iterable[Item | None]
+    ) -> Iterator[Answer[Result] | None]:
+        """Yield ``function(state, item)`` for each item, in order; for None, None.
+
+        ``function`` is one of a module. Items are taken as they are needed, few at a time.
+        """
+        waiting: deque[Future[Result] | None] = deque()
+        for item in items:
+            waiting.append(
+                None if item is None else self._threads.submit(self._call, function, item)
+            )
+            while waiting and (waiting[0] is None or len(waiting) > AHEAD * self.jobs):
+                yield _answer(waiting.popleft())
+        while waiting:
+            yield _answer(waiting.popleft())
+
+    def _call(self, function: Callable[[Any, Item], Result], item: Item) -> Result:
+        """One call, in a thread of its own, by a process that is free."""
+        message = pickle.dumps((function, item), pickle.HIGHEST_PROTOCOL)
+        for _ in range(TRIES):
+            worker = self._free.get() or self._started()
+            reply = worker.ask(message)
+            if reply is not None:
+                self._free.put(worker)
+                went_well, value = pickle.loads(reply)
+                if not went_well:
+                    raise value
+                return cast(Result, value)
+            self._buried(worker)
+            self._free.put(None)
+        raise WorkerError(
+            f"the process that worked on it ended unexpectedly ({worker.code}), {TRIES} times; "
+            "there may be too little memory",
+            hint=Hint.JOBS,
+        )
+
+    def _started(self) -> Worker:
+        with self._lock:
+            if self._closed:
+                raise WorkerError("the work was given up")
+            worker = Worker(self._first)
+            self._workers.add(worker)
+            return worker
+
+    def _buried(self, worker: Worker) -> None:
+        worker.end()
+        with self._lock:
+            self._workers.discard(worker)
+
+
+def _answer(future: Future[Result] | None) -> Answer[Result] | None:
+    return None if future is None else future.result
+
+
+class Worker:
+    """One process, and its two pipes."""
+
+    def __init__(self, first: bytes) -> None:
+        code = "from mcz.files.jobs.worker import main; main()"
+        code = f"import sys; sys.path[:] = {sys.path!r}; {code}"
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", code],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=os.environ | ONE_THREAD,
+            **_APART,
+        )
+        with suppress(OSError):  # it has died already, which the first question finds
+            send(cast(BinaryIO, self.process.stdin), first)
+
+    @property
+    def code(self) -> str:
+        """Describe the exit code."""
+        code = self.process.poll()
+        if code is None:
+            return "without a word"
+        return f"exit code {code}" if code >= 0 else f"signal {-code}"
+
+    def ask(self, message: bytes) -> bytes | None:
+        """The reply, None where the process has died."""
+        try:
+            send(cast(BinaryIO, self.process.stdin), message)
+            reply = receive(cast(BinaryIO, self.process.stdout))
+        except OSError:
+            reply = None
+        if reply is None:
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(1)
+        return reply
+
+    def end(self) -> None:
+        """End the process now; nothing that it holds is of use."""
+        self.process.kill()
+        self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout):
+            with suppress(OSError):
+                cast(BinaryIO, stream).close()
+
+
+# An interrupt at the terminal goes to the group in front: the pool ends its processes itself.
+_APART: Settings = (
+    {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
+    if os.name == "nt"
+    else {"process_group": 0}
+)
+
+
+@contextmanager
+def answers(
+    function: Callable[[Any, Item], Result],
+    items: Iterable[Item | None],
+    jobs: int,
+    state: object = None,
+) -> Iterator[Iterator[Answer[Result] | None]]:
+    """``Pool.in_order`` of a pool for this alone, or of the engine in use."""
+    other = engine()
+    if other is not None:
+        with closing(other.in_order(function, items, state)) as found:
+            yield found
+        return
+    with Pool(jobs, state) as pool:
+        yield pool.in_order(function, items)

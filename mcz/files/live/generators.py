@@ -1,0 +1,243 @@
+"""Live streams as Python generators: rows of numbers -> bytes to send, and back."""
+
+from __future__ import annotations
+
+import io
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcz.errors import FormatError, MotionError, OptionError, TruncatedError
+from mcz.files.live.clip_state import LiveClip
+from mcz.files.live.concealment import LOST, LiveFrame, Lost
+from mcz.files.live.reader_with_losses import FramesWithLosses, StreamSummary
+from mcz.files.live.strict_reader import StrictFrames
+from mcz.files.live.writer import LiveWriter
+from mcz.model.motion import POSITION_KINDS, Channel, Joint, Skeleton
+from mcz.model.types import Params
+from mcz.model.units import facing, in_unit
+
+if TYPE_CHECKING:
+    from mcz.codecs.transforms.post_filter import PostFilter
+
+AXES = "xyz"
+Row = ArrayLike | Params
+
+
+def stream_encode(
+    frames: Iterable[Row],
+    skeleton: Skeleton | Sequence[str],
+    *,
+    codec: str = "online",
+    params: Params = MappingProxyType({}),
+    frame_rate: Fraction | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+    name: str = "live",
+    metadata: Mapping[str, str] = MappingProxyType({}),
+    repeat: int | None = None,
+) -> Iterator[bytes]:
+    """The bytes of a live clip: first what precedes the frames, then those of each as it comes.
+
+    ``skeleton`` may be names instead, of markers or of their coordinates (see ``markers``).
+    ``frames`` gives rows in source units, (n_channels,), NaN where invalid; a mapping among them
+    changes parameters of the codec from the next group of frames on. The bytes of a frame are given
+    before the next is asked for. Where ``frames`` raises, so does this, and the stream has no end.
+    ``repeat`` and what is raised: see ``LiveWriter``.
+    """
+    sink = io.BytesIO()
+    known = skeleton if isinstance(skeleton, Skeleton) else markers(skeleton)
+    writer = LiveWriter(
+        sink,
+        facing(in_unit(known, unit), up),
+        codec,
+        params,
+        frame_rate=frame_rate,
+        name=name,
+        metadata=metadata,
+        repeat=repeat,
+    )
+    yield _taken(sink)
+    for row in frames:
+        if isinstance(row, Mapping):
+            writer.change(**{str(name): value for name, value in row.items()})
+        else:
+            writer.push(_numbers(row))
+            yield _taken(sink)
+    writer.close()
+    yield _taken(sink)
+
+
+def _numbers(row: ArrayLike) -> NDArray[np.float64]:
+    try:
+        return np.asarray(row, np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise MotionError(f"a row that is not one of numbers: {error}") from None
+
+
+def _taken(sink: io.BytesIO) -> bytes:
+    """The bytes in ``sink``, which it has no longer."""
+    data = sink.getvalue()
+    sink.seek(0)
+    sink.truncate()
+    return data
+
+
+def markers(names: Sequence[str]) -> Skeleton:
+    """A skeleton of markers of these ``names``, or of those whose coordinates they name.
+
+    Coordinates are ``a.x a.y a.z``, or ``a.tx a.ty a.tz``, of each marker in turn. Raises
+    OptionError for no names, an empty one, or coordinates in another order.
+    """
+    if not names or not all(names):
+        raise OptionError("a stream needs names of markers, none of them empty")
+    split = [name.rpartition(".") for name in names]
+    found = [(marker, axis.removeprefix("t")) for marker, _, axis in split]
+    if len(names) % 3 == 0 and {axis for _, axis in found} == set(AXES):
+        chosen = [marker for marker, _ in found[::3]]
+        wanted = [(marker, axis) for marker in chosen for axis in AXES]
+        if found != wanted:
+            raise OptionError(
+                f"{', '.join(names[:3])}, ... name coordinates, but not x, y and z of each marker "
+                "in turn"
+            )
+        names = chosen
+    channels = tuple(map(Channel, POSITION_KINDS))
+    return Skeleton(tuple(Joint(name, channels=channels) for name in names))
+
+
+def stream_decode(
+    source: object,
+    *,
+    lost: Lost = "refuse",
+    join: bool = False,
+    post_filter: bool = False,
+    rate: Fraction | None = None,
+) -> LiveReader:
+    """The frames of the MCZ file that ``source`` gives, each as soon as its bytes are there.
+
+    ``source`` is a binary stream, bytes, or an iterable of such. ``lost`` says what is done where
+    frames do not come, or come damaged, or need such a one: ``refuse`` raises at the first fault,
+    as ``live_frames`` does; ``missing`` gives NaN, ``hold`` the last decoded values, ``linear``
+    those on a straight line to the next decoded ones, when these have come. Frames before the first
+    decoded one are missing. With ``join`` the stream may begin anywhere, and gives frames from the
+    first on that can be numbered. ``post_filter``: positions go through the post filter, which is
+    12 frames late; ``rate`` is the frame rate of a clip that does not know its own.
+
+    Where ``lost`` is not ``refuse``, FormatError is raised where a clip cannot be read at all, and
+    ChecksumError where all of its frames came and are not those that it was closed with.
+    """
+    if lost not in LOST:
+        raise OptionError(f"lost is {lost!r}, not one of {', '.join(LOST)}")
+    return LiveReader(_stream_of(source), lost, join, rate, post_filter=post_filter)
+
+
+def _stream_of(source: object) -> Any:
+    if hasattr(source, "read"):
+        return source
+    if isinstance(source, bytes | bytearray | memoryview):
+        return io.BytesIO(source)
+    if isinstance(source, str) or not isinstance(source, Iterable):
+        raise OptionError(f"cannot read from {source!r}: neither a binary stream nor bytes")
+    return _Fed(source)
+
+
+class LiveReader:
+    """Iterates over the ``LiveFrame`` of a stream.
+
+    ``summary`` says what came so far, ``clip`` of which clip the last frame is, None before.
+    """
+
+    def __init__(
+        self, stream: BinaryIO, lost: Lost, join: bool, rate: Fraction | None, *, post_filter: bool
+    ) -> None:
+        self.summary = StreamSummary()
+        self.clip: LiveClip | None = None
+        if lost == "refuse" and not join:
+            self._source: StrictFrames | FramesWithLosses = StrictFrames(stream, self.summary)
+        else:
+            self._source = FramesWithLosses(stream, lost, join, self.summary)
+        self._filter_rate = rate
+        self._frames = self._filtered() if post_filter else self._counted()
+
+    def __iter__(self) -> LiveReader:
+        return self
+
+    def __next__(self) -> LiveFrame:
+        return next(self._frames)
+
+    def _counted(self) -> Iterator[LiveFrame]:
+        source, summary = self._source, self.summary
+        try:
+            for frame in source.frames():
+                self.clip, summary.stream_bytes = source.clip, source.size
+                summary.count(frame)
+                yield frame
+        except TruncatedError:
+            summary.is_cut = True
+            raise
+        finally:
+            summary.stream_bytes = source.size
+
+    def _filtered(self) -> Iterator[LiveFrame]:
+        """The frames 12 later, their positions filtered; gaps in their numbers separate them."""
+        waiting: deque[LiveFrame] = deque()
+        stage: PostFilter | None = None
+        clip: LiveClip | None = None
+        try:
+            for frame in self._counted():
+                follows = waiting and frame.number == waiting[-1].number + 1
+                if stage is None or clip is not self.clip or not follows:
+                    now, self.clip = self.clip, clip or self.clip
+                    yield from _rest(stage, waiting)
+                    self.clip = clip = now
+                    stage = self._stage()
+                waiting.append(frame)
+                row = stage.push(np.asarray(frame.values, np.float64))
+                if row is not None:
+                    yield _with_values(waiting.popleft(), row)
+        except FormatError:
+            yield from _rest(stage, waiting)
+            raise
+        yield from _rest(stage, waiting)
+
+    def _stage(self) -> PostFilter:
+        from mcz.files.reading.post_filtering import live_filter
+
+        assert self.clip is not None
+        rate = self.clip.frame_rate
+        rate = self._filter_rate if rate is None else rate
+        return live_filter(self.clip.skeleton, rate, self.clip.name)
+
+
+def _rest(stage: PostFilter | None, waiting: deque[LiveFrame]) -> Iterator[LiveFrame]:
+    """Yield the frames that are left in the filter."""
+    if stage is not None:
+        for row in stage.finish():
+            yield _with_values(waiting.popleft(), row)
+
+
+def _with_values(frame: LiveFrame, row: Any) -> LiveFrame:
+    return replace(frame, values=np.where(frame.valid, row, np.nan))
+
+
+class _Fed:
+    """A binary stream of pieces of bytes that come one by one."""
+
+    def __init__(self, pieces: Iterable[bytes]) -> None:
+        self._pieces = iter(pieces)
+
+    def read1(self, size: int) -> bytes:
+        """The next piece that is not empty, however large; empty at the end."""
+        for piece in self._pieces:
+            if not isinstance(piece, bytes | bytearray | memoryview):
+                raise OptionError(f"cannot read from {piece!r}: not bytes")
+            if piece:
+                return bytes(piece)
+        return b""

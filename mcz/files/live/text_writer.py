@@ -1,0 +1,144 @@
+"""A motion whose text arrives line by line -> a live clip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+
+from mcz.codecs import codec_by_name
+from mcz.container.writer import Sink
+from mcz.errors import OptionError, SourceError
+from mcz.files.live.writer import LiveWriter
+from mcz.files.reading.read import NONE, how_given
+from mcz.files.reading.read import NOTE as SKELETON_NOTE
+from mcz.files.reading.source_files import SourceOptions, read_skeleton
+from mcz.files.writing.source_encoder import EncodingOptions, rate_notes
+from mcz.model.motion import Skeleton
+from mcz.model.types import Params
+from mcz.model.units import facing, in_unit
+from mcz.sources import FORMATS, likely_formats
+from mcz.sources.text.line_by_line import Arriving
+
+NOTE = "coded live, frame by frame, from {format} text, which was not kept"
+
+
+class LiveText:
+    """A motion that arrives as text, and ``writer``, which writes it.
+
+    ``remarks`` are what the clip cannot say, all of them known when ``push_all`` has returned.
+    """
+
+    def __init__(self, arriving: Arriving, writer: LiveWriter, remarks: tuple[str, ...]) -> None:
+        self.writer, self.remarks = writer, remarks
+        self._arriving = arriving
+
+    def push_all(self) -> None:
+        """Write each frame before the next line is read.
+
+        Raises SourceError at text that is none of the format, at a last line without a line end,
+        and where fewer frames came than are declared; the clip has all frames before that.
+        """
+        due, is_renumbered = self._arriving.first_number, False
+        for number, values in self._arriving.frames:
+            if number is not None and number != due:
+                if number > due:
+                    self.writer.miss(number - due)
+                elif not is_renumbered:
+                    remark = f"frame {number} comes where {due} is due; the clip counts on"
+                    self.remarks = (*self.remarks, remark)
+                    is_renumbered = True
+                due = number
+            self.writer.push(values)
+            due += 1
+        declared, n_frames = self._arriving.declared, self.writer.n_frames
+        if declared not in (None, n_frames):
+            remark = f"{declared} frames are declared, {n_frames} came"
+            if n_frames < declared:
+                raise SourceError(remark)
+            self.remarks = (*self.remarks, remark)
+
+
+def begin_live(
+    lines: Iterable[bytes],
+    sink: Sink,
+    source_format: str,
+    options: SourceOptions,
+    encoding: EncodingOptions,
+) -> LiveText:
+    """A live clip, up to its first frame, of the motion that ``lines`` spell.
+
+    The caller uses its writer as a context manager. ``source_format`` is ``bvh`` or ``amc``; an AMC
+    needs the ``skeleton`` of ``options``, its ASF. Raises SourceError at text that is none of the
+    format, and otherwise as ``LiveWriter`` does.
+    """
+    arriving, base = _arriving(_whole_lines(lines), source_format, options)
+    notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
+    metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
+    if base is not None:
+        found = (how_given(base), metadata.get(SKELETON_NOTE, ""))
+        metadata[SKELETON_NOTE] = "; ".join(filter(None, found))
+    writer = LiveWriter(
+        sink,
+        facing(in_unit(arriving.skeleton, options.unit), *options.axes),
+        encoding.codec,
+        encoding.params,
+        frame_rate=arriving.frame_rate if options.rate is None else Fraction(options.rate),
+        frame_rate_exact=arriving.frame_rate_exact if options.rate is None else True,
+        metadata=metadata,
+        first_number=arriving.first_number,
+        base=base,
+    )
+    return LiveText(arriving, writer, _remark(arriving, options))
+
+
+def _whole_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
+    """Lines as they come; raises SourceError for a last one that may have been cut."""
+    for number, line in enumerate(lines, 1):
+        if not line.endswith(b"\n") and line.strip():
+            raise SourceError(f"line {number} has no line end: the source was cut off")
+        yield line
+
+
+def _arriving(
+    lines: Iterable[bytes], source_format: str, options: SourceOptions
+) -> tuple[Arriving, Skeleton | None]:
+    """Open a source that arrives line by line, and the skeleton that it needs."""
+    found = FORMATS.get(source_format)
+    if found is None or found.arrive is None:
+        able = ", ".join(f.name for f in FORMATS.values() if f.arrive is not None)
+        raise OptionError(f"format {source_format!r} cannot come line by line; these can: {able}")
+    base = None
+    if found.wants_skeleton:
+        if options.skeleton is None or options.skeleton == NONE:
+            raise OptionError(f"{source_format} that comes line by line needs its skeleton file")
+        base = in_unit(read_skeleton(options.skeleton), options.unit)
+    arriving: Arriving = found.arrive(iter(lines), base)
+    return arriving, base
+
+
+def _remark(arriving: Arriving, options: SourceOptions) -> tuple[str, ...]:
+    """Remarks on the skeleton and the rate that were given."""
+    notes = tuple(rate_notes(arriving.frame_rate, options))
+    if SKELETON_NOTE not in arriving.metadata:
+        return notes
+    return (f"{options.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}", *notes)
+
+
+def codes_live(codec: str, params: Params) -> bool:
+    """Return True if the codec of that name, with these parameters, codes frame by frame.
+
+    Raises OptionError for a codec or a parameter that there is not.
+    """
+    found = codec_by_name(codec)
+    if found.live is None:
+        return False
+    options = found.options(params)
+    return all(options[name] == value for name, value in found.live_options.items())
+
+
+def suffix_of(data: bytes, format_name: str | None) -> str:
+    """The suffix of files of a source format, or of what ``data`` looks like; OptionError."""
+    found = likely_formats(data) if format_name is None else (format_name,)
+    if not found:
+        raise OptionError("it looks like no known format; say which it is")
+    return FORMATS[found[0]].suffix

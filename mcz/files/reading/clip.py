@@ -1,0 +1,420 @@
+"""A clip of an open file: values decoded on demand, in part if that is all that is asked for."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from fractions import Fraction
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from mcz.container.limits import check_decoded
+from mcz.container.reader import Container
+from mcz.container.value_hash import ValueDigest, value_hash
+from mcz.errors import ChecksumError, FormatError, OptionError
+from mcz.files.reading.decimation import decimated, decimated_rows
+from mcz.files.reading.signal_info import SignalInfo, groups_of
+from mcz.files.reading.signal_reader import SignalReader
+from mcz.files.reading.source_info import SourceInfo, read_source, sourced_skeleton, stating_rate
+from mcz.files.reading.stored_clip import StoredClip
+from mcz.files.reading.views import ClipValues, FrameValues, Masked, Preview, preview
+from mcz.hints import Hint
+from mcz.kinematics import point_names
+from mcz.model.clock import (
+    TIMES,
+    Column,
+    Counting,
+    Timeline,
+    column_of,
+    known_timeline,
+    timeline_of,
+    times_fault,
+    times_place,
+    unit_of_times,
+)
+from mcz.model.motion import Motion, Signal, Skeleton, Source, joint_columns
+from mcz.model.notebook import html_of
+from mcz.model.skeleton import Joints, joint_list
+from mcz.model.text_format import shown
+from mcz.model.types import Values
+from mcz.sources import FORMATS
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
+    from mcz.kinematics import poses
+    from mcz.kinematics.contacts import ContactRule, Contacts
+
+
+class _OfPoses:
+    """A function of ``mcz.kinematics.poses`` as a method of its name, imported on first use."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._owner, self._name = owner, name
+
+    def __get__(self, instance: object, owner: type) -> object:
+        function = getattr(import_module("mcz.kinematics.poses"), self._name)
+        setattr(self._owner, self._name, function)
+        return function.__get__(instance, owner)
+
+
+class Clip(StoredClip):
+    """One clip; nothing is decoded before it is asked for."""
+
+    _repr_html_ = html_of
+    if TYPE_CHECKING:  # as of ``mcz``: only what they need is decoded
+        positions = poses.positions
+        rotations = poses.rotations
+        root = poses.root
+        velocities = poses.velocities
+        accelerations = poses.accelerations
+    else:
+        positions, rotations, root = _OfPoses(), _OfPoses(), _OfPoses()
+        velocities, accelerations = _OfPoses(), _OfPoses()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _reopened, (self.container, self.name)
+
+    def __repr__(self) -> str:
+        return f"<Clip {shown(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
+
+    @property
+    def values(self) -> ClipValues:
+        """The motion signal as something to slice: ``clip.values[100:200]`` decodes 100 frames."""
+        return ClipValues(self.read, self.shape)
+
+    def read(
+        self,
+        frames: tuple[int, int] | None = None,
+        joints: Joints = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+        signal: int | str = 0,
+    ) -> Values:
+        """The values of frames a <= f < b of some joints, NaN where invalid.
+
+        Shape (rows, channels of the joints in the order given), binary64 in source units.
+        ``signal`` is one of ``signals`` by index or name; analog samples are in the units of their
+        channels, while ``read_masked`` gives the stored words. ``resolution`` leaves out that many
+        of the finest details; with ``decimate`` only the rows of every 2^resolution-th frame are
+        returned; ``motion`` also gives their numbers. Raises OptionError for a range outside the
+        clip and FormatError for bad bytes; a full read also checks the value hash,
+        as ``mcz.open`` was told.
+        """
+        signal = self.find_signal(signal)
+        values, mask = self.read_masked(frames, joints, resolution, signal=signal)
+        scaling = self.scaling(signal)
+        if scaling is not None:
+            values = scaling.values(values)
+        if mask is not None:
+            values = np.where(mask, values, np.nan)
+        if not decimate:
+            return values
+        per_frame = self.signals[signal].layout.samples_per_frame
+        return decimated_rows(values, per_frame, 2**resolution)
+
+    def read_masked(
+        self,
+        frames: tuple[int, int] | None = None,
+        joints: Joints = None,
+        resolution: int = 0,
+        *,
+        signal: int | str = 0,
+    ) -> Masked:
+        """The numbers as they are stored, those beneath the mask and analog words too; the mask."""
+        info = self._info(self.find_signal(signal))
+        start, stop = self.checked_range(frames)
+        self._check_resolution(info, resolution)
+        groups, columns = (None, []) if joints is None else self.groups_of(info, joints)
+        reader = SignalReader(self.container, info, groups, resolution, self.name)
+        values, mask = reader.read(start + info.skip, stop + info.skip)  # CLIP-18
+        if joints is not None:
+            values = values[:, columns]
+            mask = mask[:, columns] if mask is not None else None
+        if (start, stop) == (0, self.n_frames) and joints is None and resolution == 0:
+            self._check_whole(info, values, mask)
+        if info.role == TIMES:
+            self._check_times(info, values, mask)
+        return Masked(values, mask)
+
+    def _check_whole(
+        self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None
+    ) -> None:
+        if self.container.salvage:
+            return
+        if self.container.verify or not info.codec.hash_optional:  # CEND-05
+            self.check_hash(info, values, mask)
+
+    def _check_times(
+        self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None
+    ) -> None:
+        fault = times_fault(np.where(True if mask is None else mask, values, np.nan)[:, 0])
+        if fault and not self.container.salvage:  # ROLE-04
+            raise FormatError(f"no times: {fault}", clip=self.name, where=f"signal {info.index}")
+
+    def _info(self, signal: int) -> SignalInfo:
+        if not 0 <= signal < len(self.signals):
+            raise OptionError(f"it has {len(self.signals)} signals, not {signal}", clip=self.name)
+        return self.signals[signal]
+
+    def _check_resolution(self, info: SignalInfo, resolution: int) -> None:
+        if not 0 <= resolution < info.counts.n_resolutions:
+            raise OptionError(
+                f"it has resolutions 0 to {info.counts.n_resolutions - 1}, not {resolution}",
+                clip=self.name,
+            )
+
+    def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
+        """The groups that hold the channels of these joints, and where each is among theirs."""
+        return groups_of(info.layout, self._columns(info, joints))
+
+    def _columns(self, info: SignalInfo, joints: Joints) -> list[int]:
+        if joints is None:
+            return list(range(info.layout.n_channels))
+        if info.channels is not None:
+            raise OptionError(f"signal {info.name!r} has channels of its own, no joints")
+        return joint_columns(self.skeleton, joint_list(joints))
+
+    def check_values(self, signal: int) -> None:
+        """Decode a whole signal, a few segments in memory at a time, and compare its hash."""
+        info = self._info(signal)
+        digest = ValueDigest()
+        reader = SignalReader(self.container, info, None, 0, self.name)
+        for block in reader.blocks(info.skip, info.skip + self.n_frames):
+            digest.update(block.values, block.mask)
+        self._compare(info, digest.digest())
+
+    def check_hash(self, info: SignalInfo, values: Values, mask: NDArray[np.bool_] | None) -> None:
+        """Raise ChecksumError where these are not the values and the mask of a whole signal."""
+        self._compare(info, value_hash(values, mask))
+
+    def _compare(self, info: SignalInfo, found: bytes) -> None:
+        stored = self.value_hashes[info.index]
+        if found != stored:
+            raise ChecksumError(
+                f"value hash is {found.hex()}, stored is {stored.hex()}",
+                clip=self.name,
+                where=f"signal {info.index}",
+            )
+
+    def motion(
+        self,
+        frames: tuple[int, int] | None = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+    ) -> Motion:
+        """The whole clip, or frames a <= f < b of it, as a Motion with its source.
+
+        ``resolution`` leaves out that many of the finest details of the motion, and of every
+        other signal as many as it has. With ``decimate`` only frames a, a + 2^resolution, ... are
+        there, at a frame rate divided by 2^resolution, their numbers in ``frame_numbers``; the
+        source then is left out where its text states the rate.
+        """
+        motion = self._motion(frames, resolution, decimate)
+        scalings = [self.scaling(info.index) for info in self.signals]
+        pairs = zip(motion.signals, scalings, strict=True)
+        signals = tuple(signal.in_units(scaling) for signal, scaling in pairs)
+        return replace(motion, skeleton=self._sourced_skeleton, signals=signals)
+
+    @cached_property
+    def _sourced_skeleton(self) -> Skeleton:
+        """The skeleton with its own source file, unless salvage finds that damaged."""
+        try:
+            return sourced_skeleton(self.container, self.skeleton_id)
+        except FormatError:
+            if not self.container.salvage:
+                raise
+            return self.skeleton
+
+    def _motion(self, frames: tuple[int, int] | None, resolution: int, decimate: bool) -> Motion:
+        start, stop = self.checked_range(frames)
+        self._check_resolution(self.signals[0], resolution)
+        numbers = self.frame_numbers[start:stop]
+        motion = Motion(
+            skeleton=self.skeleton,
+            signals=tuple(self._read_signal(s, start, stop, resolution) for s in self.signals),
+            frame_rate=self.frame_rate,
+            frame_rate_exact=self.frame_rate_exact,
+            name=self.name,
+            metadata=self.metadata,
+            frame_numbers=numbers if start or self._time_base is not None else None,
+            first_time=self.first_time,
+        )
+        step = 2**resolution if decimate else 1
+        motion = decimated(motion, step) if step > 1 else motion
+        motion = replace(motion, source=self._source(start, stop, resolution, step))
+        if step == 1 and (not start or self.first_time is None):
+            return motion
+        return motion.at_times(self.timeline and self.timeline.cut(slice(start, stop, step)))
+
+    def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
+        whole = (start, stop) == (0, self.n_frames)
+        resolution = info.coarser(resolution)
+        reader = SignalReader(self.container, info, None, resolution, self.name)
+        signal = reader.signal(start + info.skip, stop + info.skip)
+        if whole and resolution == 0:
+            self._check_whole(info, signal.values, signal.mask)
+        if info.role == TIMES:
+            self._check_times(info, signal.values, signal.mask)
+            if times_fault(signal.masked()[:, 0]):  # of salvage
+                return replace(signal, role="")
+        return signal
+
+    def _source(self, start: int, stop: int, resolution: int, step: int) -> Source | None:
+        info, fields = self.source, self._fields.source
+        if info is None or fields is None or (step > 1 and FORMATS[info.format].states_rate):
+            return None
+        skip = self.signals[0].skip
+        frames = range(start + skip, stop + skip, step)
+        try:
+            if self._row.skeleton != self._fields.skeleton:  # what salvage has in its place
+                raise FormatError("the names of its skeleton are lost")
+            source = read_source(self.container, fields, info, self.signals[0], frames)
+        except FormatError as error:
+            self._complain(f"its source file is lost: {error}", error)
+            return None
+        if (start, stop, resolution) == (0, self.n_frames, 0):
+            return source
+        return source.of_no_file()
+
+    @cached_property
+    def timeline(self) -> Timeline | None:
+        """The times of all frames, None where neither times nor a rate are known."""
+        counting = Counting(self.frame_numbers, self.frame_rate)
+        return timeline_of(counting, self.first_time, self.times_column())
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The time of every frame in seconds, (n_frames,): see ``mcz.times``; OptionError.
+
+        At most the column of times is decoded.
+        """
+        return known_timeline(self.name, self.timeline).times
+
+    def timeline_at(self, rate: Fraction | None) -> Timeline | None:
+        """``timeline``, by ``rate`` where the clip states neither a rate nor times."""
+        if self.timeline is None and rate is not None:
+            return timeline_of(Counting(self.frame_numbers, rate), self.first_time)
+        return self.timeline
+
+    def times_column(self) -> Column | None:
+        """The times that stand among the values; None where there are none."""
+        index = times_place(self.signals)
+        if index is None:
+            return None
+        info = self.signals[index]
+        return column_of(self.read(signal=index)[:, 0], info.grids[0], unit_of_times(info))
+
+    def preview(self, joints: Joints = None) -> FrameValues:
+        """Read the frames that need no decoding of the rest, counted from 0, and their values.
+
+        The values, of shape (frames, channels of the joints), are those that ``read`` gives for
+        these frames where the codec has some that it stores apart (qbc: its marks); otherwise
+        they are its coarsest resolution. Raises OptionError where there is no such thing.
+        """
+        found = self.previewed(joints)
+        return FrameValues(found.frames, found.masked())
+
+    def previewed(self, joints: Joints = None) -> Preview:
+        """``preview`` with the mask apart, and how far its frames lie from each other."""
+        info = self.signals[0]
+        groups, columns = self.groups_of(info, joints)
+        reader = SignalReader(
+            self.container, info, groups, info.counts.n_resolutions - 1, self.name
+        )
+        return preview(reader, self.n_frames, columns)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The names of the joints, ``name#n`` where one repeats."""
+        return tuple(self.skeleton.addresses())
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The names of the points of ``positions``, in their order."""
+        return point_names(self.skeleton)
+
+    def to_xarray(
+        self, *, form: str = "quat", unit: str | None = None, dtype: DTypeLike = np.float64
+    ) -> Dataset:
+        """The whole clip as an ``xarray.Dataset``: see ``mcz.to_xarray``."""
+        from mcz.files.tables.labelled import to_xarray
+
+        return to_xarray(self.motion(), form=form, unit=unit, dtype=dtype)
+
+    def to_pandas(
+        self,
+        what: str = "positions",
+        *,
+        joints: Joints = None,
+        unit: str | None = None,
+        flat: bool = False,
+    ) -> DataFrame:
+        """A table of the whole clip as a ``pandas.DataFrame``: see ``mcz.to_pandas``."""
+        from mcz.files.tables.frames import to_pandas
+
+        return to_pandas(self.motion(), what, joints=joints, unit=unit, flat=flat)
+
+    def contacts(self, joints: Joints = None, rule: ContactRule | None = None) -> Contacts:
+        """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
+        from mcz.kinematics.contacts import RULE, contacts
+
+        feet = None if joints is None else joint_list(joints)
+        return contacts(self.motion(), feet, rule or RULE)
+
+    def source_bytes(
+        self,
+        frames: tuple[int, int] | None = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+    ) -> bytes:
+        """The source file, byte for byte (of a lossy clip: like it), or a part of it.
+
+        The arguments are those of ``motion``. What is not the file itself states the frame rate of
+        the clip, where its format can. Raises ChecksumError where a lossless clip does not give
+        back the bytes it was made of.
+        """
+        info = self.source
+        if info is None:
+            raise OptionError("no source file", clip=self.name, hint=Hint.CONVERT)
+        check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
+        motion = self._motion(frames, resolution, decimate)
+        if motion.source is None and self.container.salvage:
+            raise FormatError("its source file is lost", clip=self.name, hint=Hint.CONVERT)
+        is_file = self.gives_file(frames, resolution)
+        if not is_file:
+            motion = stating_rate(motion, self.frame_numbers)
+        data: bytes = FORMATS[info.format].write(motion)
+        if is_file and not self.container.salvage:
+            self._check_source(data, info)
+        return data
+
+    def gives_file(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
+        """Return whether ``source_bytes`` gives the very file that the clip was made of."""
+        whole = self.checked_range(frames) == (0, self.n_frames) and not resolution
+        return whole and all(signal.codec.lossless for signal in self.signals)
+
+    def _check_source(self, data: bytes, info: SourceInfo) -> None:
+        digest = hashlib.sha256(data).digest()
+        if len(data) != info.size or digest != info.sha256:  # SRC-01, SRC-02
+            raise ChecksumError(
+                f"the restored {info.path} has {len(data)} bytes and hash "
+                f"{digest.hex()}, stored are {info.size} and {info.sha256.hex()}",
+                clip=self.name,
+            )
+
+
+def _reopened(container: Container, name: str) -> Clip:
+    """Reopen a pickled Clip; raises OptionError if the file has changed meanwhile."""
+    row = container.directory.clips.get(name)
+    if row is None:
+        raise OptionError(f"the clip {name!r} is no longer there", path=container.source.name)
+    return Clip(container, row)

@@ -1,0 +1,141 @@
+"""The clips of a file, each made when it is asked for by its name, as users write it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import PurePosixPath
+from weakref import WeakValueDictionary
+
+from mcz.container import payloads
+from mcz.container.directory import ClipRow
+from mcz.container.reader import Container
+from mcz.errors import FormatError, OptionError, UnknownNameError
+from mcz.files.reading.clip import Clip
+from mcz.model import text_format
+from mcz.model.text_format import nearest
+
+FEW = 8  # names that a message lists
+Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
+
+
+KEPT = 64
+
+
+def clip_called(clips: Clips, name: str) -> str:
+    """The name of the clip that ``name`` means; see ``File.only_clip``. Raises OptionError."""
+    found = clips_meant(clips, name)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise OptionError(f"{name!r} may be {listed(found)}; choose one")
+    raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
+
+
+def names_of(clips: Clips) -> dict[str, set[str]]:
+    """The names that clips may have, as ``clips_meant`` finds it, for who asks for many."""
+    known: dict[str, set[str]] = {name: {name} for name in clips}
+    for names in _ways(clips):
+        found: dict[str, set[str]] = {}
+        for called, clip in names:
+            found.setdefault(called, set()).add(clip)
+        known = found | known
+    return known
+
+
+def clips_meant(clips: Clips, name: str) -> list[str]:
+    """The names of the clips that ``name`` may mean, sorted."""
+    if name in clips.rows:
+        return [name]
+    for names in _ways(clips):
+        found = sorted({clip for known, clip in names if known == name})
+        if found:
+            return found
+    return []
+
+
+def _ways(clips: Clips) -> Iterator[Named]:
+    """The names that clips may have, the plainest way first; the last reads of their sources."""
+    names = [(name, name) for name in clips]
+    others = list(_of_clips(clips))
+    yield others
+    yield _last_parts([*names, *others])
+    paths = []
+    for clip in clips.values():
+        with suppress(FormatError):  # one that is damaged hides no other
+            if clip.source is not None:
+                paths.append((clip.source.path, clip.name))
+    yield paths
+    yield _last_parts(paths)
+
+
+def _of_clips(clips: Clips) -> Iterator[tuple[str, str]]:
+    """The aliases of clips, which are paths of files, with their suffix and without."""
+    for alias, (of, target) in clips.aliases.items():
+        clip = target.decode("utf-8", "replace")
+        if of == payloads.OF_CLIP and clip in clips.rows:
+            yield alias, clip
+            yield str(PurePosixPath(alias).parent / PurePosixPath(alias).stem), clip
+
+
+def _last_parts(names: Named) -> Named:
+    return [(name.rpartition("/")[2], clip) for name, clip in names]
+
+
+def _suggestion(clips: Iterable[str], name: str) -> str:
+    near = nearest(name, [*clips, *(clip.rpartition("/")[2] for clip in clips)])
+    return f"did you mean {near}?" if near else f"there are: {listed(clips) or 'none'}"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Some names, few of many."""
+    known = list(names)
+    return ", ".join(known[:FEW]) + (" ..." if len(known) > FEW else "")
+
+
+class Clips(Mapping[str, Clip]):
+    """In file order, found by whatever ``File.only_clip`` takes.
+
+    A clip is the same object as long as anybody has it.
+    Of those that nobody has, the last ``KEPT`` are kept. A clip keeps what was read of it, so that
+    work on all clips of an archive would otherwise hold the whole archive in the end.
+    """
+
+    def __init__(self, container: Container) -> None:
+        self._container = container
+        self.rows: Mapping[str, ClipRow] = container.directory.clips  # by their own names alone
+        self.aliases: Mapping[str, tuple[int, bytes]] = container.directory.aliases
+        self._alive: WeakValueDictionary[str, Clip] = WeakValueDictionary()
+        self._last: deque[Clip] = deque(maxlen=KEPT)
+
+    __repr__ = text_format.clips_text
+
+    def __getitem__(self, name: str) -> Clip:
+        """The clip that ``name`` means; raises UnknownNameError, which suggests a name."""
+        if not isinstance(name, str):
+            raise UnknownNameError(f"{name!r} is not the name of a clip", path=self.file_name)
+        if name not in self.rows:
+            try:
+                name = clip_called(self, name)
+            except OptionError as error:
+                raise UnknownNameError(error.message, path=self.file_name) from None
+        found = self._alive.get(name)
+        if found is None:
+            made = Clip(self._container, self.rows[name])
+            found = self._alive.setdefault(name, made)  # another thread may have made it, too
+            self._last.append(found)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and len(clips_meant(self, name)) == 1
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def file_name(self) -> str:
+        return self._container.source.name

@@ -1,0 +1,174 @@
+"""Differences of two motions beside their numbers: events, parameters, ..."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from mcz.files.reading.source_info import recording
+from mcz.model.clock import EXACT, numbers_or_rows
+from mcz.model.motion import Motion
+from mcz.model.types import JsonObject, Params
+from mcz.sources import FORMATS, arrays_of
+from mcz.sources.c3d.events import Event
+from mcz.sources.c3d.parameters import TEXT, Parameter, Parameters
+from mcz.sources.c3d.recording import parameters_of
+
+# Parameters that say where data lie and which frames there are, which is compared by itself.
+OF_DATA = {"DATA_START", "FRAMES", "LONG_FRAMES", "ACTUAL_START_FIELD", "ACTUAL_END_FIELD"}
+OF_READERS = {"source-note", "skeleton-note", "name-encoding"}
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Something that two motions do not say alike: what each says, or how many of it each has.
+
+    Of things with names or texts: which one alone has, and which are not the same in both.
+    """
+
+    what: str
+    a: str | int | float | None
+    b: str | int | float | None
+    only_in_a: tuple[str, ...] = ()
+    only_in_b: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+
+
+def document_of(a: Motion, b: Motion) -> list[JsonObject]:
+    """The differences as JSON has them."""
+    return [asdict(each) for each in differences(a, b)]
+
+
+def differences(a: Motion, b: Motion) -> list[Difference]:
+    """The differences of ``b`` from ``a`` beside their numbers; raises FormatError on bad bytes."""
+    facts, things = (_facts(a), _facts(b)), (_things(a), _things(b))
+    found = [
+        Difference(what, facts[0][what], facts[1][what])
+        for what in facts[0]
+        if facts[0][what] != facts[1][what]
+    ]
+    if facts[0]["first frame"] == facts[1]["first frame"]:
+        found += _of_times(a, b, is_rate_same=facts[0]["frame rate"] == facts[1]["frame rate"])
+    names = [list(side["joints"]) for side in things]
+    if sorted(names[0]) == sorted(names[1]) and names[0] != names[1]:
+        found.append(Difference("order of joints", None, None))
+    for one, other in (things, things[::-1]):  # a group that is not there is enough to say
+        groups = other["groups of parameters"]
+        both = {key: value for key, value in one["parameters"].items() if key[0] in groups}
+        one["parameters"] = {f"{group}:{name}": value for (group, name), value in both.items()}
+    found += filter(None, (_compared(what, things[0][what], things[1][what]) for what in things[0]))
+    if not found and (what := _otherwise(a, b)):
+        found.append(Difference(what, None, None))
+    return found
+
+
+def _of_times(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Difference]:
+    """Differences of frame numbers and times beyond the first frame's number and the rate."""
+    numbers = numbers_or_rows(a.frame_numbers, a.n_frames)
+    if not np.array_equal(numbers, numbers_or_rows(b.frame_numbers, b.n_frames)):
+        yield Difference("frame numbers", None, None)
+        return
+    one, other = a.timeline, b.timeline
+    if one is None or other is None or not is_rate_same or len(one.times) != len(other.times):
+        return
+    off = np.abs(one.even - other.even)
+    allowed = one.rounding + other.rounding + EXACT
+    if (off[:1] > allowed).any():
+        first, others = float(one.even[0]), float(other.even[0])
+        yield Difference("time of the first frame in s", first, others)
+    elif (off > allowed).any():
+        yield Difference("times", None, None)
+
+
+def _compared(what: str, a: Params, b: Params) -> Difference | None:
+    only_a, only_b = (tuple(name for name in x if name not in y) for x, y in ((a, b), (b, a)))
+    changed = tuple(name for name in a if name in b and repr(a[name]) != repr(b[name]))
+    if not (only_a or only_b or changed):
+        return None
+    return Difference(what, len(a), len(b), only_a, only_b, changed)
+
+
+def _facts(motion: Motion) -> dict[str, str | int | float | None]:
+    numbers, rate, bones = motion.frame_numbers, motion.frame_rate, motion.skeleton
+    return {
+        "first frame": 1 if numbers is None or not len(numbers) else int(numbers[0]),
+        "frame rate": None if rate is None else float(rate),
+        "unit in cm": bones.unit_cm,
+        "up axis": bones.up_axis or None,
+        "forward axis": bones.forward_axis or None,
+        "handedness": bones.handedness or None,
+    }
+
+
+def _things(motion: Motion) -> dict[str, dict[Any, Any]]:
+    """Things of which a motion may have several, by name or by what they say."""
+    parameters, told = _parameters(motion), recording(motion)
+    arrays = arrays_of(motion.source, [signal.name for signal in motion.signals]) or ()
+    platforms = () if told is None else told.platforms
+    bones = motion.skeleton
+    names = bones.addresses()
+    return {
+        "joints": {
+            name: (names[joint.parent] if joint.parent >= 0 else "", joint.channels)
+            for name, joint in zip(names, bones.joints, strict=True)
+        },
+        "signals": {
+            s.name: (s.n_channels, s.samples_per_frame, s.channels) for s in motion.signals
+        },
+        "events": {} if told is None else dict(_events(told.events)),
+        "force platforms": {f"platform {n}": one for n, one in enumerate(platforms, 1)},
+        "groups of parameters": {group: None for group, _ in parameters},
+        "parameters": parameters,
+        "arrays": {str(array["name"]): array["type"] for array in arrays},
+        "metadata": {k: v for k, v in motion.metadata.items() if k not in OF_READERS},
+    }
+
+
+def _events(events: Iterable[Event]) -> Iterator[tuple[str, Event]]:
+    """Each event under its words and time; of those that are the same each has a number."""
+    seen: Counter[str] = Counter()
+    for event in events:
+        words = " ".join(filter(None, (event.subject, event.context, event.label)))
+        text = f"{words} at {event.time:.6g} s"
+        seen[text] += 1
+        yield text if seen[text] == 1 else f"{text} #{seen[text]}", event
+
+
+def _parameters(motion: Motion) -> dict[tuple[str, str], Any]:
+    """The parameters of a C3D by group and name; of another file none."""
+    source = motion.source
+    if source is None or FORMATS[source.format].recording is None:
+        return {}
+    held = parameters_of(source.format, source.template, source.detail)
+    return {
+        (group, name): _value(held, parameter)
+        for (group, name), parameter in held.found.items()
+        if name not in OF_DATA
+    }
+
+
+def _value(held: Parameters, parameter: Parameter) -> Any:
+    if parameter.type == TEXT:
+        return parameter.type, parameter.dims, parameter.data
+    return parameter.type, parameter.dims, held.numbers_of(parameter)
+
+
+def _otherwise(a: Motion, b: Motion) -> str:
+    """The kind of difference of two sources that is named nowhere else, "" if there is none."""
+    one, other = a.source, b.source
+    if one is None or other is None or one.format != other.format:
+        return ""
+    if one.template != other.template:
+        return "header or layout of the files"
+    numbers = [[signal.masked() for signal in motion.signals] for motion in (a, b)]
+    if not all(np.array_equal(x, y, equal_nan=True) for x, y in zip(*numbers, strict=True)):
+        return ""  # whose digits may take other places
+    notes = [source.notes and source.notes.cut(0, a.n_frames) for source in (one, other)]
+    if (one.detail, notes[0]) == (other.detail, notes[1]):
+        return ""
+    has_arrays = FORMATS[one.format].arrays is not None
+    return "arrays beside the signals" if has_arrays else "texts or layout of the rows"

@@ -1,0 +1,356 @@
+"""``mcz.open``: an MCZ file and what is in it by name, nothing decoded yet.
+
+``clip.py`` turns chunks into values, ``report.py`` tells what a file says of itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+from mcz.container import payloads
+from mcz.container.chunks import SIGNATURE, ChunkType
+from mcz.container.directory import AttachmentRow
+from mcz.container.metadata import applied
+from mcz.container.reader import Container
+from mcz.container.source import ByteSource, open_source, path_of
+from mcz.errors import (
+    AccessError,
+    ChecksumError,
+    FormatError,
+    MczError,
+    MotionError,
+    OptionError,
+    TruncatedError,
+    reason_of,
+)
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.clips import Clips, listed
+from mcz.files.reading.fields import Where, filter_clips
+from mcz.files.reading.lost_skeletons import restore_skeletons
+from mcz.files.reading.source_info import sourced_skeleton
+from mcz.model.motion import Skeleton
+from mcz.model.schema import parse
+from mcz.model.text_format import counted, shown
+from mcz.model.threads import checked
+from mcz.model.types import JsonObject, Params, Target
+from mcz.sources import FORMATS
+
+
+def is_mcz(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file is an MCZ file, by suffix or first bytes; URLs by their suffix."""
+    if str(path).partition("?")[0].lower().endswith(".mcz"):
+        return True
+    try:
+        with Path(path).open("rb") as stream:
+            return stream.read(len(SIGNATURE)) == SIGNATURE
+    except (OSError, ValueError):
+        return False
+
+
+def is_source(path: str) -> bool:
+    """Return whether a path has the suffix of a source format, and its file is no MCZ file."""
+    suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
+    return path.lower().endswith(suffixes) and not is_mcz(path)
+
+
+def suffixes_of(target: str) -> tuple[str, ...]:
+    """The suffixes of files of a target: of a format, or of a scene."""
+    return FORMATS[target].suffixes if target in FORMATS else (f".{target}",)
+
+
+class StoredSkeleton(NamedTuple):
+    """A skeleton of a file, and its id, by which clips name it."""
+
+    id: bytes
+    skeleton: Skeleton
+
+
+class AliasTarget(NamedTuple):
+    """Target of an alias: its kind, "clip", "skeleton" or "attachment", and its name."""
+
+    kind: str
+    name: str
+
+
+class Attachment:
+    """A file kept as it is."""
+
+    def __init__(self, container: Container, row: AttachmentRow) -> None:
+        self._container, self._row = container, row
+        self.name, self.size = row.name, row.size
+
+    def __repr__(self) -> str:
+        return f"<Attachment {shown(self.name)}: {self.size} bytes>"
+
+    def read(self) -> bytes:
+        """The bytes, their hash checked."""
+        return self._container.attachment(self._row)
+
+
+class File:
+    """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet.
+
+    It iterates over its clips in file order; ``file[name]`` and ``name in file`` find a clip as
+    ``only_clip`` does.
+    Threads may share it, and processes after a fork. A File and what is taken from it, opened by
+    path, URL or from bytes, can be pickled: what is unpickled opens the same file anew.
+    """
+
+    def __init__(self, container: Container) -> None:
+        self.container = container
+        self.grows = False  # another process was appending: this is the file up to its last end
+        rows = container.directory
+        self.clips = Clips(container)
+        self.attachments: Mapping[str, Attachment] = {
+            name: Attachment(container, row) for name, row in rows.attachments.items()
+        }
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return file_of, (self.container,)
+
+    def __repr__(self) -> str:
+        held = f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
+        return f"<File {shown(self.name)}: {held}, {self.size} bytes>"
+
+    def __iter__(self) -> Iterator[Clip]:
+        return iter(self.clips.values())
+
+    def __len__(self) -> int:
+        return len(self.clips)
+
+    def __bool__(self) -> bool:
+        """True: a file without clips is a file, too."""
+        return True
+
+    def __getitem__(self, name: str) -> Clip:
+        """The clip that ``name`` means; raises UnknownNameError, an OptionError and KeyError."""
+        return self.clips[name]
+
+    def __contains__(self, thing: object) -> bool:
+        """Return True for a clip of this file, or the name or alias of one."""
+        if isinstance(thing, Clip):
+            return thing.name in self.clips.rows and self.clips[thing.name] is thing
+        return thing in self.clips
+
+    def __enter__(self) -> File:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self.container.source.close()
+
+    @property
+    def name(self) -> str:
+        return self.container.source.name
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self.container.source.size
+
+    @property
+    def aliases(self) -> Mapping[str, tuple[int, bytes]]:
+        """Further names of a clip, skeleton or attachment: name -> (of, target)."""
+        return self.container.directory.aliases
+
+    def alias_of(self, name: str) -> AliasTarget:
+        """Resolve an alias to the kind, "clip", "skeleton" or "attachment", and name of its target.
+
+        That is its name, of a skeleton its id in hex, for its own file is what the name restores.
+        """
+        of, target = self.aliases[name]
+        if of == payloads.OF_SKELETON:
+            return AliasTarget("skeleton", target.hex())
+        kind = "clip" if of == payloads.OF_CLIP else "attachment"
+        return AliasTarget(kind, target.decode("utf-8", "replace"))
+
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        """Metadata of the file as a whole, see ``Clip.metadata``."""
+        return applied({}, self.container.metadata_records(""))
+
+    @property
+    def damage(self) -> list[str]:
+        """Faults that salvage found, in file order."""
+        return self.container.damage
+
+    @property
+    def unverified(self) -> int:
+        """Segments of which so far only a part was read: nothing vouches for its numbers."""
+        return self.container.unverified
+
+    @cached_property
+    def header(self) -> JsonObject:
+        """Format version, version needed and profile, from HEAD."""
+        head = parse(payloads.Head, self.container.directory.head, "HEAD")
+        return {
+            "format_version": f"{head.major}.{head.minor}",
+            "needs_version": f"{head.needs_major}.{head.needs_minor}",
+            "profile": self.container.profile.name,
+        }
+
+    @cached_property
+    def skeletons(self) -> list[StoredSkeleton]:
+        """The skeletons with their ids, in file order."""
+        ids = [id_ for kind, id_ in self.container.directory.shared if kind == ChunkType.SKEL]
+        return [StoredSkeleton(id_, self.skeleton(id_)) for id_ in ids]
+
+    def skeleton(self, id_: bytes, *, with_source: bool = False) -> Skeleton:
+        """The skeleton with this id; ``with_source`` also reads the template of its own file."""
+        return (sourced_skeleton if with_source else Container.skeleton)(self.container, id_)
+
+    def skeleton_bytes(self, id_: bytes) -> bytes:
+        """The skeleton's own source file (ASF), byte for byte."""
+        skeleton = self.skeleton(id_, with_source=True)
+        source = skeleton.source
+        if source is None:
+            raise OptionError(
+                f"skeleton {skeleton.name or id_.hex()} has no source file of its own"
+            )
+        try:
+            data = FORMATS[source.format].write(skeleton)
+        except MotionError:  # printed anew, and the format cannot say it
+            data = b""
+        if data != source.template:
+            raise FormatError(f"skeleton {id_.hex()}: its source describes another skeleton")
+        # SRC-01, SRC-02
+        if len(data) != source.size or hashlib.sha256(data).digest() != source.sha256:
+            raise ChecksumError(f"skeleton {id_.hex()}: the restored file differs from its source")
+        return data
+
+    def only_clip(self, name: str | None = None) -> Clip:
+        """The clip called ``name``, or the only one there is.
+
+        A clip is found by its name, the path of its source or an alias, and by the last part of one
+        of these where only one clip has it. Raises OptionError, which suggests a name.
+        """
+        if name is not None:
+            return self.clips[name]
+        if len(self.clips) != 1:
+            names = listed(self.clips)
+            raise OptionError(
+                f"it has {len(self.clips)} clips, choose one: {names}", path=self.name
+            )
+        return next(iter(self.clips.values()))
+
+    def clips_called(self, names: Iterable[str]) -> list[Clip]:
+        """The clips of these names, each once, in this order; raises as ``only_clip`` does."""
+        found = {clip.name: clip for clip in map(self.only_clip, names)}
+        return list(found.values())
+
+    def find(self, where: Where) -> list[Clip]:
+        """The clips that ``where`` takes, in file order, which may be none.
+
+        ``where`` is a query, "subject == '05' and n_frames > 500" (docs/queries.md), or a function
+        of a Clip. Raises OptionError for a text that is no query, and for a name in it that is
+        neither a field nor a metadata key of any clip.
+        """
+        return filter_clips(self, where, self.clips.values())
+
+    def chosen(self, names: Iterable[str] | None = None, where: Where | None = None) -> list[Clip]:
+        """The clips of these names that ``where`` takes; None: all.
+
+        Raises OptionError as ``only_clip`` and ``find`` do, and where ``where`` takes none.
+        """
+        clips = list(self) if names is None else self.clips_called(names)
+        if where is None:
+            return clips
+        found = filter_clips(clips, where, self.clips.values())
+        if not found:
+            said = shown(where) if isinstance(where, str) else "what is asked for"
+            raise OptionError(
+                f"none of {counted(len(clips), 'clip')} matches {said}", path=self.name
+            )
+        return found
+
+    def skeleton_ids(self, clips: Iterable[Clip]) -> set[bytes]:
+        """The ids of the skeletons of these clips, and of those that they are derived from."""
+        found: set[bytes] = set()
+        for clip in clips:
+            id_: bytes | None = clip.skeleton_id
+            while id_ and id_ not in found:
+                found.add(id_)
+                id_ = self.skeleton(id_).base
+        return found
+
+
+def open(
+    target: Target,
+    salvage: bool = False,
+    max_decoded: int | None = None,
+    unverified: bool = False,
+    threads: int | None = None,
+    verify: bool = False,
+) -> File:
+    """Open an MCZ file lazily: a path, an fsspec target, bytes or a binary stream.
+
+    ``salvage`` reads what a damaged file still holds and lists the rest in ``File.damage``.
+    ``max_decoded`` replaces the limit of decoded bytes, max(64 MiB, 4096 x file size).
+    ``unverified`` reads no more of a segment than what is asked for (joints, a resolution), so that
+    its checksum cannot be checked and a damaged file may give wrong numbers; ``File.unverified``
+    counts such segments. It saves bytes where segments are large, and does nothing in salvage.
+    ``threads`` may decode at once, by default one a processor; the numbers are the same.
+    ``verify`` compares the SHA-256 of every signal that is decoded whole. By default that of the
+    codecs raw and fast is not compared: checksums guard their bytes.
+    Raises FormatError, in particular TruncatedError where there is no FOOT at the end,
+    AccessError where the file cannot be read, and OptionError.
+    """
+    options = {
+        "salvage": salvage,
+        "max_decoded": max_decoded,
+        "reads_parts": unverified,
+        "threads": checked(threads),
+        "verify": verify,
+    }
+    source = open_bytes(target)
+    try:
+        return _opened(source, options)
+    except MczError as error:
+        source.close()
+        error.add(path=source.name)
+        raise
+    except BaseException:
+        source.close()
+        raise
+
+
+def open_bytes(target: Target) -> ByteSource:
+    """The bytes of ``target``, as ``open`` takes it; raises AccessError and OptionError."""
+    try:
+        return open_source(target)
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+        raise AccessError(reason_of(error), path=path_of(target)) from None
+
+
+def file_of(container: Container) -> File:
+    """The file in ``container``, with the lost skeletons that salvage can make again."""
+    if container.salvage:
+        restore_skeletons(container)
+    return File(container)
+
+
+def _opened(source: ByteSource, options: Params) -> File:
+    """The file; while another process appends to it, the file up to its last end."""
+    while True:
+        try:
+            return file_of(Container(source, **options))
+        except TruncatedError as error:
+            size = source.size_now()
+            if source.grows():
+                if error.last_foot is None:
+                    raise
+                end = error.last_foot
+                break
+            if size == source.size:  # nobody is at it, or has been meanwhile
+                raise
+            source = source.up_to(size)
+    file = file_of(Container(source.up_to(end), **options))
+    file.grows = True
+    return file

@@ -1,0 +1,194 @@
+"""The post filter of clips of positions: what a reader may do about the jitter of a coarse codec.
+
+The filter is a reader's choice: nothing of it is stored, and hashes are those of the values without
+it. SPEC.md, "Post filter", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.transforms.post_filter import PostFilter, filter_rows
+from mcz.errors import MotionError, OptionError
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.decimation import decimated_rows
+from mcz.files.reading.source_files import SourceOptions
+from mcz.files.reading.source_info import stating_rate
+from mcz.hints import Hint
+from mcz.kinematics import point_set
+from mcz.kinematics.marker_motion import SEPARATOR
+from mcz.model.motion import Motion, Signal, Skeleton
+from mcz.model.types import Values
+from mcz.sources import FORMATS
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+NOTE = "post-filtered"  # ends the source-note of what was filtered
+
+
+def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
+    """``motion``, one of markers, the noise of coarse quantization filtered out of its positions.
+
+    Each coordinate goes through a low-pass of 1, 3 or 5 Hz over 25 rows, chosen by how well its
+    past predicts it. That helps where positions are off by more than a centimeter or two, and harms
+    where they are nearly exact. Unknown positions stay unknown. The other signals are kept; there
+    is no source. ``rate`` is the frame rate, in place of the motion's own.
+
+    Raises MotionError where there are other joints than markers, OptionError where the length unit
+    or the frame rate is unknown.
+    """
+    motion = SourceOptions(rate=rate).applied_to(motion)
+    first = motion.signals[0]
+    _check_markers(motion.name, motion.skeleton, first.channels)
+    settings = _settings(motion.name, motion.skeleton, motion.frame_rate, first.samples_per_frame)
+    signal = Signal(
+        _filtered(first.values, first.mask, *settings),
+        name=first.name,
+        samples_per_frame=first.samples_per_frame,
+        mask=first.mask,
+    )
+    filtered = replace(
+        motion, signals=(signal, *motion.signals[1:]), metadata=_noted(motion.metadata)
+    )
+    return filtered.without_source()
+
+
+def live_filter(skeleton: Skeleton, rate: Fraction | None, name: str = "live") -> PostFilter:
+    """The filter of the frames of a clip ``name`` that come one by one; raises as ``post_filter``.
+
+    Its rows are NaN where a position is not known.
+    """
+    _check_markers(name, skeleton, None)
+    return PostFilter(skeleton.n_channels, *_settings(name, skeleton, rate, 1))
+
+
+def filtered_part(
+    clip: Clip,
+    frames: tuple[int, int] | None = None,
+    joints: Sequence[int | str] | None = None,
+    resolution: int = 0,
+    *,
+    rate: Fraction | None = None,
+) -> tuple[Values, Mask | None]:
+    """As ``clip.read_masked`` of the motion signal, cut out of the whole clip, filtered."""
+    info, skeleton = clip.signals[0], clip.skeleton
+    start, stop = clip.checked_range(frames)
+    per_frame = info.layout.samples_per_frame
+    _check_markers(clip.name, skeleton, info.channels)
+    settings = _settings(clip.name, skeleton, rate or clip.frame_rate, per_frame)
+    values, mask = clip.read_masked(None, None, resolution)  # FILT-04
+    rows = slice(start * per_frame, stop * per_frame)  # FILT-04
+    columns: Any = slice(None)
+    if joints is not None:
+        columns = [c for joint in joints for c in skeleton.columns(skeleton.find(joint))]
+    filtered = _filtered(values, mask, *settings)[rows, columns]
+    return filtered, None if mask is None else mask[rows, columns]
+
+
+def filtered_motion(
+    clip: Clip,
+    frames: tuple[int, int] | None = None,
+    resolution: int = 0,
+    *,
+    decimate: bool = False,
+    rate: Fraction | None = None,
+) -> Motion:
+    """As ``clip.motion``, its positions cut out of the whole clip, filtered; without a source."""
+    motion = _with_places(clip, frames, resolution, decimate, rate).without_source()
+    first = motion.signals[0]
+    signal = Signal(
+        first.values, name=first.name, samples_per_frame=first.samples_per_frame, mask=first.mask
+    )
+    return replace(motion, signals=(signal, *motion.signals[1:]), metadata=_noted(motion.metadata))
+
+
+def filtered_source(
+    clip: Clip,
+    frames: tuple[int, int] | None = None,
+    resolution: int = 0,
+    *,
+    decimate: bool = False,
+    rate: Fraction | None = None,
+) -> bytes:
+    """As ``clip.source_bytes``, of filtered positions: the source's own style, other numbers."""
+    motion = _with_places(clip, frames, resolution, decimate, rate)
+    if clip.source is None or motion.source is None:
+        raise OptionError("no source file", clip=clip.name, hint=Hint.CONVERT)
+    data: bytes = FORMATS[clip.source.format].write(stating_rate(motion, clip.frame_numbers))
+    return data
+
+
+def _with_places(
+    clip: Clip,
+    frames: tuple[int, int] | None,
+    resolution: int,
+    decimate: bool,
+    rate: Fraction | None,
+) -> Motion:
+    """``clip.motion`` with filtered values, on the grids of the clip where they can be."""
+    values, mask = filtered_part(clip, frames, None, resolution, rate=rate)
+    motion = clip.motion(frames, resolution, decimate=decimate)
+    first, step = motion.signals[0], 2**resolution if decimate else 1
+    if step > 1:
+        values = decimated_rows(values, first.samples_per_frame, step)
+        mask = None if mask is None else decimated_rows(mask, first.samples_per_frame, step)
+    if rate is not None:
+        motion = replace(motion, frame_rate=rate / step, frame_rate_exact=True)
+    grids = first.grids if first.values.dtype == np.float64 else ()
+    signal = Signal(
+        np.ascontiguousarray(values),
+        grids,
+        first.name,
+        first.samples_per_frame,
+        mask,
+        grid_changes=first.grid_changes if grids else (),
+    )
+    return replace(motion, signals=(signal, *motion.signals[1:]))
+
+
+def _check_markers(name: str, skeleton: Skeleton, own: object) -> None:
+    """Raise MotionError for a motion that has other joints than markers, or channels of its own."""
+    if own is not None or point_set(skeleton) != "markers":
+        raise MotionError(
+            f"motion {name!r} is not one of markers alone, and the post filter is for positions; "
+            "mcz.in_positions makes them of a skeleton's motion"
+        )
+
+
+def _settings(
+    name: str, skeleton: Skeleton, rate: Fraction | None, per_frame: int
+) -> tuple[float, float]:
+    """Rows a second, and the length unit in cm; raises OptionError where either is unknown."""
+    if rate is None:  # FILT-03
+        raise OptionError(
+            "its frame rate is unknown, and the post filter's cutoffs are in Hz",
+            clip=name,
+            hint=Hint.RATE,
+        )
+    if skeleton.unit_cm is None:  # FILT-03
+        raise OptionError(
+            "its length unit is unknown, and the post filter's thresholds are 20 and 120 mm",
+            clip=name,
+            hint=Hint.UNIT,
+        )
+    return rate.numerator / rate.denominator * per_frame, skeleton.unit_cm  # FILT-07
+
+
+def _filtered(values: Values, mask: Mask | None, rate: float, unit_cm: float) -> Floats:
+    rows = np.asarray(values, np.float64)
+    if mask is None:
+        return filter_rows(rows, rate, unit_cm)
+    # FILT-05, FILT-06
+    return np.where(mask, filter_rows(np.where(mask, rows, np.nan), rate, unit_cm), rows)
+
+
+def _noted(metadata: Mapping[str, str]) -> dict[str, str]:
+    notes = [note for note in (metadata.get("source-note"), NOTE) if note]
+    return dict(metadata) | {"source-note": SEPARATOR.join(notes)}

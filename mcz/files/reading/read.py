@@ -1,0 +1,309 @@
+"""``mcz.read``: the motion in a file of any format, and the skeleton for it: never one only near.
+
+An ASF is taken without a word where its name fits the take and all bones fit the file. One that
+somebody named, or the only one around whose bones fit, is taken with a remark. All else is a
+riddle, and an error that lists what is there.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+from mcz.errors import OptionError, SkeletonWarning, SourceError
+from mcz.files.reading.file import is_mcz, open
+from mcz.files.reading.source_files import SourceOptions, load, read_skeleton, read_source
+from mcz.hints import Hint
+from mcz.model.motion import Motion, Skeleton
+from mcz.model.text_format import first_of
+from mcz.model.units import in_unit
+from mcz.sources import Format, format_of
+from mcz.sources.text.bones import Match, match_bones
+from mcz.sources.text.find import Candidate, skeletons_around
+
+NONE = "none"  # given in place of a skeleton file: do without
+NOTE = "skeleton-note"
+SHOWN = 8  # names in a message
+Given = str | os.PathLike[str] | Skeleton | None
+Counts = Mapping[str, int]
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    skeleton: str | os.PathLike[str] | Skeleton | None = None,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+    arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
+    clip: str | None = None,
+    max_decoded: int | None = None,
+    threads: int | None = None,
+    verify: bool = False,
+) -> Motion:
+    """The motion in a file of any source format, or in an MCZ file.
+
+    An AMC finds its ASF beside it, or takes ``skeleton``, a path, a Skeleton or "none"; how it was
+    found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
+    ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
+    ("x" to "-z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
+    NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". ``model``
+    is a model file of SMPL and its kin, which says how long the bones of such a body in an NPZ are
+    ("{gender}" and "{body}" in it: those of the take). Of an MCZ file ``clip`` is read, with
+    ``max_decoded``, ``threads`` and ``verify`` as in ``open``. Raises SourceError, FormatError or
+    OptionError.
+    """
+    path = Path(path)
+    if is_mcz(path):
+        with open(path, max_decoded=max_decoded, threads=threads, verify=verify) as file:
+            motion = file.only_clip(clip).motion()
+    else:
+        source_format, data = load(path)
+        if source_format.is_skeleton:
+            raise OptionError("a skeleton without motion (mcz.read_skeleton reads it)", path=path)
+        taken = take(path, skeleton, data=data)
+        if taken.remark:
+            warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
+        motion = taken.motion
+    said = SourceOptions(rate=rate, unit=unit, up=up, arrays=arrays, model=model)
+    return said.applied_to(motion)
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A skeleton for a motion file: ``how`` it was found, and what is to be said of it, or "".
+
+    ``path`` is that of its file, where it has one that was read here.
+    """
+
+    skeleton: Skeleton
+    how: str
+    remark: str = ""
+    path: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A motion as read from its file, and the skeleton that was chosen for it."""
+
+    motion: Motion
+    chosen: Chosen | None
+
+    @property
+    def skeleton(self) -> Skeleton | None:
+        return self.chosen.skeleton if self.chosen is not None else None
+
+    @property
+    def remark(self) -> str:
+        """The remark about the skeleton, "" where there is none."""
+        return self.chosen.remark if self.chosen is not None else ""
+
+
+def take(
+    path: Path,
+    given: Given = None,
+    unit: str | None = None,
+    data: bytes | None = None,
+    *,
+    flat: bool = False,
+) -> Taken:
+    """Read the motion file ``path``, whose bytes are ``data`` if they were read already.
+
+    ``given`` is the skeleton of a format that wants one: an object, the path of a file, "none" for
+    none, or None to look around. The metadata say how it was found. Raises SourceError where no
+    skeleton can be taken, and as ``read_source`` does; with ``flat`` a file for which several of
+    those around may be meant is read without one, and the metadata say so.
+    """
+    source_format, data = load(path) if data is None else (format_of(path, data), data)
+    if not source_format.wants_skeleton:
+        return Taken(read_source(path, source_format, None, data), None)
+    try:
+        chosen = choose(path, source_format, data, given)
+    except AmbiguousError as error:
+        if not flat:
+            raise
+        motion = read_source(path, source_format, None, data)
+        return Taken(with_note(motion, f"kept without a skeleton: {error.reason}"), None)
+    if chosen is not None:
+        chosen = replace(chosen, skeleton=in_unit(chosen.skeleton, unit))
+    if chosen is None:
+        return Taken(read_source(path, source_format, None, data), None)
+    motion = read_source(path, source_format, chosen.skeleton, data)
+    if motion.skeleton is not chosen.skeleton:  # bones may come later than in the first frame
+        chosen = _with_misfits(path, source_format, data, chosen, asked=given is not None)
+    return Taken(with_note(motion, chosen.how), chosen)
+
+
+def with_note(motion: Motion, how: str) -> Motion:
+    """``motion`` whose metadata say how its skeleton was found."""
+    notes = "; ".join(filter(None, (how, motion.metadata.get(NOTE, ""))))
+    return replace(motion, metadata=dict(motion.metadata) | {NOTE: notes})
+
+
+def choose(path: Path, source_format: Format, data: bytes, given: Given) -> Chosen | None:
+    """The skeleton for the file ``path`` with the bytes ``data``, None where there is none."""
+    assert source_format.bones is not None
+    counts = source_format.bones(data)
+    if isinstance(given, Skeleton):
+        return _asked(path, given, _file_of(given) or f"the skeleton {given.name!r}", counts)
+    if given is not None:
+        if given == NONE:
+            return None
+        found = _asked(path, read_skeleton(given), str(given), counts)
+        return replace(found, path=Path(given))
+    return _found(path, skeletons_around(path), counts) if counts else None
+
+
+def _asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> Chosen:
+    check_own(str(path), skeleton, label, counts)
+    return Chosen(skeleton, how_given(skeleton))
+
+
+def how_given(skeleton: Skeleton) -> str:
+    """The record of a skeleton that somebody named."""
+    name = _file_of(skeleton)
+    return f"ASF as given: {name}" if name else "skeleton as given"
+
+
+def _file_of(skeleton: Skeleton) -> str:
+    return _text(Path(skeleton.source.path).name) if skeleton.source is not None else ""
+
+
+def check_own(path: str, skeleton: Skeleton, label: str, counts: Counts) -> None:
+    """Raise SourceError where ``skeleton`` has none of the bones but the root."""
+    match = match_bones(skeleton, counts)
+    if match.is_foreign:
+        raise SourceError(f"{label} has none of its bones: {_listed(match.lacking)}", path=path)
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """A candidate and how its bones match; ``skeleton`` None where it cannot be read."""
+
+    candidate: Candidate
+    skeleton: Skeleton | None
+    match: Match
+    fault: str = ""
+
+    @property
+    def grade(self) -> int:
+        """2: bones and dofs fit; 1: bones do; 0: some are lacking."""
+        return 0 if self.match.lacking or self.skeleton is None else 2 - bool(self.match.differing)
+
+    def describe(self, folder: Path) -> str:
+        """The file, as seen from ``folder``, and how its bones match."""
+        path = _seen_from(folder, self.candidate.path)
+        if self.fault:
+            return f"{path} (which cannot be read)"
+        if self.match.lacking:
+            return f"{path} (which lacks {_listed(self.match.lacking)})"
+        if self.match.differing:
+            return f"{path} (other dofs of {_listed(self.match.differing)})"
+        return f"{path} (whose bones fit)"
+
+
+def _found(path: Path, around: Sequence[Candidate], counts: Counts) -> Chosen | None:
+    """The one of the candidates that can be taken; None where there are none."""
+    named = [_try(candidate, counts) for candidate in around if candidate.name_of]
+    for grade in (2, 1):
+        fitting = [one for one in named if one.grade == grade]
+        nearest = [one for one in fitting if one.candidate.rank == fitting[0].candidate.rank]
+        if nearest:
+            return _only(path, nearest, named)
+    others = [_try(candidate, counts) for candidate in around if not candidate.name_of]
+    if named:
+        raise _riddle(path, [*named, *others], "a skeleton has its name, but not its bones")
+    for grade in (2, 1):
+        fitting = [one for one in others if one.grade == grade]
+        if fitting:
+            return _only(path, fitting, others)
+    if others:
+        raise _riddle(path, others, "no skeleton around has its name or its bones")
+    return None
+
+
+def _try(candidate: Candidate, counts: Counts) -> _Tried:
+    try:
+        skeleton = read_skeleton(candidate.path)
+    except SourceError as error:
+        if candidate.name_of:
+            raise
+        return _Tried(candidate, None, Match((), (), 0), str(error))
+    return _Tried(candidate, skeleton, match_bones(skeleton, counts))
+
+
+def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> Chosen:
+    first = fitting[0]
+    if len(fitting) > 1:
+        if first.candidate.name_of:
+            raise _ambiguous(path, fitting, f"{len(fitting)} skeletons are equally near")
+        text = f"no skeleton has its name, and {len(fitting)} have its bones"
+        raise _ambiguous(path, all_, text)
+    assert first.skeleton is not None
+    asf, name_of = first.candidate.path, first.candidate.name_of
+    label = _text(asf.name)
+    how = f"ASF of the name of {name_of}" if name_of else f"ASF the only one that fits: {label}"
+    remark = "" if name_of else f"its skeleton is {asf}, the only one around whose bones fit"
+    if first.match.differing:
+        remark = remark or f"its skeleton is {asf}"
+        remark += f"; the dofs of {_listed(first.match.differing)} are not those of the file"
+    return Chosen(first.skeleton, how, remark, asf)
+
+
+def _with_misfits(
+    path: Path, source_format: Format, data: bytes, chosen: Chosen, *, asked: bool
+) -> Chosen:
+    """``chosen`` with a remark on the bones of the whole file that it does not fit."""
+    assert source_format.bones is not None
+    match = match_bones(chosen.skeleton, source_format.bones(data, whole=True))
+    label = _text(str(chosen.path or chosen.skeleton.name or "the skeleton"))
+    if match.lacking and not asked:
+        found = label if chosen.path is None else _text(_seen_from(path.parent, chosen.path))
+        raise SourceError(f"{found} lacks {_listed(match.lacking)}", path=path, hint=Hint.SKELETON)
+    remark = chosen.remark
+    if match.lacking:
+        remark = f"{label} lacks {_listed(match.lacking)}; they are scalars without kinematics"
+    elif match.differing and not remark:
+        text = f"the dofs of {_listed(match.differing)} are not those of the file"
+        remark = f"its skeleton is {label}; {text}"
+    return replace(chosen, remark=remark)
+
+
+class AmbiguousError(SourceError):
+    """Several skeletons may be meant; ``reason`` says which, without their folders."""
+
+    reason = ""
+
+
+def _ambiguous(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError:
+    riddle = _riddle(path, tried, text)
+    error = AmbiguousError(riddle.message, **riddle.fields)
+    error.reason = f"{text}: {_listed([_text(one.candidate.path.name) for one in tried])}"
+    return error
+
+
+def _riddle(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:
+    shown = first_of([_text(one.describe(path.parent)) for one in tried], SHOWN)
+    return SourceError(f"{text}: {shown}", path=path, hint=Hint.SKELETON)
+
+
+def _seen_from(folder: Path, path: Path) -> str:
+    try:
+        return os.path.relpath(path, folder)
+    except ValueError:  # on another drive
+        return str(path)
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return " ".join(names[:3]) + more
+
+
+def _text(name: str) -> str:
+    """A name of a file as text that any file can hold."""
+    return name.encode("utf-8", "backslashreplace").decode()

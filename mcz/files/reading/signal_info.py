@@ -1,0 +1,252 @@
+"""Facts of a signal from CLIP, checked: channels, grids, groups and places of segments."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+from mcz.codecs import CODECS, codec_by_id
+from mcz.codecs.contract import Codec, Layout, Model, Span
+from mcz.container import payloads
+from mcz.container.chunks import ChunkType
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.limits import check
+from mcz.container.packets import FRAME
+from mcz.container.reader import Container
+from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
+from mcz.container.skeletons import parse_channels
+from mcz.errors import FormatError
+from mcz.model.clock import TIMES, times_form_fault
+from mcz.model.motion import ROLES, Channel, Skeleton
+from mcz.model.numbers import Grid, GridKind
+
+
+@dataclass(frozen=True, slots=True)
+class SignalInfo:
+    """Facts of one signal from CLIP, and the places of its segments.
+
+    ``layout`` and ``rows`` count stored frames, of which the clip shows those from ``skip`` on.
+    """
+
+    index: int
+    name: str
+    channels: tuple[Channel, ...] | None
+    grids: tuple[Grid, ...]
+    codec_id: int
+    preset: int
+    codec_version: int
+    header: bytes
+    layout: Layout
+    counts: StreamCounts
+    rows: tuple[SegmentRow, ...]
+    skip: int = 0
+    spare: int = 0
+    role: str = ""
+    of: int | None = None
+    own_codec: Codec | None = None  # of a signal that is being written: it need not be in the table
+
+    @property
+    def has_poses(self) -> bool:
+        """True of a motion whose channels are those of the skeleton."""
+        return self.role == "motion" and self.channels is None
+
+    @property
+    def samples_per_frame(self) -> int:
+        return self.layout.samples_per_frame
+
+    @property
+    def codec(self) -> Codec:
+        """Raises UnsupportedError where this reader lacks the codec."""
+        return self.own_codec or codec_by_id(self.codec_id, self.codec_version, self.preset)
+
+    @property
+    def exact(self) -> tuple[int, ...]:
+        """The groups of ordinals of a codec of values."""
+        return self.codec.exact(self.header, self.layout) if self.codec.exact else ()
+
+    @property
+    def is_integer(self) -> bool:
+        # GRID-10
+        return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
+
+    @property
+    def spans(self) -> list[Span]:
+        """Spans of the segments, as codecs take them."""
+        headers = [row.header for row in self.rows]
+        return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
+
+    def covering(self, start: int, stop: int) -> range:
+        """The segments whose own frames meet the stored frames start <= f < stop."""
+        low = bisect_right(self.rows, start, key=lambda row: row.header.stop)
+        return range(low, bisect_left(self.rows, stop, key=lambda row: row.header.first))
+
+    def coarser(self, resolution: int) -> int:
+        """The details to leave out of a signal beside the motion: no more than it has."""
+        return min(resolution, self.counts.n_resolutions - 1)
+
+
+def read_signal(
+    container: Container,
+    row: ClipRow,
+    fields: Any,
+    index: int,
+    skeleton: Skeleton,
+    frame_rate: Fraction | None,
+) -> SignalInfo:
+    """The checked SignalInfo of signal ``index`` of a clip; ``fields`` are those of CLIP.
+
+    Raises FormatError or LimitError.
+    """
+    where = f"clip {row.name!r}, signal {index}"
+    own = fields.signals[index]
+    channels = None
+    if own.flags & payloads.OWN_CHANNELS:
+        channels = parse_channels(own.channels, where)
+    coded: Skeleton | None = skeleton
+    if channels is not None:  # PWAVE-04
+        coded = None
+    n_channels = skeleton.n_channels if channels is None else len(channels)
+    check(f"{where}: channels", n_channels, container.profile.channels)
+    layout = Layout(
+        own.skip + row.n_frames + own.spare,
+        # CLIP-09
+        parse_groups(own.groups, skeleton if channels is None else None, n_channels, where),
+        own.samples_per_frame,
+        coded,
+        frame_rate,
+        parse_grids(own.grids, n_channels, where),
+        own.n_resolutions,
+        find_model=partial(_model, container, row.clip.offset),
+    )
+    info = SignalInfo(
+        index,
+        own.name,
+        channels,
+        layout.grids,
+        own.codec,
+        own.preset,
+        own.codec_version,
+        bytes(own.header),
+        layout,
+        StreamCounts(len(layout.groups), own.n_resolutions),
+        tuple(segment for segment in row.segments if segment.header.signal == index),  # DATA-08
+        own.skip,
+        own.spare,
+        role_name(own.role),
+        own.of,
+    )
+    if info.role == TIMES:
+        _check_times(info, where)
+    _check_segments(container, info, index == 0 and bool(fields.source), where)
+    return info
+
+
+def role_name(role: int) -> str:
+    """The name of a role of the registry, "" of any other."""
+    return ROLES[role] if role < len(ROLES) else ""  # ROLE-06
+
+
+def check_roles(signals: Sequence[payloads.Signal], where: str) -> None:
+    """Raise FormatError for roles that signals of one clip cannot have."""
+    roles = [signal.role for signal in signals]
+    if payloads.MOTION in roles[1:]:  # ROLE-01
+        raise FormatError(f"{where}: a motion that is not the first signal")
+    if roles.count(payloads.TIMES) > 1:  # ROLE-02
+        raise FormatError(f"{where}: two signals of times")
+    for index, signal in enumerate(signals):
+        if signal.of is not None and (signal.of >= len(signals) or signal.of == index):  # ROLE-05
+            raise FormatError(f"{where}: signal {index} has residuals of signal {signal.of}")
+
+
+def _check_times(info: SignalInfo, where: str) -> None:
+    fault = times_form_fault(info)
+    codec = CODECS.find(info.codec_id, info.preset)
+    if not fault and codec is not None and not CODECS[codec].lossless:  # ROLE-03
+        fault = f"codec {info.codec_id} is lossy"
+    if fault:
+        raise FormatError(f"{where}: no times: {fault}")
+
+
+def read_segments(container: Container, info: SignalInfo) -> None:
+    """Read the segments of a signal that cannot be decoded: their tables hold all the same."""
+    for row in info.rows:
+        container.streams(row, info.counts, None)
+
+
+def _model(container: Container, before: int, id_: bytes) -> Model | None:
+    """The model with this id, None where the file has none before this offset, that of the clip."""
+    chunk = container.directory.shared.get((ChunkType.MODL, id_))
+    if chunk is None or chunk.offset > before:  # GRAM-10
+        return None
+    fields = container.model(id_)
+    return Model(fields.kind, bytes(fields.data))
+
+
+def _check_segments(container: Container, info: SignalInfo, noted: bool, where: str) -> None:
+    """``noted``: frame notes are legal."""
+    limit = container.profile.segment_bytes
+    per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
+    due = 0
+    for row in info.rows:
+        if row.packet == FRAME:
+            # refuses what cannot be such a packet
+            frame_table(row.header, info.counts, row.size, 0)
+        if row.header.flags & FRAME_NOTES and not noted:  # NOTES-01
+            raise FormatError("frame notes, but no source that they belong to", where=where)
+        if not (row.header.first or row.header.flags & FRESH):  # DATA-12
+            raise FormatError("the first segment needs one before it", where=where)
+        check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
+        n_rows = row.header.n_frames * info.layout.samples_per_frame
+        check(f"{where}: rows of a segment", n_rows, container.profile.rows)  # LIMIT-19
+        if row.header.first != due and not container.salvage:
+            raise FormatError(f"a segment begins at {row.header.first}, {due} is due", where=where)
+        due = row.header.stop
+    if due != info.layout.n_frames and not container.salvage:
+        raise FormatError(f"segments end at frame {due} of {info.layout.n_frames}", where=where)
+
+
+def parse_groups(
+    fields: Any, skeleton: Skeleton | None, n_channels: int, where: str
+) -> tuple[tuple[int, ...], ...]:
+    """The channels of each group, as the ``kind`` of GROUPS defines them."""
+    if fields.kind == payloads.GROUP_ALL:
+        return (tuple(range(n_channels)),) if n_channels else ()
+    if fields.kind == payloads.GROUP_JOINT:
+        if skeleton is None:
+            raise FormatError("groups per joint, but the channels have no joints", where=where)
+        sizes = [len(joint.channels) for joint in skeleton.joints]
+    elif fields.kind == payloads.GROUP_CHANNEL:
+        sizes = [1] * n_channels  # CLIP-08
+    else:
+        sizes = list(fields.sizes)
+        if 0 in sizes or sum(sizes) != n_channels:  # CLIP-10, CLIP-11
+            raise FormatError(f"groups of {sizes} channels do not make {n_channels}", where=where)
+    groups, at = [], 0
+    for size in sizes:
+        if size:  # CLIP-08
+            groups.append(tuple(range(at, at + size)))
+        at += size
+    return tuple(groups)
+
+
+def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
+    grids: list[Grid] = []
+    for run in runs:
+        if not 1 <= run.n_channels <= n_channels - len(grids):  # CLIP-06, CLIP-07
+            raise FormatError(f"grids for more than its {n_channels} channels", where=where)
+        grids += [run.grid] * run.n_channels
+    if len(grids) != n_channels:  # CLIP-07
+        raise FormatError(f"grids for {len(grids)} of {n_channels} channels", where=where)
+    return tuple(grids)
+
+
+def groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], list[int]]:
+    """The groups that hold ``columns``, and where each column is among theirs."""
+    group_of = {c: g for g, group in enumerate(layout.groups) for c in group}
+    groups = tuple(dict.fromkeys(sorted(group_of[c] for c in columns)))
+    column = {c: i for i, c in enumerate(c for g in groups for c in layout.groups[g])}
+    return groups, [column[c] for c in columns]

@@ -1,0 +1,175 @@
+"""Source files on disk -> Motion or Skeleton, with what the caller says and the file does not."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from mcz.errors import MczError, OptionError, SourceError, reason_of
+from mcz.model.motion import Motion, Skeleton
+from mcz.model.units import facing, in_unit, unit_cm_of
+from mcz.sources import FORMATS, HEAD_BYTES, Format, format_of, has_known_suffix, likely_formats
+from mcz.sources.arrays.kinds import kinds_of, with_kinds
+
+
+def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
+    """The skeleton in an ASF file, with its source."""
+    path = Path(path)
+    source_format, data = load(path)
+    if not source_format.is_skeleton:
+        raise OptionError("not a skeleton file", path=path)
+    skeleton: Skeleton = _named(path, source_format.read, data, path.stem)
+    if skeleton.source is None:
+        return skeleton
+    return replace(skeleton, source=replace(skeleton.source, path=path.name))
+
+
+def load(path: Path) -> tuple[Format, bytes]:
+    """The format of a source file, see ``format_of``, and its bytes; raises SourceError."""
+    if not has_known_suffix(path):  # it is refused, whatever it holds
+        format_of(path, _start_of(path))
+    data = read_bytes(path)
+    return format_of(path, data), data
+
+
+def content_note(path: str | os.PathLike[str], source_format: Format) -> str:
+    """A remark on a file whose suffix is not that of its format, "" where it is."""
+    suffix = Path(path).suffix.lower()
+    if suffix in source_format.suffixes:
+        return ""
+    return f"its content is {source_format.suffix[1:].upper()}, though its suffix is {suffix}"
+
+
+def read_source(
+    path: Path, source_format: Format, skeleton: Skeleton | None, data: bytes
+) -> Motion:
+    """The motion in the bytes ``data`` of the file ``path``."""
+    arguments = (skeleton,) if source_format.wants_skeleton else ()
+    motion: Motion = _named(path, source_format.read, data, path.stem, *arguments)
+    if note := content_note(path, source_format):
+        notes = filter(None, (note, motion.metadata.get("source-note", "")))
+        metadata = dict(motion.metadata) | {"source-note": "; ".join(notes)}
+        motion = replace(motion, metadata=metadata)
+    if motion.source is None:
+        return motion
+    return replace(motion, source=replace(motion.source, path=path.name))
+
+
+def _named(path: Path, reader: Any, data: bytes, *arguments: object) -> Any:
+    """Read ``data`` with ``reader``; its errors name the file."""
+    if not data:
+        raise SourceError("the file is empty", path=path)
+    try:
+        return reader(data, *arguments)
+    except MczError as error:
+        error.add(path=path, note=_other_content(path, data))
+        raise
+
+
+def _other_content(path: Path, data: bytes) -> str | None:
+    """A note where a file that cannot be read begins as one of another suffix does."""
+    formats = [FORMATS[name] for name in likely_formats(data)]
+    found = [known.suffix for known in formats if known.is_motion is None or known.is_motion(data)]
+    return f"it looks like {found[0]}" if found and path.suffix.lower() not in found else None
+
+
+def _start_of(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(HEAD_BYTES)
+    except OSError:
+        return b""
+
+
+def read_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SourceError(reason_of(error), path=path) from None
+
+
+@dataclass(frozen=True, slots=True)
+class SourceOptions:
+    """Facts about a source file that its caller states.
+
+    ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit``,
+    ``up``, the axis that points up ("y", "-z"), ``forward``, the one that a figure faces, and
+    ``handedness`` ("right", "left") say what the file does not; ``force_rate``: the rate holds also
+    where the file states one. ``arrays`` says what plain arrays are, ``model`` how long the bones
+    of bodies are, see ``mcz.read``. ``verbatim``: a file that cannot be parsed is kept as an
+    attachment. ``keep_skeleton``: an ASF is restored as well, under its own name. ``flat``: a file
+    for which several skeletons around may be meant is kept without one. Raises OptionError for an
+    unknown unit, axis, kind of arrays, or a rate that is no positive number.
+    """
+
+    skeleton: str | os.PathLike[str] | None = None
+    rate: Fraction | float | None = None
+    force_rate: bool = True
+    unit: str | None = None
+    up: str | None = None
+    arrays: str | None = None
+    model: str | os.PathLike[str] | None = None
+    verbatim: bool = False
+    keep_skeleton: bool = False
+    flat: bool = False
+    forward: str | None = None
+    handedness: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.rate is not None:
+            checked_rate(self.rate)
+        if self.unit is not None:
+            unit_cm_of(self.unit)
+        facing(Skeleton(()), *self.axes)
+        if self.arrays is not None:
+            kinds_of(self.arrays)
+
+    @property
+    def axes(self) -> tuple[str | None, str | None, str | None]:
+        """The stated axes, as ``facing`` takes them."""
+        return self.up, self.forward, self.handedness
+
+    def applied_to(self, motion: Motion) -> Motion:
+        """``motion`` with the facts that are stated; raises MotionError for arrays that differ."""
+        if self.arrays is not None:
+            motion = with_kinds(motion, self.arrays)
+        if self.model is not None:
+            from mcz.sources.arrays.shaped import with_model
+
+            motion = with_model(motion, self.model)
+        if self.rate is not None and (self.force_rate or motion.frame_rate is None):
+            rate = checked_rate(self.rate)
+            motion = motion.at_rate(rate)
+        if self.unit is not None:
+            motion = replace(motion, skeleton=in_unit(motion.skeleton, self.unit))
+        if any(self.axes):
+            motion = replace(motion, skeleton=facing(motion.skeleton, *self.axes))
+        return motion
+
+    def completing(self, motion: Motion) -> Motion:
+        """``motion`` with those of the facts that it does not say itself."""
+        skeleton = motion.skeleton
+        unknown = replace(
+            self,
+            force_rate=False,
+            unit=self.unit if skeleton.unit_cm is None else None,
+            up=None if skeleton.up_axis else self.up,
+            forward=None if skeleton.forward_axis else self.forward,
+            handedness=None if skeleton.handedness else self.handedness,
+        )
+        return unknown.applied_to(motion)
+
+
+def checked_rate(rate: Fraction | float) -> Fraction:
+    """``rate`` as a Fraction; raises OptionError where it is no positive number."""
+    try:
+        exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
+        value = exact.limit_denominator(2**52)
+    except (TypeError, ValueError, OverflowError):
+        raise OptionError(f"frame rate {rate!r} is not a number") from None
+    if value <= 0:
+        raise OptionError(f"frame rate {rate} is not positive")
+    return value

@@ -1,0 +1,220 @@
+"""A clip's source file: its facts, its parts put together, and what it says of the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.container import payloads
+from mcz.container.reader import Container
+from mcz.errors import FormatError, UnsupportedError
+from mcz.files.reading.decimation import picked_notes
+from mcz.files.reading.signal_info import SignalInfo
+from mcz.model.clock import SAME_RATE, usual_step
+from mcz.model.motion import FrameNotes, Motion, Skeleton, Source
+from mcz.model.numbers.scaling import Scaling
+from mcz.model.types import JsonObject
+from mcz.sources import FORMATS, Format, format_by_id, recording_of
+
+if TYPE_CHECKING:
+    from mcz.sources.c3d.recording import Recording
+
+ANALOG = "analog"  # the role of signals whose stored numbers a source may have a meaning for
+
+
+@dataclass(frozen=True, slots=True)
+class SourceInfo:
+    """Facts of a source file that need no restoring."""
+
+    format: str
+    path: str
+    size: int
+    sha256: bytes
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """The suffixes, in lower case, of its format, and that of its name."""
+        own = PurePosixPath(self.path).suffix.lower()
+        return (*FORMATS[self.format].suffixes, *([own] if own else []))
+
+
+def source_facts(source: SourceInfo | Source | None) -> JsonObject:
+    """Path, size and hash as the documents have them, None where there is no source."""
+    return {
+        "source_path": source.path if source else None,
+        "source_bytes": source.size if source else None,
+        "source_sha256": source.sha256.hex() if source else None,
+    }
+
+
+def source_info(fields: payloads.Clip, cend: payloads.Cend | None) -> SourceInfo | None:
+    """The facts in CLIP and CEND of a clip (None: it has no CEND); None where it has no source."""
+    if not fields.source:
+        return None
+    source = fields.source
+    digest = cend.source_sha256 if cend is not None else None
+    name = format_by_id(source.format).name
+    return SourceInfo(name, source.path, source.size, digest or b"")
+
+
+def known_format(fields: payloads.Clip) -> Format | None:
+    """The source format of a clip whose CLIP is ``fields``; None: none that is known."""
+    if not fields.source:
+        return None
+    try:
+        return format_by_id(fields.source.format)
+    except UnsupportedError:
+        return None
+
+
+def read_source(
+    container: Container,
+    fields: payloads.ClipSource,
+    info: SourceInfo,
+    signal: SignalInfo,
+    frames: range,
+) -> Source:
+    """The source of the stored ``frames`` of a clip; ``fields`` are those of CLIP_SOURCE.
+
+    ``signal`` is the clip's motion, whose segments hold the notes. Raises FormatError.
+    """
+    source_format = format_by_id(fields.format)
+    template = container.template(fields.template, fields.format)
+    return Source(
+        format=info.format,
+        template=template,
+        detail=bytes(fields.detail),
+        notes=_notes(container, source_format, signal, frames),
+        path=info.path,
+        size=info.size,
+        sha256=info.sha256,
+    )
+
+
+def _notes(
+    container: Container, source_format: Format, signal: SignalInfo, frames: range
+) -> FrameNotes | None:
+    """The notes of ``frames``, numbered from 0."""
+    if source_format.join_notes is None:
+        return None
+    base, parts = frames.start, []
+    for row in (signal.rows[i] for i in signal.covering(frames.start, frames.stop)):
+        table, streams = container.streams(row, signal.counts, None)
+        index = table.frame_notes()
+        part = b"" if index is None else streams[index]
+        base = min(base, row.header.first)
+        parts.append((row.header.first, row.header.stop, part))
+    notes = source_format.join_notes([(a - base, b - base, part) for a, b, part in parts])
+    whole = range(base, max((b for _, b, _ in parts), default=base))
+    if frames == whole:
+        return notes
+    picked = range(frames.start - base, frames.stop - base, frames.step)
+    return picked_notes(source_format.join_notes, notes, picked)
+
+
+def sourced_skeleton(container: Container, id_: bytes) -> Skeleton:
+    """The skeleton ``id_`` with its own source file, if it has one."""
+    return replace(container.skeleton(id_), source=_skeleton_source(container, id_))
+
+
+def _skeleton_source(container: Container, id_: bytes) -> Source | None:
+    """The source file of the skeleton ``id_``, under the first name that the file has for it."""
+    fields = container.skeleton_fields(id_)
+    if not fields.source:
+        return None
+    source = fields.source
+    own = (payloads.OF_SKELETON, id_)
+    return Source(
+        format=format_by_id(source.format, of_skeleton=True).name,
+        template=container.template(bytes(source.template), source.format),
+        path=next((n for n, alias in container.directory.aliases.items() if alias == own), ""),
+        size=source.size,
+        sha256=bytes(source.sha256),
+    )
+
+
+def stating_rate(motion: Motion, numbers: NDArray[np.int64] | None = None) -> Motion:
+    """``motion`` with a source that states its rate; as it is where it cannot, or states none.
+
+    ``numbers``: all frame numbers of a clip that it is a part of. Raises FormatError on bad bytes.
+    """
+    source, rate = motion.source, motion.frame_rate
+    if source is None or rate is None:
+        return motion
+    step = usual_step(motion.frame_numbers if numbers is None else numbers)
+    found = contradiction(source.format, source.template, rate, step)
+    if found is None:
+        return motion
+    return replace(motion, source=replace(source, template=found.template))
+
+
+def is_one_of(ratio: Fraction, step: int) -> bool:
+    """Return whether two rates of this ratio agree, where frame numbers rise by ``step``."""
+    return any(abs(ratio - n) <= SAME_RATE * n for n in (1, step))
+
+
+def contradiction(format_name: str, template: bytes, rate: Fraction, step: int) -> Any:
+    """The result of ``Format.restate`` where the template states another rate; else None."""
+    restate = FORMATS[format_name].restate
+    found = restate(template, rate) if restate is not None else None
+    return None if found is None or is_one_of(found.rate / rate, step) else found
+
+
+def recording(motion: Motion) -> Recording | None:
+    """The facts that the source of ``motion`` states beside all numbers; None where it has none.
+
+    Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is that of a clip.
+    Raises FormatError on bad bytes.
+    """
+    source = motion.source
+    return None if source is None else _on_clock(source, motion.frame_rate)
+
+
+def _on_clock(source: Source, rate: Fraction | None) -> Recording | None:
+    """The recording of a source, its times corrected where the clip's ``rate`` corrects its own."""
+    found: Recording | None = recording_of(source)
+    if found is None or rate is None:
+        return found
+    stated = contradiction(source.format, source.template, rate, 1)
+    if stated is None or not stated.rate:
+        return found
+    factor = float(stated.rate / rate)
+    events = tuple(replace(event, time=event.time * factor) for event in found.events)
+    samples = found.analog_rate and found.analog_rate / factor
+    return replace(found, events=events, analog_rate=samples)
+
+
+def read_recording(
+    container: Container, fields: payloads.Clip, rate: Fraction | None = None
+) -> Recording | None:
+    """The recording that the source of a clip, whose CLIP is ``fields``, tells of."""
+    form = known_format(fields)
+    source = fields.source
+    if form is None or form.recording is None or source is None:
+        return None
+    template = container.template(source.template, source.format)
+    return _on_clock(Source(form.name, template, bytes(source.detail)), rate)
+
+
+def scaling_of(
+    signals: Sequence[SignalInfo], index: int, recording: Callable[[], Recording | None]
+) -> Scaling | None:
+    """The meaning of the stored numbers of a signal; None where they are the values themselves."""
+    analog = next((info for info in signals if info.role == ANALOG), None)
+    if analog is None or analog.index != index:
+        return None
+    told = recording()
+    scaling = None if told is None else told.scaling
+    n_channels = analog.layout.n_channels
+    if scaling is not None and len(scaling.scales) != n_channels:
+        raise FormatError(
+            f"source template: {len(scaling.scales)} analog channels, but signal {ANALOG!r} has "
+            f"{n_channels}"
+        )
+    return scaling

@@ -1,0 +1,150 @@
+"""Views of a clip of which little is decoded: values to slice, and few frames as a preview."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from mcz.errors import OptionError
+from mcz.files.reading.signal_info import SignalInfo
+from mcz.files.reading.signal_reader import SignalReader
+from mcz.model.indexing import Rows, row_numbers
+from mcz.model.types import Values
+
+
+class Masked(NamedTuple):
+    """Numbers as they are stored, and which of them are valid (bool, same shape; None: all)."""
+
+    values: Values
+    mask: NDArray[np.bool_] | None
+
+
+class FrameValues(NamedTuple):
+    """Some frames, ascending and counted from 0, (n,), and a row of values for each."""
+
+    frames: NDArray[np.int64]
+    values: Values
+
+
+class ClipValues:
+    """The motion signal of a clip, sliced by frames like an array of shape ``shape``."""
+
+    dtype = np.dtype("<f8")
+
+    def __init__(self, read: Callable[..., Values], shape: tuple[int, int]) -> None:
+        self._read, self.shape = read, shape
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __repr__(self) -> str:
+        n_frames, n_channels = self.shape
+        return f"<ClipValues: {n_frames} frames, {n_channels} channels, not yet decoded>"
+
+    def __getitem__(self, key: Any) -> Values:
+        """Frames, and some of their channels: ``[100]``, ``[10:20, 3:6]``, as of an array.
+
+        Only the frames that are asked for are decoded, from the first to the last of them.
+        """
+        rows, *rest = (key if isinstance(key, tuple) else (key,)) or (Ellipsis,)
+        if not _is_one_axis(rows):
+            whole: Values = np.asarray(self)[key]
+            return whole
+        chosen = row_numbers(rows, len(self), "frame")
+        first, stop = _span(chosen)
+        found = self._read(frames=(first, stop))
+        if isinstance(chosen, range):
+            return found[(slice(None, None, chosen.step), *rest)]
+        part: Values = found[(chosen - first, *rest)]
+        return part
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Values:
+        return np.asarray(self._read(), dtype=dtype)
+
+
+def _is_one_axis(key: object) -> bool:
+    """False for an index that adds an axis, or takes more than one."""
+    if key is None or key is Ellipsis or isinstance(key, (bool, np.bool_)):
+        return False
+    return isinstance(key, slice) or getattr(key, "ndim", 1) < 2
+
+
+def _span(rows: Rows) -> tuple[int, int]:
+    if isinstance(rows, int):
+        return rows, rows + 1
+    if not len(rows):
+        return 0, 0
+    ends = (rows[0], rows[-1]) if isinstance(rows, range) else (rows.min(), rows.max())
+    return int(min(ends)), int(max(ends)) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """Some frames of a clip, ascending and counted from 0; a row of values for each.
+
+    ``mask`` is None where all values are valid. ``step``: the frames between two of them, but for
+    the last, which may be nearer.
+    """
+
+    frames: NDArray[np.int64]
+    values: Values
+    mask: NDArray[np.bool_] | None
+    step: int
+
+    @property
+    def is_regular(self) -> bool:
+        """True where every frame is ``step`` behind the one before."""
+        return bool((np.diff(self.frames) == self.step).all())
+
+    def masked(self) -> Values:
+        """The values, NaN where invalid."""
+        return self.values if self.mask is None else np.where(self.mask, self.values, np.nan)
+
+
+def preview(
+    reader: SignalReader, n_frames: int, columns: Sequence[int] | slice = slice(None)
+) -> Preview:
+    """The frames that a clip of ``n_frames`` can show without decoding the rest.
+
+    ``reader`` reads the motion signal in its coarsest resolution; of what it gives these
+    ``columns`` are kept.
+    """
+    info = reader.info
+    frames, step = _frames(info, n_frames, reader.name)
+    per_frame = info.layout.samples_per_frame
+    parts, masks = [], []
+    for block in reader.blocks(info.skip, info.skip + n_frames):
+        a, b = np.searchsorted(frames, (block.start - info.skip, block.stop - info.skip)).tolist()
+        picked = frames[a:b] + info.skip - block.start
+        rows = (picked[:, None] * per_frame + np.arange(per_frame)).ravel()
+        parts.append(block.values[rows])
+        valid = np.ones(parts[-1].shape, np.bool_) if block.mask is None else block.mask[rows]
+        masks.append(valid)
+    if not parts:
+        values, _ = reader.read(0, 0)
+        parts, masks = [values], [np.ones(values.shape, np.bool_)]
+    valid = np.concatenate(masks)[:, columns]
+    values = np.concatenate(parts)[:, columns]
+    return Preview(frames, values, None if valid.all() else valid, step)
+
+
+def _frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray[np.int64], int]:
+    """The frames that are shown, counted from the first of the clip, and how far apart they are."""
+    codec = info.codec
+    if codec.preview is not None:
+        stored = codec.preview(info.header, info.layout, info.spans)
+        frames = stored - info.skip
+        frames = frames[(frames >= 0) & (frames < n_frames)]
+        return frames, int(frames[1] - frames[0]) if len(frames) > 1 else 1
+    if info.counts.n_resolutions == 1:
+        raise OptionError(
+            f"codec {codec.name} has stored it in one resolution, so that "
+            "there is nothing to show without decoding it",
+            clip=name,
+        )
+    step = 2 ** (info.counts.n_resolutions - 1)
+    return np.arange(0, n_frames, step, dtype=np.int64), step

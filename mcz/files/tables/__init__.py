@@ -1,0 +1,11 @@
+"""Motions for other libraries: NPZ that needs no MCZ, xarray and pandas.
+
+xarray and pandas are imported when they are asked for.
+"""
+
+from __future__ import annotations
+
+from mcz.files.tables.frames import to_pandas
+from mcz.files.tables.labelled import to_xarray
+
+__all__ = ["to_pandas", "to_xarray"]

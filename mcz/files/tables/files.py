@@ -1,0 +1,147 @@
+"""Tables of numbers as files, CSV and NPZ; docs/tables.md describes them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.files.tables.arrays import pose_arrays
+from mcz.model.clock import numbers_or_rows
+from mcz.model.motion import Channel, Joint, Motion, Skeleton
+from mcz.model.text_format import printable, spreadsheet_cell
+from mcz.model.types import Settings
+
+DECIMALS = 12  # of times in a CSV
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Some channels of some frames, a row a sample.
+
+    ``values`` is float64 (n_rows, n_channels) in source units; ``mask`` (bool, same shape) is True
+    where a value is valid; ``frame_numbers`` (int64, (n_rows,)) are the source's own, ``times``
+    (float64, (n_rows,)) the seconds of ``mcz.times``, None while unknown.
+    """
+
+    names: list[str]
+    values: NDArray[np.float64]
+    mask: NDArray[np.bool_]
+    frame_numbers: NDArray[np.int64]
+    frame_rate: Fraction | None
+    units: Sequence[str] = ()  # of the columns, "" where unknown; none: those of the skeleton
+    motion: Motion | None = None  # whose channels these are, all of them
+    times: NDArray[np.float64] | None = None
+    samples_per_frame: int = 1
+
+
+def table_of(motion: Motion) -> Table:
+    """The channels of the motion signal, with all that an NPZ says of its poses beside."""
+    signal = motion.signals[0]
+    mask = np.ones(signal.values.shape, np.bool_) if signal.mask is None else signal.mask
+    numbers, timeline = numbers_or_rows(motion.frame_numbers, motion.n_frames), motion.timeline
+    per_frame = signal.samples_per_frame
+    return Table(
+        channel_names(motion.skeleton, signal.channels),
+        np.asarray(signal.values, np.float64),
+        mask,
+        np.repeat(numbers, per_frame),
+        motion.frame_rate,
+        motion=motion,
+        times=None if timeline is None else timeline.samples(per_frame),
+        samples_per_frame=per_frame,
+    )
+
+
+def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> list[str]:
+    """``joint.channel`` of every column, of a joint that is one number its name alone; ``joint#n``
+    where that repeats.
+
+    Of a signal with ``own`` channels their names, or ``channel-n`` where one has none.
+    """
+    if own is not None:
+        return [channel.label or f"channel-{n}" for n, channel in enumerate(own)]
+    return [
+        address if is_number(joint) else f"{address}.{channel.label}"
+        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
+        for channel in joint.channels
+    ]
+
+
+def is_number(joint: Joint) -> bool:
+    """Return whether a joint is a column of a table: one plain scalar without a name of its own."""
+    return len(joint.channels) == 1 and (joint.channels[0].kind, joint.channels[0].label) == (
+        "",
+        "value",
+    )
+
+
+def channel_units(skeleton: Skeleton, own: Sequence[Channel] | None) -> list[str]:
+    """The unit of every column, "" where the channel does not say it."""
+    return [channel.unit for channel in (skeleton.channels if own is None else own)]
+
+
+def to_csv(table: Table) -> bytes:
+    """UTF-8 text: a header row, then a row a frame; an invalid value is an empty cell.
+
+    Columns ``frame`` and, in seconds and where times are known, ``time`` come first. Units follow
+    the names, in brackets. What would steer a terminal is escaped in both, as text it is often
+    printed on one, and an apostrophe stands before what a spreadsheet would run. Values are the
+    shortest decimals that read back as the same binary64.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    units = table.units or [""] * len(table.names)
+    heads = [f"{n} [{u}]" if u else n for n, u in zip(table.names, units, strict=True)]
+    first: list[list[Any]] = [table.frame_numbers.tolist()]
+    if table.times is not None and table.names[:1] != ["time"]:
+        first.append(list(map(repr, table.times.round(DECIMALS).tolist())))
+    writer.writerow(
+        [*("frame", "time")[: len(first)], *map(spreadsheet_cell, map(printable, heads))]
+    )
+    for *lead, values, valid in zip(
+        *first, table.values.tolist(), table.mask.tolist(), strict=True
+    ):
+        cells = [repr(v) if ok else "" for v, ok in zip(values, valid, strict=True)]
+        writer.writerow([*lead, *cells])
+    return text.getvalue().encode("utf-8", "surrogateescape")
+
+
+def to_npz(table: Table) -> bytes:
+    """A NumPy archive of values, mask, frame_numbers, frame_rate, names and, where they are known,
+    times and units; of a whole motion with its skeleton and poses (``pose_arrays``), too.
+
+    ``sample_rate`` counts rows a second, of which a frame may have several. No pickles.
+    """
+    rate = table.frame_rate
+    if rate is not None and max(rate.numerator, rate.denominator) >= 2**63:
+        raise MotionError(f"a frame rate of {float(rate):g}: an NPZ has terms below 2^63")
+    more: Settings = {"units": np.array(table.units, np.str_)} if table.units else {}
+    more |= {} if table.times is None else {"times": table.times}
+    if table.motion is not None:
+        more |= pose_arrays(table.motion)
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        values=table.values,
+        mask=table.mask,
+        frame_numbers=table.frame_numbers,
+        frame_rate=np.float64(np.nan if rate is None else float(rate)),
+        sample_rate=np.float64(np.nan if rate is None else float(rate * table.samples_per_frame)),
+        frame_rate_fraction=np.array(
+            [0, 1] if rate is None else [rate.numerator, rate.denominator], np.int64
+        ),
+        names=np.array(table.names, dtype=np.str_),
+        **more,
+    )
+    return buffer.getvalue()
+
+
+EXPORTS: dict[str, Callable[[Table], bytes]] = {"csv": to_csv, "npz": to_npz}

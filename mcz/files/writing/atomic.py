@@ -1,0 +1,254 @@
+"""Writing a file so that it has its name only when it is whole, and never in place of an input."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO, cast
+from urllib.parse import unquote, urlsplit
+
+from mcz.container.locks import is_abandoned, lock
+from mcz.container.scan import scan
+from mcz.container.source import ByteSource, file_system
+from mcz.errors import AccessError, ExistsError, OptionError, reason_of
+from mcz.hints import Hint
+from mcz.model.types import Target
+
+SUFFIX = ".part"
+SHOWN = 48  # characters of a name in that of its temporary file: 192 bytes of 255 at most
+FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)  # errors that only writing has
+
+
+LOCAL = ("file", "local")  # protocols of fsspec whose files are those of this machine
+
+
+@contextmanager
+def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> Iterator[BinaryIO]:
+    """A binary stream whose bytes become ``target`` only when the block ends well.
+
+    On disk that is a temporary file beside the target, synced and renamed; a device or a pipe, and
+    a stream that was given, are written as they are. Raises OptionError where the target is one of
+    ``inputs``, whatever ``force`` says, ExistsError where it exists and not ``force``, AccessError
+    where it cannot be written.
+    """
+    refuse_inputs(target, inputs)
+    if hasattr(target, "write"):
+        yield cast(BinaryIO, target)
+        return
+    if "://" in str(target):
+        with _remote(str(target), force) as stream:
+            yield stream
+        return
+    if not isinstance(target, (str, os.PathLike)):
+        raise OptionError(f"cannot write to {target!r}: neither a path nor a binary stream")
+    if os.fspath(target)[-1:] in (os.sep, os.altsep):
+        raise OptionError("a folder; name the file in it", path=target)
+    path = Path(target)
+    if path.is_dir():
+        raise OptionError("a folder; name the file in it", path=path)
+    if not force and os.path.lexists(path):
+        raise ExistsError("it exists", path=path, hint=Hint.FORCE)
+    with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:
+        yield stream
+
+
+@contextmanager
+def replacing_file(
+    target: Target, *, force: bool, inputs: Iterable[object] = ()
+) -> Iterator[BinaryIO]:
+    """As ``replacing``, for an MCZ file: it is read again, strictly, before it gets its name.
+
+    The stream can be read. Also raises FormatError where the new file breaks a rule.
+    """
+    with replacing(target, force=force, inputs=inputs) as stream, rereadable(stream) as own:
+        yield own
+        own.flush()
+        scan(ByteSource(own), whole=True)
+        own.seek(0, os.SEEK_END)
+
+
+@contextmanager
+def rereadable(stream: BinaryIO) -> Iterator[BinaryIO]:
+    """``stream`` itself, or, where it cannot be read, a temporary file that is copied to it.
+
+    So what was written can be read again before it gets its name; it is copied only when the block
+    ends well.
+    """
+    if all(getattr(stream, name, bool)() for name in ("readable", "seekable", "writable")):
+        yield stream
+        return
+    with tempfile.TemporaryFile() as own:
+        yield own
+        own.seek(0)
+        shutil.copyfileobj(own, stream)
+
+
+@contextmanager
+def _remote(target: str, force: bool) -> Iterator[BinaryIO]:
+    fs, path = file_system(target)
+    if not force and fs.exists(path):
+        raise ExistsError("it exists", path=target, hint=Hint.FORCE)
+    with fs.transaction, fs.open(path, "wb") as stream:
+        yield stream
+
+
+def _is_special(path: Path) -> bool:
+    """Return True for a device, a pipe or the like, which a rename would replace."""
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+@contextmanager
+def _in_place(path: Path) -> Iterator[BinaryIO]:
+    whole = io.BytesIO()
+    yield whole
+    try:
+        with path.open("wb") as stream:
+            stream.write(whole.getvalue())
+    except OSError as error:
+        raise AccessError(reason_of(error), path=path) from None
+
+
+@contextmanager
+def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
+    prefix = f".{path.name[:SHOWN]}."
+    _clear(path.parent, prefix)
+    stream, name = _locked_file(path, prefix)
+    try:
+        with stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
+            if os.name == "posix":  # elsewhere nothing can be renamed that is open
+                _give_name(name, path, force)
+        if os.name != "posix":
+            _give_name(name, path, force)
+        _sync_directory(path.parent)
+    except BaseException as error:
+        with suppress(OSError):
+            os.unlink(name)
+        if isinstance(error, OSError) and error.errno in FULL and error.filename is None:
+            raise AccessError(reason_of(error), path=path) from error
+        raise
+
+
+def _locked_file(path: Path, prefix: str) -> tuple[BinaryIO, str]:
+    """A temporary file for ``path`` that no other writer takes for a leftover."""
+    while True:
+        try:
+            handle, name = tempfile.mkstemp(prefix=prefix, suffix=SUFFIX, dir=path.parent)
+        except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+            raise AccessError(reason_of(error), path=path) from None
+        stream = os.fdopen(handle, "w+b")
+        if lock(stream) and Path(name).exists():  # else one has cleared it away just now
+            return stream, name
+        stream.close()
+
+
+def _clear(folder: Path, prefix: str) -> None:
+    """Take away what writers of this name have left that were killed: nobody has locked it."""
+    with suppress(OSError, ValueError):
+        for entry in os.scandir(folder):
+            named = entry.name.startswith(prefix) and entry.name.endswith(SUFFIX)
+            if not (named and entry.is_file(follow_symlinks=False)):
+                continue
+            with suppress(OSError), open(entry.path, "r+b") as leftover:
+                if is_abandoned(leftover):
+                    os.unlink(entry.path)
+
+
+def _give_name(name: str, path: Path, force: bool) -> None:
+    """Rename ``name`` to ``path``; without ``force`` never over what has come there meanwhile."""
+    try:
+        if not force and _linked(name, path):
+            os.unlink(name)
+        else:
+            os.replace(name, path)
+    except FileExistsError:
+        raise ExistsError("it exists", path=path, hint=Hint.FORCE) from None
+    except OSError as error:  # a folder, perhaps
+        raise AccessError(reason_of(error), path=path) from None
+
+
+def _linked(name: str, path: Path) -> bool:
+    """Make ``path`` a second name of the file; False where the file system has no such names.
+
+    Raises FileExistsError, which a rename would not.
+    """
+    try:
+        os.link(name, path)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        if os.path.lexists(path):
+            raise FileExistsError from error
+        return False
+    return True
+
+
+def _sync_directory(path: Path) -> None:
+    """Make the rename itself last; not every system lets a directory be opened."""
+    with suppress(OSError):
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def refuse_inputs(target: object, inputs: Iterable[object]) -> None:
+    """Raise OptionError where ``target`` is one of ``inputs``, by its file and not by its name.
+
+    Each is a path, an fsspec target, a stream or anything else, which is no file. Links of both
+    sorts lead to the same file; a device, a pipe or what does not exist yet is nobody's input.
+    """
+    target_is = _identity(target)
+    if target_is is None:
+        return
+    for source in inputs:
+        if _identity(source) == target_is:
+            name = _name(target)
+            other = f" ({_name(source)})" if _name(source) != name else ""
+            raise OptionError(f"{name}: it is the input itself{other}; name another output")
+
+
+def _name(file: object) -> str:
+    return str(file if isinstance(file, (str, os.PathLike)) else getattr(file, "name", "a stream"))
+
+
+def _identity(file: object) -> object:
+    """The identity of a file; None for what is no file."""
+    if isinstance(file, (str, os.PathLike)):
+        path = os.fspath(file)
+        if isinstance(path, str) and "://" in path:
+            url = urlsplit(path)
+            if url.scheme not in LOCAL:
+                return path
+            path = unquote(url.path)
+        return _stat_of(path)
+    try:
+        number = getattr(file, "fileno", None)
+        return None if number is None else _stat_of(number())
+    except (OSError, ValueError):  # a stream of memory, or a closed one
+        return None
+
+
+def _stat_of(file: str | bytes | int) -> tuple[int, int] | None:
+    try:
+        found = os.stat(file)  # noqa: PTH116 - of a path or a number
+    except (OSError, ValueError):  # ValueError: a name with a zero byte
+        return None
+    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None

@@ -1,0 +1,298 @@
+"""A planned clip -> chunks: its skeletons and models, CLIP, segments, CEND, its quality record.
+
+The clip is decoded from its final bytes before it ends. SPEC.md, "CEND", is normative.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec, Segment
+from mcz.container import payloads
+from mcz.container.chunks import ChunkType
+from mcz.container.dictionary_deflate import pack_skeleton
+from mcz.container.limits import Profile, check
+from mcz.container.reader import Container
+from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
+from mcz.container.skeletons import build_skeleton
+from mcz.container.source import ByteSource, open_source
+from mcz.container.time_base import put_time_base, time_base_of
+from mcz.container.value_hash import ValueDigest, canonical
+from mcz.container.writer import Writer
+from mcz.errors import ChecksumError, LimitError
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.signal_info import SignalInfo, read_signal
+from mcz.files.reading.signal_reader import SignalReader
+from mcz.files.reading.stored_clip import with_indices, with_names
+from mcz.files.writing.planning import (
+    ClipPlan,
+    Prepared,
+    SignalPlan,
+    StoredSkeleton,
+    clip_record,
+    plan_clip,
+)
+from mcz.files.writing.quality import CHUNK, quality_payload, quality_record
+from mcz.files.writing.signal_source import MemorySource
+from mcz.files.writing.write_transaction import alias_once
+from mcz.model.motion import Motion, Signal, Skeleton
+from mcz.model.types import Params, Progress, Values
+from mcz.sources import FORMATS
+
+NO_HASH = bytes(32)
+
+
+# (entries of a quality record as stored, decoded values of each signal) -> its entries
+Amend = Callable[[dict[str, str], Sequence[Values]], dict[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """A signal as a reader has it: of a lossless codec ``values`` are those that were given."""
+
+    values: Values
+    sha256: bytes
+
+
+class ClipCopy:
+    """CLIP and segments a second time, in memory, where they can be decoded.
+
+    The file of the clip itself may be a pipe.
+    """
+
+    def __init__(self, profile: Profile) -> None:
+        self._out = io.BytesIO()
+        self.writer = Writer(self._out, profile=profile)
+
+    def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+        self.writer.segment(header, streams)
+
+    def decoded(self, motion: Motion, coded: Sequence[SignalPlan]) -> list[Decoded]:
+        """The signals; raises ChecksumError where a channel differs that may not."""
+        self.writer.end_clip(motion.n_frames, NO_HASH, [NO_HASH] * len(motion.signals))
+        directory, data = self.writer.directory, open_source(self._out.getvalue())
+        container = Container(data, max_decoded=2**53, directory=directory)
+        row = directory.clips[motion.name]
+        record = container.clip(row)
+        found = []
+        for index, part in enumerate(coded):
+            info = read_signal(container, row, record, index, motion.skeleton, motion.frame_rate)
+            info = replace(info, own_codec=part.codec)
+            found.append(_decoded(container, info, motion.signals[index], part.lossy_channels()))
+        return found
+
+
+def _decoded(
+    container: Container, info: SignalInfo, signal: Signal, free: NDArray[np.bool_]
+) -> Decoded:
+    reader = SignalReader(container, info, None, 0, signal.name)
+    values = np.empty(signal.values.shape) if free.any() else signal.values
+    digest, n_frames = ValueDigest(), info.layout.n_frames
+    for block in reader.blocks(0, n_frames):
+        rows = slice(*(edge * signal.samples_per_frame for edge in (block.start, block.stop)))
+        kept = ~free if free.any() else slice(None)
+        is_same = _is_same(signal.values[rows, kept], block.values[:, kept])
+        mask = None if signal.mask is None else signal.mask[rows]
+        if not is_same or not _is_same_mask(mask, block.mask):  # CEND-07
+            raise ChecksumError(
+                f"frames {block.start}:{block.stop}: codec {info.codec.name} decodes other values "
+                "than it was given",
+                where=f"signal {info.index}",
+            )
+        if free.any():
+            values[rows] = block.values
+        digest.update(block.values, block.mask)
+    return Decoded(values, digest.digest())
+
+
+def _is_same(given: Values, found: Values) -> bool:
+    """True where the bits are the same, those of NaN apart."""
+    own, other = (np.ascontiguousarray(values).view(np.int64) for values in (given, found))
+    if given.dtype == found.dtype and np.array_equal(own, other):
+        return True
+    return canonical(given) == canonical(found)
+
+
+def _is_same_mask(given: NDArray[np.bool_] | None, found: NDArray[np.bool_] | None) -> bool:
+    if given is None or found is None:
+        return (given is None or bool(given.all())) and (found is None or bool(found.all()))
+    return np.array_equal(given, found)
+
+
+def check_values(stream: BinaryIO, names: Iterable[str]) -> None:
+    """Decode clips of the file in ``stream`` and compare their hashes, before it gets its name."""
+    stream.flush()
+    container = Container(ByteSource(stream), max_decoded=2**53)
+    for name in names:
+        clip = Clip(container, container.directory.clips[name])
+        for info in clip.signals:
+            clip.check_values(info.index)
+    stream.seek(0, os.SEEK_END)
+
+
+def write_skeletons(writer: Writer, skeletons: Sequence[StoredSkeleton]) -> bytes:
+    """Write skeletons that the file does not have, and their names; return the id of the last."""
+    id_ = b""
+    for stored in skeletons:
+        skeleton = replace(stored.skeleton, base=id_) if stored.derives else stored.skeleton
+        id_ = write_skeleton(writer, skeleton)
+        if stored.path:
+            alias_once(writer, stored.path, id_)
+    return id_
+
+
+def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
+    """Write SKEL, after the SRCE of its own file if it has one; return its id."""
+    given = skeleton
+    if writer.last_skeleton is not None and writer.last_skeleton[0] is given:
+        id_ = writer.last_skeleton[1]
+        if (ChunkType.SKEL, id_) in writer.directory.shared:  # not taken back with what failed
+            return id_
+    check("joints", skeleton.n_joints, writer.profile.joints)
+    check("channels", skeleton.n_channels, writer.profile.channels)
+    if skeleton.base and (ChunkType.SKEL, skeleton.base) not in writer.directory.shared:
+        skeleton = replace(skeleton, base=None)  # it is in another file
+    source = None
+    if skeleton.source is not None:
+        format_id = FORMATS[skeleton.source.format].id
+        source = payloads.SkeletonSource(
+            template=writer.template(format_id, skeleton.source.template),
+            format=format_id,
+            size=skeleton.source.size,
+            sha256=skeleton.source.sha256,
+        )
+    payload = build_skeleton(skeleton, source)
+    id_ = writer.shared(ChunkType.SKEL, pack_skeleton(payload) if writer.short else payload)
+    writer.last_skeleton = given, id_
+    return id_
+
+
+def write_clip(
+    writer: Writer, motion: Motion, codec: Codec, params: Params
+) -> dict[str, str] | None:
+    """``write_plan`` of a motion as it is."""
+    return write_plan(writer, plan_clip(Prepared(motion), codec, params, writer.profile))
+
+
+def file_in_memory(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> bytes:
+    """A file of one clip without its quality record."""
+    out = io.BytesIO()
+    writer = Writer(out, profile=profile)
+    write_plan(writer, plan_clip(prepared, codec, params, profile), quality=False)
+    writer.finish()
+    return out.getvalue()
+
+
+def write_plan(
+    writer: Writer,
+    plan: ClipPlan,
+    progress: Progress | None = None,
+    *,
+    quality: bool = True,
+    remarks: Mapping[str, str] = MappingProxyType({}),
+    amend: Amend | None = None,
+    copy: ClipCopy | None = None,
+) -> dict[str, str] | None:
+    """Write one clip: its skeletons and template if new, CLIP, segments, CEND, quality if lossy.
+
+    Returns what the quality record says, None where there is none. ``remarks`` join it, ``amend``
+    has the last word on it. ``copy`` decodes the clip before it ends.
+    """
+    motion, codec = plan.motion, plan.codec
+    record = _referred(writer, plan)
+    copy = copy or ClipCopy(writer.profile)
+    for model in plan.models:
+        copy.writer.shared(ChunkType.MODL, model)
+    for each in (writer, copy.writer):
+        each.begin_clip(record)
+    for index, signal in enumerate(plan.signals):
+        _write_signal((writer, copy), motion, index, signal, progress)
+    decoded = copy.decoded(motion, plan.signals)
+    sha256 = motion.source.sha256 if motion.source else b""
+    writer.end_clip(motion.n_frames, sha256, [signal.sha256 for signal in decoded])
+    if not quality or codec.lossless:
+        return None
+    settings, values = codec.settings(plan.options), [signal.values for signal in decoded]
+    named = quality_record(motion, values, codec.name, settings, remarks)
+    stored = with_indices(named, motion.skeleton)
+    stored = amend(stored, values) if amend else stored
+    writer.ancillary(CHUNK, quality_payload(stored))
+    return with_names(stored, motion.skeleton)
+
+
+def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> None:
+    """Write the CLIP, and what it refers to, of a plan of which no frame is known yet.
+
+    ``first_number`` is that of its first frame.
+    """
+    record = _referred(writer, plan)
+    record.flags |= payloads.OPEN_CLIP
+    put_time_base(record, time_base_of(np.array([first_number], np.int64), None))
+    writer.begin_clip(record)
+
+
+def _referred(writer: Writer, plan: ClipPlan) -> payloads.Clip:
+    """Write what CLIP refers to, and return the record."""
+    prepared, source = plan.prepared, plan.motion.source
+    for model in plan.models:
+        writer.shared(ChunkType.MODL, model)
+    skeletons = prepared.skeletons or (StoredSkeleton(plan.motion.skeleton),)
+    skeleton = write_skeletons(writer, skeletons)
+    template = None
+    if source is not None:
+        template = writer.template(FORMATS[source.format].id, source.template)
+    return clip_record(plan, skeleton, template)
+
+
+def _write_signal(
+    outs: tuple[Writer, ClipCopy],
+    motion: Motion,
+    index: int,
+    plan: SignalPlan,
+    progress: Progress | None,
+) -> None:
+    for segment in plan.encoded.segments:
+        header, streams = _segment(outs[0].profile, motion, index, plan.source, segment)
+        for out in outs:
+            out.segment(header, streams)
+        if progress is not None:
+            progress(segment.first + segment.n_frames, motion.n_frames, motion.name)
+
+
+def _segment(
+    profile: Profile, motion: Motion, index: int, source: MemorySource, segment: Segment
+) -> tuple[SegmentHeader, list[bytes]]:
+    """Header and streams of a segment: its notes, its masks, and what the codec made."""
+    start, stop = segment.first, segment.first + segment.n_frames
+    per_frame = 8 * source.layout.samples_per_frame * max(1, source.layout.n_channels)
+    size = segment.n_frames * per_frame
+    check(f"frames {start}:{stop}: decoded bytes", size, profile.segment_bytes)
+    flags = FRESH if segment.fresh else 0
+    streams: list[bytes] = []
+    notes = b""
+    if index == 0 and motion.source is not None and motion.source.notes is not None:
+        notes = motion.source.notes.cut(start, stop)
+    if notes:
+        flags |= FRAME_NOTES
+        streams.append(notes)
+    group_notes = source.group_notes(start, stop)
+    if any(group_notes):
+        if profile.is_plain:  # LIMIT-21
+            raise LimitError("the profile small has no numbers beyond their grid (group notes)")
+        flags |= GROUP_NOTES
+        streams += group_notes
+    masks = source.masks(start, stop)
+    if any(masks):
+        flags |= MASKS
+        streams += masks
+    streams += segment.streams
+    header = SegmentHeader(index, start, segment.n_frames, segment.lead, segment.tail, flags)
+    return header, streams

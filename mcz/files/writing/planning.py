@@ -1,0 +1,331 @@
+"""The plan of a clip: a motion made ready for its codec, and what is decided before the writing."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import codec_by_name
+from mcz.codecs.contract import Codec, Encoded
+from mcz.codecs.parameters import TARGETS
+from mcz.container import payloads
+from mcz.container.limits import LARGE, Profile, check
+from mcz.container.skeletons import channel_records
+from mcz.container.strict import is_plain_path
+from mcz.container.time_base import put_time_base, time_base_of
+from mcz.errors import MotionError, OptionError
+from mcz.files.reading.source_info import stating_rate
+from mcz.files.writing.signal_bounds import of_codec
+from mcz.files.writing.signal_source import MemorySource, as_stored, group_kind, settle
+from mcz.kinematics import point_set
+from mcz.kinematics.marker_motion import in_positions
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
+from mcz.model.clock import TIMES
+from mcz.model.motion import ROLES, Motion, Signal, Skeleton, Source
+from mcz.model.schema import MAX_COUNT, build
+from mcz.model.types import JsonObject, Params
+from mcz.model.units import axes_of
+from mcz.sources import FORMATS
+
+BESIDE = "fast"  # the codec of all signals but the motion, where that one is lossy
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSkeleton:
+    """A skeleton that a file stores.
+
+    Where it ``derives``, its base is the one before it. ``path`` names its own file, which the MCZ
+    file restores; empty: it restores none.
+    """
+
+    skeleton: Skeleton
+    derives: bool = False
+    path: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A motion as a codec takes it, and the skeletons that are stored: its own alone, or last."""
+
+    motion: Motion
+    skeletons: tuple[StoredSkeleton, ...] = ()
+
+
+def prepare(
+    motion: Motion, codec: Codec, params: Params, skeletons: tuple[StoredSkeleton, ...] = ()
+) -> Prepared:
+    """``motion``, or the positions of its points where ``codec`` codes those.
+
+    ``skeletons`` are those of ``Prepared``, of the motion as it is given. Raises OptionError where
+    positions have no meaning, MotionError where there are none.
+    """
+    options = codec.options(of_codec(params))
+    skeletons = skeletons or (StoredSkeleton(motion.skeleton),)
+    if not wants_positions(codec, options, motion.skeleton):
+        return Prepared(motion, skeletons)
+    check_bones(motion.skeleton, f"codec {codec.name}, of positions,")
+    made = in_positions(motion, virtual_markers=bool(options.get("virtual_markers")))
+    if made is motion:
+        return Prepared(motion, skeletons)
+    return Prepared(made, (*skeletons, StoredSkeleton(made.skeleton, derives=True)))
+
+
+def read_with(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[StoredSkeleton, ...]:
+    """The stored skeletons of one that was read with ``base``, whose file stays as it is."""
+    if base is None:
+        return (StoredSkeleton(skeleton),)
+    derives = skeleton.base is not None or axes_of(skeleton) != axes_of(base.skeleton)
+    return base, StoredSkeleton(skeleton, derives)
+
+
+def under_its_path(skeleton: Skeleton) -> StoredSkeleton:
+    """``skeleton``, stored with the path of its own file where it has one."""
+    path = skeleton.source.path if skeleton.source is not None else ""
+    return StoredSkeleton(skeleton, path=path)
+
+
+def wants_positions(codec: Codec, options: Params, skeleton: Skeleton) -> bool:
+    """True where a codec takes the positions of points instead of the channels of a clip."""
+    if not codec.positions or options.get("domain") == "channels" or not skeleton.joints:
+        return False
+    return point_set(skeleton) != "markers"
+
+
+def check_bones(skeleton: Skeleton, what: str) -> None:
+    """Raise OptionError where rotations move no point, since no bone has a length.
+
+    Arrays of body models are such: ``what`` would then be about the root alone.
+    """
+    if has_no_lengths(skeleton):
+        raise OptionError(
+            f"{what} has no meaning: {NO_LENGTHS}, so that rotations move no point; "
+            "rest offsets give them one"
+        )
+
+
+def with_true_sources(motion: Motion, *, lossless: bool) -> Motion:
+    """``motion`` whose sources state the size and the hash of what it restores.
+
+    Values may have been replaced since they were read: then the source is of no known file. A
+    skeleton that is no longer that of its own file has none. Raises MotionError or FormatError
+    where the source cannot hold the values.
+    """
+    motion = replace(motion, skeleton=_with_true_source(motion.skeleton)).counted_by_ones()
+    source = motion.source
+    if source is None:
+        return motion
+    if source.format not in FORMATS:
+        raise MotionError(f"source format {source.format!r} is not one of {', '.join(FORMATS)}")
+    if source.sha256 and _facts(_restored(motion, lossless)) == (source.size, source.sha256):
+        return motion
+    return with_source_hash(replace(motion, source=source.of_no_file()), lossless=lossless)
+
+
+def _with_true_source(skeleton: Skeleton) -> Skeleton:
+    source = skeleton.source
+    if source is None:
+        return skeleton
+    try:
+        data = FORMATS["asf"].write(skeleton) if source.format == "asf" else b""
+    except MotionError:  # printed anew, and the format cannot say it
+        data = b""
+    known = (source.size, source.sha256) == _facts(data)
+    return skeleton if data == source.template and known else replace(skeleton, source=None)
+
+
+def with_source_hash(motion: Motion, *, lossless: bool) -> Motion:
+    """``motion`` with size and hash of its source file, which was changed or cut since.
+
+    Unless ``lossless``, its values may lie off their grids.
+    """
+    if motion.source is None or motion.source.sha256:
+        return motion
+    motion = stating_rate(motion)
+    size, digest = _facts(_restored(motion, lossless))
+    assert motion.source is not None
+    return replace(motion, source=replace(motion.source, size=size, sha256=digest))
+
+
+def _restored(motion: Motion, lossless: bool) -> bytes:
+    assert motion.source is not None
+    stored = as_stored(motion)
+    signals = tuple(_as_read(signal, lossless) for signal in stored.signals)
+    data: bytes = FORMATS[motion.source.format].write(replace(stored, signals=signals))
+    return data
+
+
+def _as_read(signal: Signal, lossless: bool) -> Signal:
+    try:
+        return settle(signal)[1]
+    except MotionError:
+        if lossless:
+            raise
+        return signal
+
+
+def _facts(data: bytes) -> tuple[int, bytes]:
+    return len(data), hashlib.sha256(data).digest()
+
+
+@dataclass(frozen=True, slots=True)
+class SignalPlan:
+    """A signal, the codec that it is encoded with, and the segments that are yet to be encoded."""
+
+    source: MemorySource
+    codec: Codec
+    encoded: Encoded
+
+    def lossy_channels(self) -> NDArray[np.bool_]:
+        """The channels whose values the codec may change, (n_channels,)."""
+        layout, codec = self.source.layout, self.codec
+        free = np.full(layout.n_channels, not codec.lossless)
+        for group in codec.exact(self.encoded.header, layout) if codec.exact else ():
+            free[list(layout.groups[group])] = False
+        return free
+
+
+@dataclass(frozen=True, slots=True)
+class ClipPlan:
+    """A clip as it is stored, in the order of its chunks.
+
+    ``prepared`` has the values that a file stores; ``models`` are payloads of MODL. ``options`` are
+    those of the motion's codec.
+    """
+
+    prepared: Prepared
+    options: Params
+    models: tuple[bytes, ...]
+    signals: tuple[SignalPlan, ...]
+
+    @property
+    def motion(self) -> Motion:
+        return self.prepared.motion
+
+    @property
+    def codec(self) -> Codec:
+        """The codec of the motion."""
+        return self.signals[0].codec
+
+
+def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile) -> ClipPlan:
+    """The plan of a motion, whose codec is ``codec``, for a file of a profile.
+
+    A lossy codec takes the motion alone; further signals stay lossless. Raises OptionError for a
+    bad parameter or a target that nobody has met yet (see ``tuning.py``), MotionError for values
+    that the codec cannot hold, LimitError for what the profile does not allow.
+    """
+    options = codec.options(params, inner=True)
+    if codec.dial and asked(options) and options[codec.dial.parameter] is None:
+        raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
+    counted = prepared.motion.counted_by_ones()
+    motion = as_stored(with_source_hash(counted, lossless=codec.lossless))
+    for signal in motion.signals:
+        check(f"signal {signal.name!r}: channels", signal.n_channels, profile.channels)
+    signals = tuple(
+        _signal_plan(motion, index, codec, options, profile) for index in range(len(motion.signals))
+    )
+    models = tuple(model for plan in signals for model in _models(plan.encoded, profile))
+    return ClipPlan(Prepared(motion, prepared.skeletons), options, models, signals)
+
+
+def plan_open_clip(
+    prepared: Prepared, codec: Codec, options: Params, encoded: Encoded, profile: Profile
+) -> ClipPlan:
+    """The plan of a clip of which no frame is known yet."""
+    check("channels", prepared.motion.signals[0].n_channels, profile.channels)
+    source = MemorySource(prepared.motion, 0, codec, profile.segment_bytes)
+    models = tuple(_models(encoded, profile))
+    return ClipPlan(prepared, options, models, (SignalPlan(source, codec, encoded),))
+
+
+def asked(options: Params) -> JsonObject:
+    """The targets among the options of a codec."""
+    return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
+
+
+def _signal_plan(
+    motion: Motion, index: int, codec: Codec, options: Params, profile: Profile
+) -> SignalPlan:
+    if index and not codec.lossless:
+        codec = codec_by_name(BESIDE)
+        options = codec.options({})
+    signal = motion.signals[index]
+    if not codec.lossless and signal.channels is not None:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
+    if codec.domain == "values" and signal.values.dtype == np.int64:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
+    row_bytes = 8 * max(1, signal.n_channels)
+    most = min(profile.segment_bytes, profile.coded_bytes, profile.rows * row_bytes)
+    source = MemorySource(motion, index, codec, most, options)
+    if codec.domain == "values" and source.signal.values.dtype == np.int64:
+        raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
+    return SignalPlan(source, codec, codec.encode(source, options))
+
+
+def _models(encoded: Encoded, profile: Profile) -> Iterator[bytes]:
+    """Models that a signal needs; well-known ones where all shall be in the file."""
+    known = encoded.known if profile is LARGE else ()
+    for model in (*encoded.models, *known):
+        yield build(payloads.Modl(kind=model.kind, data=model.data), "MODL")
+
+
+def clip_record(plan: ClipPlan, skeleton: bytes, template: bytes | None) -> payloads.Clip:
+    """CLIP of a plan; ``skeleton`` and ``template`` are the ids of its SKEL and its SRCE."""
+    motion = plan.motion
+    rate = motion.frame_rate
+    if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
+        raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
+    record = payloads.Clip(
+        name=motion.name,
+        flags=0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
+        skeleton=skeleton,
+        n_frames=motion.n_frames,
+        rate_numerator=rate.numerator if rate else 0,
+        rate_denominator=rate.denominator if rate else 1,
+        metadata=payloads.metadata_records(dict(sorted(motion.metadata.items()))),
+        source=_source_record(motion.source, template),
+        signals=[_signal_record(signal) for signal in plan.signals],
+    )
+    first_time = None if motion.signals_of(TIMES) else motion.first_time
+    put_time_base(record, time_base_of(motion.frame_numbers, first_time))
+    return record
+
+
+def _source_record(source: Source | None, template: bytes | None) -> payloads.ClipSource | None:
+    if source is None or template is None:
+        return None
+    if source.path and not is_plain_path(source.path):
+        raise MotionError(f"source path {source.path!r} is not relative and plain")
+    return payloads.ClipSource(
+        template=template,
+        format=FORMATS[source.format].id,
+        detail=source.detail,
+        path=source.path,
+        size=source.size,
+    )
+
+
+def _signal_record(plan: SignalPlan) -> payloads.Signal:
+    signal, codec, encoded = plan.source.signal, plan.codec, plan.encoded
+    own, listed = signal.channels is not None, plan.source.is_listed
+    kind = payloads.GROUP_LISTED if listed else group_kind(signal, codec.grouping)
+    sizes = [len(group) for group in plan.source.layout.groups] if listed else None
+    return payloads.Signal(
+        name=signal.name,
+        flags=payloads.OWN_CHANNELS if own else 0,
+        role=ROLES.index(signal.role or ""),
+        of=signal.of,
+        channels=channel_records(signal.channels) if signal.channels is not None else None,
+        samples_per_frame=signal.samples_per_frame,
+        grids=payloads.grid_runs(signal.grids),
+        codec=codec.id,
+        preset=encoded.preset or codec.preset,
+        codec_version=codec.version if encoded.version is None else encoded.version,
+        header=encoded.header,
+        groups=payloads.Groups(kind=kind, sizes=sizes),
+        n_resolutions=encoded.n_resolutions,
+    )

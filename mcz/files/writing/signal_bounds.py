@@ -1,0 +1,281 @@
+"""Bounds of the signals beside the motion: coarser numbers, whose errors are measured.
+
+``analog.max_error=0.5mV`` asks for one. Each channel is put on a coarser number grid, or on fewer
+numbers of its own grid where its source can be written from that grid alone. Codec ``fast`` then
+codes it exactly, so that a decoder needs nothing new.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.channel_size import channel_bytes
+from mcz.codecs.contract import Codec
+from mcz.errors import OptionError
+from mcz.files.writing.channel_limits import MAX_ERROR, MEAN_ERROR, limits_of
+from mcz.kinematics.metrics.comparison import named_signals, signal_errors
+from mcz.model.motion import Motion, Signal, Skeleton, Source
+from mcz.model.numbers import Grid, GridKind
+from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
+from mcz.model.types import JsonObject, Params
+from mcz.sources import recording_of, with_analog_scales
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+EXACT_ROLES = {"times": "they order the frames", "residuals": "they say which points are valid"}
+FLOATS = (GridKind.BINARY32, GridKind.VAX_F)
+MOST_MULTIPLES = 2**19  # of a step in a number; beyond, fast may find no unit
+SHORT_BITS = 8  # of a unit of floats, few of whose multiples are rounded then
+TRIALS = 10
+NEAR = 0.97  # of a mean error that was asked for: near enough
+
+
+def of_codec(params: Params) -> JsonObject:
+    """``params`` without bounds of signals."""
+    return {key: value for key, value in params.items() if not _is_bound(key)}
+
+
+def _is_bound(key: str) -> bool:
+    name, _, error = key.rpartition(".")
+    return bool(name) and error in (MAX_ERROR, MEAN_ERROR)
+
+
+def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, dict[str, str]]:
+    """``motion`` with coarser signals as the bounds among ``params`` allow.
+
+    Also returns what the quality record says. Raises OptionError for a bound that makes no sense.
+    """
+    asked = {key: value for key, value in params.items() if _is_bound(key)}
+    if asked and codec.lossless:
+        raise OptionError(
+            f"{next(iter(asked))}: codec {codec.name} promises the source byte for byte; name a "
+            "lossy codec, whose parameter lossless=all keeps the motion exact"
+        )
+    signals, numbers = list(motion.signals), {n: i for i, n in enumerate(named_signals(motion), 1)}
+    remarks: dict[str, str] = {}
+    for name in dict.fromkeys(key.rpartition(".")[0] for key in asked):
+        if name not in numbers:
+            raise OptionError(f"no signal {name!r} beside the motion; there are {[*numbers]}")
+        given = signals[numbers[name]]
+        if given.role in EXACT_ROLES:
+            raise OptionError(f"signal {name!r} stays exact: {EXACT_ROLES[given.role]}")
+        limits = [
+            _limits(motion.skeleton, given, f"{name}.{error}", asked)
+            for error in (MAX_ERROR, MEAN_ERROR)
+        ]
+        motion, found = _coarser(motion, given, *limits)
+        signals[numbers[name]] = found
+        errors = signal_errors(motion.skeleton, given, found)
+        figures = {"mse": errors.mse, MAX_ERROR: errors.greatest, MEAN_ERROR: errors.mean}
+        known = {k: v for k, v in figures.items() if v is not None}
+        remarks |= {f"signal.{name}.{key}": repr(value) for key, value in known.items()}
+    remarks |= {f"param.{key}": str(value) for key, value in asked.items()}
+    return replace(motion, signals=tuple(signals)), remarks
+
+
+def _limits(skeleton: Skeleton, signal: Signal, key: str, asked: Params) -> Floats:
+    """The bound of each channel in its own unit, (n_channels,); infinite where none is asked."""
+    channels = skeleton.channels if signal.channels is None else signal.channels
+    if key not in asked:
+        return np.full(len(channels), math.inf)
+    return limits_of(skeleton, channels, key, asked[key])
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A channel: values in its unit, the numbers that a file stores, and what these mean.
+
+    ``value = (number - offset) * scale * general``. ``kept``: values that stay as they are.
+    """
+
+    values: Floats
+    numbers: Floats
+    grid: Grid
+    kept: Bools
+    valid: Bools
+    offset: float = 0.0
+    scale: float = 1.0
+    general: float = 1.0
+
+    def meant(self, numbers: Floats) -> Floats:
+        return (numbers - self.offset) * self.scale * self.general
+
+    def on(self, grid: Grid, numbers: Floats) -> Column | None:
+        """The column with other numbers, those that stay among them; None where it cannot be."""
+        numbers = np.where(self.kept, self.numbers, numbers + 0.0)  # no -0
+        with np.errstate(all="ignore"):
+            found = replace(self, grid=grid, numbers=numbers, values=self.meant(numbers))
+        return found if self.kept.any() <= _keeps(self.grid, grid) else None
+
+    def size(self) -> int:
+        """The bytes that it takes alone."""
+        return channel_bytes(self.grid.ordinals(self.numbers)[0], self.grid)
+
+
+def _keeps(old: Grid, new: Grid) -> bool:
+    """True where any number of one grid can stand among those of another."""
+    return old == new or (old.is_text and new.is_text) or new.kind == GridKind.BINARY32
+
+
+def _coarser(
+    motion: Motion, signal: Signal, greatest: Floats, mean: Floats
+) -> tuple[Motion, Signal]:
+    """The signal within these bounds of each channel, and the motion with a source of it."""
+    given = list(_columns(signal))
+    of_c3d = recording_of(motion.source) is not None
+    rescales = of_c3d and signal.role == "analog" and _states_scales(motion.source, given)
+    found = [
+        _within(column, most, average, SourceRules(motion.source is not None, of_c3d, rescales))
+        for column, most, average in zip(given, greatest.tolist(), mean.tolist(), strict=True)
+    ]
+    scales = {c: new.scale for c, new in enumerate(found) if new.scale != given[c].scale}
+    if scales:
+        assert motion.source is not None
+        motion = replace(motion, source=with_analog_scales(motion.source, scales))
+        signal = replace(signal, scaling=recording_of(motion.source).scaling, stored=signal.stored)
+    changed = [c for c, new in enumerate(found) if new is not given[c]]
+    if not changed:
+        return motion, signal
+    grids = tuple(column.grid for column in found)
+    numbers = signal.stored.copy()
+    if any(grid.kind != GridKind.INTEGER for grid in grids):
+        numbers = numbers.astype(np.float64)
+    ordinals = None if signal.ordinals is None else signal.ordinals.copy()
+    for c in changed:
+        numbers[:, c] = found[c].numbers
+        if ordinals is not None:  # those that are known of NaNs
+            same = given[c].kept & (grids[c] == given[c].grid)
+            ordinals[:, c] = np.where(same, ordinals[:, c], 0)
+    signal = replace(
+        signal,
+        values=numbers if signal.scaling is None else signal.scaling.values(numbers),
+        stored=numbers,
+        grids=grids,
+        grid_changes=tuple(change for change in signal.grid_changes if change[1] not in changed),
+        ordinals=ordinals,
+    )
+    return motion, signal
+
+
+def _states_scales(source: Source | None, columns: Sequence[Column]) -> bool:
+    """True where the source says of each channel of a converter what its words mean."""
+    scales = {c: column.scale for c, column in enumerate(columns)}
+    return source is not None and with_analog_scales(source, scales) is not None
+
+
+def _columns(signal: Signal) -> Iterator[Column]:
+    kept = ~np.isfinite(signal.values)
+    kept[signal.exceptions.rows, signal.exceptions.channels] = True
+    valid = np.ones(kept.shape, np.bool_) if signal.mask is None else signal.mask
+    scaling = signal.scaling
+    for c, grid in enumerate(signal.grids):
+        column = Column(
+            signal.values[:, c].astype(np.float64),
+            signal.stored[:, c].astype(np.float64),
+            grid,
+            kept[:, c],
+            valid[:, c] & ~kept[:, c],
+        )
+        if scaling is not None:
+            own = float(scaling.offsets[c]), float(scaling.scales[c]), float(scaling.general)
+            column = replace(column, offset=own[0], scale=own[1], general=own[2])
+        yield column
+
+
+@dataclass(frozen=True, slots=True)
+class SourceRules:
+    """Restrictions that a source puts on grids."""
+
+    has_source: bool
+    of_c3d: bool
+    rescales: bool
+
+
+def _within(column: Column, greatest: float, mean: float, rules: SourceRules) -> Column:
+    """The column on the coarsest numbers within the bounds, or as it is where none is smaller."""
+    unit = abs(column.scale * column.general)
+    most = 2 * greatest
+    step, best, least = min(most, 4 * mean), column, 0.0
+    for _ in range(TRIALS):
+        if not 0 < step < math.inf or not 0 < unit < math.inf or column.kept.all():
+            break
+        found = _rounded(column, step, unit, rules)
+        reached = math.inf if found is None else _mean_error(column, found, greatest)
+        if found is not None and reached < math.inf and reached <= mean * (1 - 1e-9):
+            if reached >= least:
+                best, least = found, reached
+            if step >= most or reached >= NEAR * mean:
+                break
+            step = min(most, step * min(2.0, 0.99 * mean / max(reached, mean / 2)))
+        else:
+            step *= min(0.9, 0.99 * mean / reached) if reached < math.inf else 0.9
+    return best if best is not column and best.size() < column.size() else column
+
+
+def _mean_error(column: Column, found: Column, greatest: float) -> float:
+    """The mean error of ``found``; infinite where one is beyond ``greatest``."""
+    if not is_within(column.values, found.values, greatest)[~column.kept].all():
+        return math.inf
+    errors = np.abs(column.values[column.valid] - found.values[column.valid])
+    return float(errors.mean()) if len(errors) else 0.0
+
+
+def is_within(given: Floats, found: Floats, bound: float) -> Bools:
+    """True where |given - found| <= bound, without any rounding."""
+    if bound == math.inf:
+        return np.isfinite(found)
+    with np.errstate(all="ignore"):
+        error = given - found
+        back = error - given
+        rest = (given - (error - back)) - (found + back)  # of the subtraction
+        at_bound = (np.abs(error) == bound) & (rest * np.sign(error) <= 0)
+        return np.asarray((np.abs(error) < bound) | at_bound)
+
+
+def _rounded(column: Column, step: float, unit: float, rules: SourceRules) -> Column | None:
+    """The column on numbers ``step`` apart, in its unit; None where there are none such."""
+    kind, numbers, own = column.grid.kind, column.numbers, step / unit
+    with np.errstate(all="ignore"):
+        if kind in FLOATS:
+            return _on_floats(column, column.grid, own)
+        if column.grid.is_text and (rules.has_source or column.kept.any()):
+            digits = min(max(math.ceil(-math.log10(own) - 1e-9), 0), 22)
+            grid = Grid(GridKind.FIXED, digits)
+            return column.on(grid, grid.values(grid.ordinals(numbers)[0]))
+        if kind == GridKind.INTEGER:
+            own = 2 * math.floor(own / 2) + 1.0
+        if rules.of_c3d:
+            return _rescaled(column, own) if rules.rescales and kind == GridKind.INTEGER else None
+        own *= 1 - 2.0**-40 if kind != GridKind.INTEGER else 1  # for the rounding of products
+        if column.kept.any() and kind != GridKind.INTEGER:
+            return _on_floats(column, Grid(GridKind.BINARY32), own)
+        if not MIN_SCALE <= own <= MAX_SCALE:
+            return None
+        grid = Grid(GridKind.SCALED, scale=own)
+        return column.on(grid, grid.values(grid.ordinals(numbers)[0]))
+
+
+def _on_floats(column: Column, grid: Grid, step: float) -> Column | None:
+    """The floats nearest to multiples of a unit, which ``fast`` finds."""
+    exponent = math.frexp(step)[1] - SHORT_BITS
+    unit = math.ldexp(math.floor(math.ldexp(step, -exponent)), exponent)
+    numbers = np.where(column.kept, 0.0, column.numbers)
+    if not 2.0**-140 <= unit <= 2.0**79 or np.abs(numbers).max(initial=0) > MOST_MULTIPLES * unit:
+        return None
+    return column.on(grid, grid.values(grid.ordinals(np.rint(numbers / unit) * unit)[0]))
+
+
+def _rescaled(column: Column, step: float) -> Column | None:
+    """Words of a converter that is coarser by ``step``, which the source then states."""
+    scale = float(np.float32(column.scale * step))
+    if step < 2 or not math.isfinite(scale):
+        return None
+    words = np.rint((column.numbers - column.offset) * (column.scale / scale)) + column.offset
+    found = replace(column, scale=scale)
+    return replace(found, numbers=words, values=found.meant(words))

@@ -1,0 +1,242 @@
+"""A signal in memory, as a codec reads it, and what is said of it beside the codec's streams.
+
+One block of frames is worked on at a time, so that encoding needs memory for a segment beside the
+values themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec, Layout
+from mcz.container import note_records, payloads
+from mcz.container.masks import build_mask
+from mcz.errors import MotionError
+from mcz.files.reading.signal_info import parse_groups
+from mcz.model.motion import Exceptions, Motion, Signal
+from mcz.model.numbers import Grid, GridKind, values_of_texts
+from mcz.model.schema import build
+from mcz.model.types import Params
+from mcz.sources import recording_of
+
+KEPT_BLOCKS = 8
+MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
+Block = tuple[NDArray[np.int64], Signal]
+
+
+class MemorySource:
+    """The SignalSource of one signal of a motion.
+
+    Values that lie on no point of their text grid join the exceptions, so that nothing is lost.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        index: int,
+        codec: Codec,
+        segment_bytes: int,
+        options: Params = MappingProxyType({}),
+    ) -> None:
+        """``options``: all of the codec's, where it has groups of ordinals beside values."""
+        signal = motion.signals[index]
+        found = codec.partition(motion.skeleton, options) if codec.partition and options else None
+        self.is_listed = found is not None
+        kinds = payloads.Groups(kind=group_kind(signal, codec.grouping))
+        usual = parse_groups(kinds, motion.skeleton, signal.n_channels, signal.name)
+        groups, exact = found or (usual, ())
+        self.is_lossless = codec.lossless
+        self.exact = [channel for group in exact for channel in groups[group]]
+        # What a lossy codec returns is no longer the number that an exception spells.
+        self.signal = signal if codec.lossless else _with_exceptions_of(signal, self.exact)
+        self.layout = Layout(
+            n_frames=motion.n_frames,
+            groups=groups,
+            samples_per_frame=signal.samples_per_frame,
+            skeleton=motion.skeleton,
+            frame_rate=motion.frame_rate,
+            grids=signal.grids,
+            segment_bytes=segment_bytes,
+        )
+        frames = {row // signal.samples_per_frame for row, _, _ in signal.grid_changes}
+        self.breaks: Sequence[int] = sorted(frames - {0})
+        self._settled: dict[tuple[int, int], Block] = {}  # the last blocks
+
+    def grids(self, frame: int) -> tuple[Grid, ...]:
+        signal = self.signal
+        return signal.cut(frame, frame).grids if signal.grid_changes else signal.grids
+
+    def values(self, start: int, stop: int) -> NDArray[np.float64]:
+        return self.signal.cut(start, stop).values.astype(np.float64, copy=False)
+
+    def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
+        return self.signal.cut(start, stop).mask
+
+    def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
+        return self._block(start, stop)[0]
+
+    def _block(self, start: int, stop: int) -> Block:
+        """Ordinals of a block, exceptions repeating the row before, and its signal with strays.
+
+        Of a lossy codec those of its exact channels; others have no strays.
+        """
+        if (start, stop) not in self._settled:
+            signal = self.signal.cut(start, stop)
+            ordinals, settled = settle(signal if self.is_lossless else _freed(signal, self.exact))
+            if settled.exceptions is not signal.exceptions:
+                signal = replace(signal, exceptions=settled.exceptions)
+            self._settled[start, stop] = ordinals, signal
+            while len(self._settled) > KEPT_BLOCKS:
+                self._settled.pop(next(iter(self._settled)))
+        return self._settled[start, stop]
+
+    def group_notes(self, start: int, stop: int) -> list[bytes]:
+        """The group notes of frames start <= f < stop, b"" for a group that needs none."""
+        signal = self.signal.cut(start, stop)
+        if self.is_lossless or self.exact:
+            signal = self._block(start, stop)[1]
+        changed = [c for c, grid in enumerate(signal.grids) if grid != self.layout.grids[c]]
+        if not changed and not len(signal.exceptions):
+            return []
+        notes = [note_records.GroupNotes() for _ in self.layout.groups]
+        groups = enumerate(self.layout.groups)
+        where = {c: (g, column) for g, group in groups for column, c in enumerate(group)}
+        for channel in changed:
+            group, column = where[channel]
+            change = note_records.GridChange(channel=column, grid=signal.grids[channel])
+            notes[group].grid_changes.append(change)
+        before = [0] * len(notes)
+        found = signal.exceptions
+        for number, channel, text in zip(found.rows, found.channels, found.texts, strict=True):
+            group, column = where[int(channel)]
+            row = int(number) - before[group]
+            odd = note_records.OddToken(row=row, channel=column, text=text)
+            notes[group].exceptions.append(odd)
+            before[group] = int(number)
+        return [build(n, "group notes") if n.grid_changes or n.exceptions else b"" for n in notes]
+
+    def masks(self, start: int, stop: int) -> list[bytes]:
+        """The mask of each group, b"" where all is valid."""
+        mask = self.signal.cut(start, stop).mask
+        if mask is None:
+            return []
+        blocks = (mask[:, list(group)] for group in self.layout.groups)
+        return [b"" if block.all() else build_mask(block) for block in blocks]
+
+
+def _with_exceptions_of(signal: Signal, channels: Sequence[int]) -> Signal:
+    old = signal.exceptions
+    kept = np.flatnonzero(np.isin(old.channels, channels))
+    texts = tuple(old.texts[i] for i in kept)
+    return replace(signal, exceptions=Exceptions(old.rows[kept], old.channels[kept], texts))
+
+
+def _freed(signal: Signal, channels: Sequence[int]) -> Signal:
+    """``signal`` with the grids of these channels alone: others may have any value."""
+    free = Grid(GridKind.BINARY64)
+    return replace(
+        signal,
+        grids=tuple(grid if c in channels else free for c, grid in enumerate(signal.grids)),
+        grid_changes=tuple(change for change in signal.grid_changes if change[1] in channels),
+    )
+
+
+def as_stored(motion: Motion) -> Motion:
+    """``motion`` with the numbers that a file holds, of which its source says what they mean.
+
+    Without a source that says so, the values are stored as they are, in their units. Raises
+    MotionError where the source says something else than a signal.
+    """
+    if all(signal.scaling is None for signal in motion.signals):
+        return motion
+    told = recording_of(motion.source)
+    if told is None:
+        return replace(motion, signals=tuple(map(_in_units, motion.signals)))
+    for signal in motion.signals:
+        if signal.scaling is not None and not signal.scaling.says(told.scaling):
+            raise MotionError(
+                f"signal {signal.name!r}: its source has another scaling; leave out one of the two"
+            )
+    return replace(motion, signals=tuple(signal.as_stored() for signal in motion.signals))
+
+
+def _in_units(signal: Signal) -> Signal:
+    """The signal with its values as what is stored, binary64."""
+    if signal.scaling is None:
+        return signal
+    return Signal(
+        signal.values,
+        name=signal.name,
+        samples_per_frame=signal.samples_per_frame,
+        mask=signal.mask,
+        channels=signal.channels,
+        role=signal.role,
+        of=signal.of,
+    )
+
+
+def settle(signal: Signal) -> Block:
+    """The ordinals of a signal, and the signal with every value off its grid as an exception."""
+    if signal.values.dtype == np.int64:
+        inside = (signal.values >= -MAX_INTEGER) & (signal.values <= MAX_INTEGER)
+        if not inside.all():
+            raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
+        return signal.values.astype(np.int64, copy=False), signal
+    if len(signal.exceptions):
+        signal = replace(signal, exceptions=_holding(signal))
+    ordinals, exact = signal.to_ordinals()
+    exact[signal.exceptions.rows, signal.exceptions.channels] = True
+    if not exact.all():
+        signal = replace(signal, exceptions=_with_strays(signal, ~exact))
+    exceptions = signal.exceptions
+    for row, channel in zip(exceptions.rows, exceptions.channels, strict=True):
+        ordinals[row, channel] = ordinals[row - 1, channel] if row else 0
+    return ordinals, signal
+
+
+def _holding(signal: Signal) -> Exceptions:
+    """The exceptions that still spell the value at their row and channel."""
+    old = signal.exceptions
+    meant, bad = values_of_texts(old.texts)
+    held = signal.values[old.rows, old.channels]
+    same = (meant.view(np.int64) == held.view(np.int64)) | (np.isnan(meant) & np.isnan(held))
+    keep = np.flatnonzero(same & ~bad)
+    texts = tuple(old.texts[i] for i in keep)
+    return Exceptions(old.rows[keep], old.channels[keep], texts)
+
+
+def _with_strays(signal: Signal, stray: NDArray[np.bool_]) -> Exceptions:
+    """The exceptions and every value in ``stray``, written as its shortest decimal."""
+    rows, channels = (cells.tolist() for cells in np.nonzero(stray))
+    for row, channel in zip(rows, channels, strict=True):
+        if not signal.grids[channel].is_text:
+            raise MotionError(
+                f"signal {signal.name!r}: row {row} of a segment, channel {channel} is "
+                f"{float(signal.values[row, channel])!r}, which its grid "
+                f"{signal.grids[channel].kind.name} does not hold"
+            )
+    old = signal.exceptions
+    texts = [repr(float(v)).encode() for v in signal.values[rows, channels]]
+    merged = sorted(
+        [
+            *zip(old.rows.tolist(), old.channels.tolist(), old.texts, strict=True),
+            *zip(rows, channels, texts, strict=True),
+        ]
+    )
+    return Exceptions(
+        np.array([m[0] for m in merged], np.int64),
+        np.array([m[1] for m in merged], np.int64),
+        tuple(m[2] for m in merged),
+    )
+
+
+def group_kind(signal: Signal, grouping: str) -> int:
+    """The ``kind`` of GROUPS for a codec's grouping; channels of its own have no joints."""
+    if grouping == "joint" and signal.channels is None:
+        return payloads.GROUP_JOINT
+    return payloads.GROUP_ALL if grouping == "all" else payloads.GROUP_CHANNEL

@@ -1,0 +1,281 @@
+"""Trials of parameters: the clip is written to memory, and measured as a reader has it.
+
+Nothing is trusted that the public reader did not give. ``bounded`` meets a greatest error by finer
+steps where it is missed, ``weighted`` the mean errors of joints by what each of them weighs.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec
+from mcz.codecs.parameters import Dial
+from mcz.container.limits import Profile
+from mcz.container.reader import Container
+from mcz.container.source import open_source
+from mcz.errors import ContactWarning, MotionError, OptionError
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.sizes import clip_sizes
+from mcz.files.writing.channel_limits import MEAN_ERROR
+from mcz.files.writing.clip_writer import file_in_memory
+from mcz.files.writing.planning import Prepared
+from mcz.kinematics import positions_of
+from mcz.kinematics.joint_groups import find_joints
+from mcz.kinematics.metrics import Comparison, compare
+from mcz.kinematics.metrics.sums import channel_errors
+from mcz.model.motion import Motion
+from mcz.model.types import JsonObject, Params
+
+Floats = NDArray[np.float64]
+
+BLOCK_FRAMES = 4096  # whose positions are in memory at a time
+
+REFINEMENT = "refinement"
+MOST_OCTAVES = 7
+MOST_ROUNDS = 10  # with one step
+MOST_STEPS = 6
+FINER = 0.85  # from one step to the next
+USUAL_STEP = 1.0  # of a bound of channels, whose steps follow from it
+MOST_CALIBRATIONS = 3
+MOST_MEANS, MOST_QUARTERS = 12, 100
+COMMON = 0.9  # of the frames have at most an error, in bounds, that is wanted within a range
+LEAST_COMMON, WANTED_COMMON, MOST_COMMON = 0.55, 0.75, 1.1
+MARGIN = 0.3  # octaves that are added to what a frame misses
+Limits = Sequence[tuple[str, float]]  # a joint or a group of joints, and its limit in cm
+QUALITY, WEIGHTS, LIKE = "quality", "weights", "like"
+MOST_WEIGHINGS = 8
+OVER = 1.15  # by how much more a weight grows than the square of what is missed
+MOST_WEIGHT = 2.0**24
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A target: the figure of that name must not exceed ``limit``.
+
+    ``falls``: the figure falls as the files get smaller (a size), instead of rising (an error).
+    ``weights``, (n_channels,), multiply the errors of channels; None where it is none of those.
+    """
+
+    name: str
+    limit: float
+    falls: bool
+    weights: Floats | None = None
+
+
+class Trials:
+    """The figures of a clip at one setting of the dial, measured on a file in memory."""
+
+    def __init__(self, motion: Motion, codec: Codec, params: Params, profile: Profile) -> None:
+        self.motion, self.codec, self.params, self.profile = motion, codec, params, profile
+        self.alone = replace(motion, signals=motion.signals[:1])
+        self.others = 0.0  # bytes of the further signals, which no dial changes
+        self.kept: JsonObject = {}  # what the first trial has chosen for all
+
+    def given(self, more: Params) -> Trials:
+        """Trials with more parameters, and what was chosen before."""
+        found = Trials(self.motion, self.codec, {**self.params, **more}, self.profile)
+        found.kept = self.kept
+        return found
+
+    def __call__(self, target: Target, setting: float) -> float:
+        """The figure of ``target`` at a setting of the dial."""
+        assert self.codec.dial is not None
+        return self.figure(target, {self.codec.dial.parameter: setting})
+
+    def figure(self, target: Target, found: Params) -> float:
+        """The figure of ``target`` with these parameters."""
+        figure = self._measure(self.alone, target, found)
+        if len(self.motion.signals) > 1 and target.falls:
+            if not self.others:
+                self.others = self._measure(self.motion, target, found) - figure
+            figure += self.others
+        return figure
+
+    def frame_errors(self, target: Target, found: Params) -> Floats:
+        """The greatest error of each frame with these parameters, (n_frames,).
+
+        It is that of positions in cm, unless ``target`` is one of channels.
+        """
+        clip = self._written(self.alone, found)[1]
+        unit, decoded = self.motion.skeleton.unit_cm, clip.motion()
+        if target.weights is not None:
+            errors = self._weighed_errors(target.weights, decoded)
+            known = np.where(np.isfinite(errors), errors, 0.0).reshape(self.motion.n_frames, -1)
+            return np.asarray(known.max(axis=1, initial=0.0))
+        assert unit is not None
+        greatest = np.zeros(self.motion.n_frames)
+        for start in range(0, len(greatest), BLOCK_FRAMES):
+            rows = slice(start, start + BLOCK_FRAMES)
+            ours, theirs = (
+                positions_of(motion.skeleton, np.asarray(motion.values[rows], np.float64))
+                for motion in (self.alone, decoded)
+            )
+            distances = np.sqrt(((ours - theirs) ** 2).sum(axis=2))
+            greatest[rows] = np.nan_to_num(distances).max(axis=1, initial=0.0) * unit
+        return greatest
+
+    def joint_errors(self, found: Params) -> Floats:
+        """The mean position error of each joint in cm with these parameters, (n_joints,).
+
+        0 for one that has no point.
+        """
+        decoded = self._written(self.alone, found)[1].motion()
+        figures = compare(self.alone, decoded, virtual_markers=False, shell_cm=None).by_joint
+        unit = self.motion.skeleton.unit_cm
+        return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
+
+    def _weighed_errors(self, weights: Floats, decoded: Motion) -> Floats:
+        """The errors of channels times ``weights``, NaN where a value does not count."""
+        signal = self.alone.signals[0]
+        given, found = (
+            np.asarray(one.masked(), np.float64) for one in (signal, decoded.signals[0])
+        )
+        with np.errstate(all="ignore"):
+            errors: Floats = channel_errors(self.motion.skeleton, signal, given, found) * weights
+        return errors
+
+    def _written(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ContactWarning)  # that of the clip itself counts
+            params = {**self.params, **self.kept, **found}
+            data = file_in_memory(Prepared(motion), self.codec, params, self.profile)
+        container = Container(open_source(data), max_decoded=2**53)
+        clip = Clip(container, container.directory.clips[motion.name])
+        if self.codec.has(LIKE):
+            self.kept.setdefault(LIKE, clip.signals[0].header)
+        return container, clip
+
+    def _measure(self, motion: Motion, target: Target, found: Params) -> float:
+        container, clip = self._written(motion, found)
+        if target.weights is not None:
+            errors = self._weighed_errors(target.weights, clip.motion())
+            n = np.isfinite(errors).sum(axis=0) if target.name == MEAN_ERROR else 1
+            known = np.where(np.isfinite(errors), errors, 0.0)
+            sums = known.sum(axis=0) / np.maximum(n, 1)
+            return float((sums if target.name == MEAN_ERROR else known).max(initial=0.0))
+        if not target.falls:
+            figures = compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
+            return _error(target, figures)
+        sizes = clip_sizes(container, clip)
+        if target.name == "target_bytes":
+            return float(sizes.payload + sizes.overhead + sizes.models)
+        assert motion.frame_rate is not None
+        return float(sizes.payload * 8 * motion.frame_rate / motion.n_frames / 1000)
+
+
+def _error(target: Target, comparison: Comparison) -> float:
+    name = target.name.replace("_error_cm", "_position_error_cm")
+    value = getattr(comparison, name)
+    if value is None:
+        why = "; ".join(comparison.notes) or "no position is known in any frame"
+        raise OptionError(f"{target.name} has no meaning: {why}")
+    return float(value)
+
+
+def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
+    """A step and the refinement of frames that meet the bound, and what the record says of it.
+
+    Raises OptionError where none that was tried does.
+    """
+    guessed = dial.guess and dial.guess(target.name, target.limit)
+    step = min(max(guessed or _first_step(dial, target, trial), dial.low), dial.high)
+    for _ in range(MOST_STEPS):
+        octaves: NDArray[np.int64] = np.zeros(trial.motion.n_frames, np.int64)
+        for _ in range(MOST_ROUNDS):
+            found = {dial.parameter: step, REFINEMENT: octaves}
+            try:
+                errors = trial.frame_errors(target, found)
+            except MotionError as error:
+                text = f"{target.name} {target.limit:g} cannot be met: {error}"
+                raise OptionError(text) from error
+            if not (errors > target.limit).any():
+                reached = float(errors.max(initial=0.0))
+                return found, {"target_reached": repr(reached)}
+            octaves = _refined(octaves, errors / target.limit)
+        missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
+        step = max(step * FINER, dial.low)
+    raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
+
+
+def _first_step(dial: Dial, target: Target, trial: Trials) -> float:
+    """A step with which most frames keep the bound of their channels, and not by far."""
+    step = USUAL_STEP
+    for _ in range(MOST_CALIBRATIONS):
+        octaves = np.zeros(trial.motion.n_frames, np.int64)
+        errors = trial.frame_errors(target, {dial.parameter: step, REFINEMENT: octaves})
+        usual = float(np.quantile(errors, COMMON)) / target.limit if len(errors) else 0.0
+        if not usual or LEAST_COMMON <= usual <= MOST_COMMON:
+            break
+        step *= min(max(WANTED_COMMON / usual, 0.1), 10.0)
+    return step
+
+
+def averaged(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
+    """The coarsest step that keeps a mean error of channels, whose steps are quarters of octaves.
+
+    Raises OptionError where none that was tried does.
+    """
+    place, met, missed = 0, -MOST_QUARTERS, MOST_QUARTERS
+    reached, figure = math.inf, math.inf
+    for _ in range(MOST_MEANS):
+        try:
+            figure = trial(target, 2.0 ** (place / 4))
+        except MotionError as error:
+            raise OptionError(f"{target.name} {target.limit:g} cannot be met: {error}") from error
+        if figure <= target.limit:
+            met, reached = place, figure
+        else:
+            missed = place
+        if missed - met == 1:
+            break
+        quarters = math.floor(4 * math.log2(target.limit / figure)) if figure else MOST_QUARTERS
+        place = min(max(place + min(max(quarters, -16), 16), met + 1), missed - 1)
+    if reached == math.inf:
+        raise OptionError(f"{target.name} {target.limit:g} cannot be met: {figure:g} was reached")
+    return {dial.parameter: 2.0 ** (met / 4)}, {"target_reached": repr(reached)}
+
+
+def _refined(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
+    """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and beside it."""
+    with np.errstate(divide="ignore"):
+        missing = np.where(ratios > 1, np.ceil(np.log2(ratios) + MARGIN), 0.0).astype(np.int64)
+    padded = np.pad(missing, 1)
+    added = np.maximum(missing, np.maximum(padded[:-2], padded[2:]))
+    return np.minimum(octaves + added, MOST_OCTAVES)
+
+
+def weighted(
+    dial: Dial, trial: Trials, limits: Limits, found: Params
+) -> tuple[JsonObject, dict[str, str]]:
+    """Weights with which the joints keep their ``limits``, with the parameters ``found``.
+
+    Also returns what the quality record says of it. Raises OptionError where they cannot be kept.
+    """
+    skeleton = trial.motion.skeleton
+    groups = [(name, find_joints(skeleton, name, QUALITY), limit) for name, limit in limits]
+    given = found.get(WEIGHTS)
+    weights = np.ones(skeleton.n_joints) if given is None else np.array(given)
+    for _ in range(MOST_WEIGHINGS):
+        errors = trial.joint_errors({**found, WEIGHTS: weights})
+        means = [float(errors[joints].mean()) for _, joints, _ in groups]
+        if all(mean <= limit for mean, (_, _, limit) in zip(means, groups, strict=True)):
+            remarks = {
+                f"quality_reached.{name}": repr(mean)
+                for mean, (name, _, _) in zip(means, groups, strict=True)
+            }
+            return {WEIGHTS: weights}, remarks
+        for mean, (_, joints, limit) in zip(means, groups, strict=True):
+            if mean > limit:
+                factor = (mean / limit) ** 2 * OVER
+                weights[joints] = np.minimum(weights[joints] * factor, MOST_WEIGHT)
+    worst = max(zip(means, groups, strict=True), key=lambda pair: pair[0] / pair[1][2])
+    raise OptionError(
+        f"quality: {worst[1][0]}={worst[1][2]:g}cm cannot be kept with {dial.parameter} "
+        f"{found.get(dial.parameter)}: {worst[0]:g} cm was reached"
+    )

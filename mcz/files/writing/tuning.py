@@ -1,0 +1,317 @@
+"""Sizes and errors as targets: the dial of a codec is turned until they are met, and it is proved.
+
+Every trial is a file in memory that the public reader opens; nothing is trusted that it did not
+measure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from operator import itemgetter
+
+import numpy as np
+
+from mcz.codecs.contract import Codec
+from mcz.codecs.parameters import Dial
+from mcz.container.limits import Profile
+from mcz.container.writer import Writer
+from mcz.errors import MotionError, OptionError
+from mcz.files.writing.channel_limits import MAX_ERROR, MEAN_ERROR, limits_of, parse_bound
+from mcz.files.writing.clip_writer import Amend, write_plan
+from mcz.files.writing.planning import Prepared, asked, check_bones, plan_clip
+from mcz.files.writing.signal_bounds import of_codec, with_bounds
+from mcz.files.writing.trials import (
+    QUALITY,
+    REFINEMENT,
+    Limits,
+    Target,
+    Trials,
+    averaged,
+    bounded,
+    weighted,
+)
+from mcz.hints import Hint
+from mcz.kinematics import positions_of
+from mcz.model.motion import Motion
+from mcz.model.types import JsonObject, Params, Progress
+
+PRESET, LIMITS = "preset", "limits"
+GOAL = 0.985  # of a target: near enough to stop
+PROMISED = 0.97  # of a target: what is less is remarked upon
+MOST_TRIALS = 60
+MOST_TURNS = 4  # of weights and a target, each found for the other
+CLOSE = 1.00002  # between a setting that meets the target and one that does not
+GUESSED = 1.25  # from a setting that was guessed to the next
+SAME = 3  # figures in a row that do not differ: the next setting is the last of the range
+NEAR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried beside the one that was found
+
+Found = tuple[JsonObject, dict[str, str]]  # parameters, and what the quality record says
+Point = tuple[float, float]  # a setting and its figure
+
+
+def write_motion(
+    writer: Writer,
+    prepared: Prepared,
+    codec: Codec,
+    params: Params,
+    progress: Progress | None = None,
+    *,
+    amend: Amend | None = None,
+) -> dict[str, str] | None:
+    """Write a clip, a size or an error among ``params`` met first.
+
+    Returns what the quality record says, ``amend`` has the last word on it; None where there is
+    none. Raises OptionError where a target cannot be met or has no meaning for this clip.
+    """
+    motion, bounded_signals = with_bounds(prepared.motion, codec, params)
+    found, remarks = tuned(motion, codec, of_codec(params), writer.profile)
+    plan = plan_clip(replace(prepared, motion=motion), codec, found, writer.profile)
+    remarks |= bounded_signals
+    return write_plan(writer, plan, progress, remarks=remarks, amend=amend)
+
+
+def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Found:
+    """``params`` with a setting of the dial that meets the targets among them, on trial files."""
+    options = codec.options(params)
+    targets = asked(options)
+    _check_preset(codec, params, options, targets)
+    promise = codec.promise if motion.signals[0].n_channels else None
+    if not targets and promise and codec.dial and options[codec.dial.parameter] is None:
+        targets = promise(options)
+        if motion.skeleton.unit_cm is None:
+            raise OptionError(
+                f"{codec.name}: a preset promises an error in cm, and the length unit is unknown, "
+                f"without which {codec.dial.parameter} is to be given",
+                hint=Hint.UNIT,
+            )
+        check_bones(motion.skeleton, f"{codec.name}: a preset that promises an error in cm")
+    limits = options.get(QUALITY)
+    if codec.dial is None or not (targets or limits):
+        return {**params}, {}
+    target = _target(motion, codec.dial, options, targets) if targets else None
+    trial = Trials(motion, codec, params, profile)
+    if target and target.weights is not None and codec.has(LIMITS):
+        trial = trial.given({LIMITS: target.limit / target.weights})
+    if limits:
+        found, remarks = _with_quality(codec, target, trial, limits)
+    else:
+        found, remarks = _meet(codec, target, trial)
+    return {**trial.params, **trial.kept, **found}, remarks
+
+
+def _check_preset(codec: Codec, params: Params, options: Params, targets: Params) -> None:
+    """A preset that promises an error stands beside nothing that says another."""
+    if not (codec.promise and codec.dial) or params.get(PRESET) is None:
+        return
+    others = [*targets, *([codec.dial.parameter] if options[codec.dial.parameter] else [])]
+    if others:
+        raise OptionError(f"{PRESET} and {others[0]} are given, only one can be")
+
+
+def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Limits) -> Found:
+    """Weights of joints beside what meets a target.
+
+    Not with a coarser step for all joints, which the weights would allow: that took more bytes.
+    """
+    assert codec.dial is not None
+    _check_unit(trial.motion, QUALITY)
+    weights: JsonObject = {}
+    for _ in range(MOST_TURNS):
+        found, remarks = _meet(codec, target, trial.given(weights))
+        weights, kept = weighted(codec.dial, trial, limits, {**found, **weights})
+        both = {**found, **weights}
+        if target is None or trial.figure(target, both) <= target.limit:
+            return both, {**remarks, **kept}
+    name = "" if target is None else f"{target.name} {target.limit:g}"
+    raise OptionError(f"{QUALITY} and {name} cannot both be kept")
+
+
+def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
+    assert codec.dial is not None
+    if target is None:
+        return {}, {}
+    if target.name.startswith("max_error") and codec.has(REFINEMENT):
+        if target.weights is None:
+            _check_places(trial.motion, codec.dial, target)
+        return bounded(codec.dial, target, trial)
+    if target.weights is not None and codec.has(LIMITS):
+        return averaged(codec.dial, target, trial)
+    return _searched(codec.dial, target, trial)
+
+
+def _check_unit(motion: Motion, name: str) -> None:
+    if motion.skeleton.unit_cm is None:
+        raise OptionError(f"{name} has no meaning: the length unit is unknown", hint=Hint.UNIT)
+    check_bones(motion.skeleton, name)
+
+
+def _check_places(motion: Motion, dial: Dial, target: Target) -> None:
+    skeleton = motion.skeleton
+    try:
+        positions_of(skeleton, np.zeros((0, skeleton.n_channels)))
+    except MotionError as error:
+        raise OptionError(
+            f"{target.name} {target.limit:g} has no meaning: {error}; give {dial.parameter}"
+        ) from error
+
+
+def _searched(dial: Dial, target: Target, trial: Trials) -> Found:
+    setting, reached, ended = search(dial, target, trial)
+    remarks = {"target_reached": repr(reached)}
+    if reached < PROMISED * target.limit:
+        why = f"no {dial.parameter} that was tried is nearer"
+        why = f"the range of {dial.parameter} ends there" if ended else why
+        remarks["target_remark"] = f"{target.name} {target.limit:g}: {reached:g} was reached; {why}"
+    return {dial.parameter: int(setting) if dial.whole else setting}, remarks
+
+
+def _target(motion: Motion, dial: Dial, options: Params, targets: Params) -> Target:
+    if len(targets) > 1:
+        raise OptionError(f"{' and '.join(targets)} are asked for, only one can be")
+    ((name, limit),) = targets.items()
+    if options[dial.parameter] is not None:
+        raise OptionError(f"{name} is asked for and {dial.parameter} is given, only one can be")
+    if name == "kbps" and not (motion.frame_rate and motion.n_frames):
+        raise OptionError(
+            "kbps has no meaning: the frame rate is unknown or there are no frames", hint=Hint.RATE
+        )
+    if name in (MAX_ERROR, MEAN_ERROR):
+        return _channel_target(motion, name, str(limit))
+    if name.endswith("_cm"):
+        _check_unit(motion, name)
+    return Target(name, float(limit), falls=not name.endswith("_cm"))
+
+
+def _channel_target(motion: Motion, name: str, text: str) -> Target:
+    """A target of channels, in the unit of the first of its bounds."""
+    signal = motion.signals[0]
+    channels = motion.skeleton.channels if signal.channels is None else signal.channels
+    limits = limits_of(motion.skeleton, channels, name, text)
+    limit = parse_bound(name, text.split(",")[0])[0]
+    if not limit > 0 or not (limits > 0).all():
+        raise OptionError(f"{name} is {text!r}, which no lossy channel keeps")
+    return Target(name, limit, falls=False, weights=limit / limits)
+
+
+def search(
+    dial: Dial, target: Target, measure: Callable[[Target, float], float]
+) -> tuple[float, float, bool]:
+    """The setting that comes nearest to the target, of those tried, without exceeding it.
+
+    Returns the setting, its figure, and whether the range of the dial ended before the target.
+    Raises OptionError where no setting meets it. A figure may jump, up and down: a greatest error
+    does.
+    """
+    tried: list[Point] = []
+
+    def measured(target: Target, setting: float) -> float:
+        tried.append((setting, measure(target, setting)))
+        return tried[-1][1]
+
+    meets, misses, ended = _bracket(dial, target, measured)
+    if ended:
+        return *meets, True
+    for _ in range(MOST_TRIALS):
+        if meets[1] >= GOAL * target.limit or _neighboring(dial, meets[0], misses[0]):
+            break
+        setting = _between(meets, misses, target.limit)
+        if dial.whole:  # strictly between the two
+            low, high = sorted((meets[0], misses[0]))
+            setting = min(max(round(setting), low + 1), high - 1)
+        found = setting, _figure(dial, measured, target, setting)
+        if found[1] <= target.limit:
+            meets = found
+        else:
+            misses = found
+    met = (point for point in reversed(tried) if point[1] <= target.limit)
+    best = max(met, key=itemgetter(1))
+    if best[1] < PROMISED * target.limit:
+        best = _beside(best, dial, target, measure)
+    return *best, False
+
+
+def _beside(
+    best: Point, dial: Dial, target: Target, measure: Callable[[Target, float], float]
+) -> Point:
+    """A setting beside ``best`` that keeps the promise, or else the best of all."""
+    middle = best[0]
+    for power in range(1, NEIGHBORS + 1):
+        beside = (middle * NEAR**power, middle / NEAR**power)
+        if dial.whole:
+            beside = (middle + power, middle - power)
+        for setting in beside:
+            if dial.low <= setting <= dial.high:
+                found = setting, _figure(dial, measure, target, setting)
+                if found[1] <= target.limit:
+                    best = max(best, found, key=itemgetter(1))
+        if best[1] >= PROMISED * target.limit:
+            break
+    return best
+
+
+def _bracket(
+    dial: Dial, target: Target, measure: Callable[[Target, float], float]
+) -> tuple[Point, Point, bool]:
+    guessed = dial.guess and dial.guess(target.name, target.limit)
+    setting = _fitting(dial, guessed or 1.0)
+    found = setting, _figure(dial, measure, target, setting)
+    first_meets = found[1] <= target.limit
+    falls = target.falls != dial.rises  # as the dial goes up
+    upwards = first_meets != falls  # where the other side of the target lies
+    factor, same = GUESSED if guessed else 2.0, 1
+    while True:
+        end = dial.high if upwards else dial.low
+        if setting == end:
+            if first_meets:
+                return found, found, True
+            raise OptionError(
+                f"{target.name} {target.limit:g} cannot be met: {dial.parameter} {setting:g} "
+                f"gives {found[1]:g}"
+            )
+        moved = setting * factor if upwards else setting / factor
+        setting = end if same == SAME else _fitting(dial, moved)
+        factor = min(factor * 2, 2.0**8)
+        other = setting, _figure(dial, measure, target, setting)
+        if (other[1] <= target.limit) != first_meets:
+            return (found, other, False) if first_meets else (other, found, False)
+        same = same + 1 if other[1] == found[1] else 1
+        found = other
+
+
+def _figure(
+    dial: Dial, measure: Callable[[Target, float], float], target: Target, setting: float
+) -> float:
+    """The figure of a setting; one that the codec refuses as too fine has no bound on its size."""
+    try:
+        return measure(target, int(setting) if dial.whole else setting)
+    except MotionError as error:
+        if setting > 1 if dial.rises else setting < 1:
+            if target.falls:
+                return math.inf
+            raise OptionError(f"{target.name} {target.limit:g} cannot be met: {error}") from error
+        raise
+
+
+def _fitting(dial: Dial, setting: float) -> float:
+    return min(max(round(setting) if dial.whole else setting, dial.low), dial.high)
+
+
+def _neighboring(dial: Dial, a: float, b: float) -> bool:
+    """Return True if no setting between two would be more precise."""
+    return _ratio(a, b) < CLOSE or (dial.whole and abs(a - b) <= 1)
+
+
+def _ratio(a: float, b: float) -> float:
+    return max(a, b) / min(a, b)
+
+
+def _between(meets: Point, misses: Point, limit: float) -> float:
+    """A setting between two, where a straight line in logarithms meets the target, or halfway."""
+    low, high = math.log(meets[0]), math.log(misses[0])
+    share = 0.5
+    if 0 < meets[1] < misses[1] < math.inf:
+        wanted = math.log(0.5 * (1 + GOAL) * limit)
+        share = (wanted - math.log(meets[1])) / (math.log(misses[1]) - math.log(meets[1]))
+    return math.exp(low + min(max(share, 0.05), 0.95) * (high - low))

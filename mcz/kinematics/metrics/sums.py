@@ -1,0 +1,223 @@
+"""Sums over frames from which figures are made, block after block of frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.kinematics.angles import without_turns
+from mcz.model.motion import Channel, Signal, Skeleton
+from mcz.model.whole_turns import without_whole_turns
+
+Values = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Number = float | None
+
+
+def mean_of(total: float, n: int) -> Number:
+    """``total / n``; None without values, or where it is beyond binary64."""
+    return total / n if n and math.isfinite(total) else None
+
+
+def times(value: Number, factor: Number) -> Number:
+    if value is None or factor is None:
+        return None
+    return mean_of(value * factor, 1)
+
+
+def channel_errors(skeleton: Skeleton, signal: Signal, left: Values, right: Values) -> Values:
+    """Absolute differences of the channels of ``signal``, less whole turns."""
+    return np.abs(_less_turns(left - right, left, right, skeleton, signal.channels))
+
+
+def _less_turns(
+    difference: Values,
+    left: Values,
+    right: Values,
+    skeleton: Skeleton,
+    channels: tuple[Channel, ...] | None,
+) -> Values:
+    """``difference`` of two sides without whole turns; ``channels``: a signal's own, or None."""
+    wrapped = without_turns(difference, skeleton, channels)
+    if channels is None:
+        wrapped = -without_whole_turns(left, right, -wrapped, skeleton)
+    return wrapped
+
+
+class ChannelErrors:
+    """Squared differences of two signals with the same channels."""
+
+    def __init__(self, skeleton: Skeleton, signal: Signal) -> None:
+        self._skeleton, self._channels = skeleton, signal.channels
+        self._n = self.mismatched = 0
+        self._squares, self._raw, self._sum = 0.0, 0.0, 0.0
+        self._greatest = -1.0
+
+    def add(self, left: Values, right: Values) -> None:
+        valid = np.isfinite(left) & np.isfinite(right)
+        raw = np.where(valid, left - right, 0.0)
+        difference = _less_turns(raw, left, right, self._skeleton, self._channels)
+        self._n += int(valid.sum())
+        self.mismatched += int((np.isfinite(left) ^ np.isfinite(right)).sum())
+        self._squares += float(np.sum(difference**2))
+        self._raw += float(np.sum(raw**2))
+        self._sum += float(np.sum(np.abs(difference)))
+        self._greatest = max(self._greatest, float(np.abs(difference).max(initial=0.0)))
+
+    @property
+    def mse(self) -> Number:
+        return mean_of(self._squares, self._n)
+
+    @property
+    def mse_raw(self) -> Number:
+        return mean_of(self._raw, self._n)
+
+    @property
+    def mean(self) -> Number:
+        """The mean of the absolute differences."""
+        return mean_of(self._sum, self._n)
+
+    @property
+    def greatest(self) -> Number:
+        return mean_of(self._greatest, 1) if self._n else None
+
+
+class Distances:
+    """Mean and greatest of distances that have ``n`` columns, of each column and of all."""
+
+    def __init__(self, n: int) -> None:
+        self.counts = np.zeros(n, np.int64)
+        self.totals = np.zeros(n)
+        self.greatest_by_column = np.full(n, -1.0)
+        self.rows = np.zeros(n, np.int64)  # of the greatest, the first of equals
+
+    def add(self, start: int, distances: Values, valid: Flags) -> None:
+        """Distances of shape (n_rows, n) from row ``start`` on, 0 where they are not ``valid``."""
+        if not len(distances):
+            return
+        self.counts += valid.sum(axis=0)
+        self.totals += distances.sum(axis=0)
+        known = np.where(valid, distances, -1.0)
+        at = known.argmax(axis=0)
+        greatest = known[at, np.arange(known.shape[1])]
+        more = greatest > self.greatest_by_column
+        self.greatest_by_column[more] = greatest[more]
+        self.rows[more] = start + at[more]
+
+    @property
+    def mean(self) -> Number:
+        return mean_of(float(self.totals.sum()), int(self.counts.sum()))
+
+    @property
+    def greatest(self) -> Number:
+        most = float(self.greatest_by_column.max(initial=-1.0))
+        return None if most < 0 else mean_of(most, 1)
+
+    @property
+    def where(self) -> tuple[int, int] | None:
+        """Row and column of the greatest distance, of equals the first row, then column."""
+        if not self.counts.any():
+            return None
+        worst = self.greatest_by_column == self.greatest_by_column.max()
+        column = int(np.argmin(np.where(worst, self.rows, np.iinfo(np.int64).max)))
+        return int(self.rows[column]), column
+
+    def by_group(self, sizes: Sequence[int]) -> Iterator[tuple[Number, Number, int | None]]:
+        """Mean, greatest and the row of the greatest of groups of columns, in order."""
+        counts, totals = self.counts.tolist(), self.totals.tolist()
+        places = list(zip(self.greatest_by_column.tolist(), (-self.rows).tolist(), strict=True))
+        first = 0
+        for size in sizes:
+            own = slice(first, first + size)
+            n = sum(counts[own])
+            most, row = max(places[own], default=(-1.0, 0))
+            yield mean_of(sum(totals[own]), n), mean_of(most, min(1, n)), -row if n else None
+            first += size
+
+
+class PointErrors(Distances):
+    """Distances of two sets of ``n`` points, in length units of the original."""
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+        self.mismatched = 0
+        self._squares, self._power = 0.0, 0.0
+
+    def add_points(self, start: int, left: Values, right: Values) -> None:
+        """Points of shape (n_rows, n, 3) from row ``start`` on, NaN where unknown."""
+        left_known, right_known = known_points(left), known_points(right)
+        valid = left_known & right_known
+        self.mismatched += int((left_known ^ right_known).sum())
+        squares = np.where(valid, squared_norms(left - right), 0.0)
+        self._squares += float(squares.sum())
+        self._power += float(np.where(valid, squared_norms(left), 0.0).sum())
+        self.add(start, np.sqrt(squares), valid)
+
+    @property
+    def rms(self) -> Number:
+        mean = mean_of(self._squares, 3 * int(self.counts.sum()))
+        return None if mean is None else math.sqrt(mean)
+
+    @property
+    def sqnr_db(self) -> Number:
+        n = int(self.counts.sum())
+        noise, power = mean_of(self._squares, n), mean_of(self._power, n)
+        if not noise or not power:
+            return None
+        return 10 * (math.log10(power) - math.log10(noise))
+
+
+class ShellErrors(Distances):
+    """Greatest distance of each joint's three shell points, in length units."""
+
+    def add_shell(self, start: int, left: Values, right: Values) -> None:
+        """Points of shape (n_rows, 3 n, 3), three a joint, from row ``start`` on."""
+        valid = known_points(left) & known_points(right)
+        whole = valid[:, 0::3] & valid[:, 1::3] & valid[:, 2::3]
+        squares = squared_norms(left - right)
+        worst = np.maximum(np.maximum(squares[:, 0::3], squares[:, 1::3]), squares[:, 2::3])
+        self.add(start, np.sqrt(np.where(whole, worst, 0.0)), whole)
+
+
+class ChangeErrors:
+    """Differences of velocities and accelerations of ``n`` points, in lengths a row, a row squared.
+
+    Blocks of rows follow one another: the last two rows of one are kept for the next.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.velocity, self.acceleration = Distances(n), Distances(n)
+        self._off, self._valid = np.zeros((0, n, 3)), np.zeros((0, n), np.bool_)
+
+    def add_points(self, start: int, left: Values, right: Values) -> None:
+        """Points of shape (n_rows, n, 3) from row ``start`` on, NaN where unknown."""
+        n_before = len(self._off)
+        known = known_points(left) & known_points(right)
+        off = np.concatenate([self._off, np.where(known[:, :, None], left - right, 0.0)])
+        valid = np.concatenate([self._valid, known])
+        for order, sums in ((1, self.velocity), (2, self.acceleration)):
+            first = max(n_before - order, 0)
+            n_rows = len(off) - first - order
+            if n_rows > 0:
+                changed = np.sqrt(squared_norms(np.diff(off[first:], order, axis=0)))
+                both = [valid[first + k : first + k + n_rows] for k in range(order + 1)]
+                counted = np.logical_and.reduce(both)
+                sums.add(start + first + order - n_before, np.where(counted, changed, 0.0), counted)
+        self._off, self._valid = off[-2:], valid[-2:]
+
+
+def known_points(points: Values) -> Flags:
+    """Mask of the points of (n_rows, n, 3) with three finite coordinates."""
+    x, y, z = np.isfinite(np.moveaxis(points, 2, 0))  # much faster than along a short axis
+    known: Flags = x & y & z
+    return known
+
+
+def squared_norms(vectors: Values) -> Values:
+    """(n_rows, n) of vectors (n_rows, n, 3)."""
+    x, y, z = np.moveaxis(vectors, 2, 0)
+    squares: Values = x * x + y * y + z * z
+    return squares

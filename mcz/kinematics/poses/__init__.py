@@ -1,0 +1,32 @@
+"""Poses as arrays with names: where points are, how joints are turned, how fast, at which rate.
+
+One convention throughout: rotations are active and turn column vectors, a joint's local rotation
+is W_parent^-1 W (W: its rotation in the world), and in the rest pose every rotation is the
+identity. Everything takes a Motion or a Clip, of which only what is needed is decoded.
+"""
+
+from __future__ import annotations
+
+from mcz.kinematics.poses.joint_rotations import rotations
+from mcz.kinematics.poses.motion_like import times
+from mcz.kinematics.poses.resampling import resample
+from mcz.kinematics.poses.trajectories import (
+    Root,
+    accelerations,
+    point_names,
+    positions,
+    root,
+    velocities,
+)
+
+__all__ = [
+    "Root",
+    "accelerations",
+    "point_names",
+    "positions",
+    "resample",
+    "root",
+    "rotations",
+    "times",
+    "velocities",
+]

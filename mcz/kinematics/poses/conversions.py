@@ -1,0 +1,190 @@
+"""Rotation matrices to other representations and back, with the conventions of SciPy.
+
+Matrices are (..., 3, 3), active, for column vectors. What is NaN stays NaN.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mcz.errors import OptionError
+from mcz.kinematics.chain import IDENTITY, Floats, rotate_axes
+from mcz.kinematics.rotation_vectors import (
+    matrices_of_quaternions,
+    matrices_of_vectors,
+    quaternions_of_matrices,
+    vectors_of_quaternions,
+)
+from mcz.model.types import Reals
+
+# What each representation adds to the shape of an array of rotations.
+FORMS = {"matrix": (3, 3), "quat": (4,), "rotvec": (3,), "6d": (6,), "euler": (3,)}
+
+LOCKED = 1e-7  # radians from gimbal lock within which the third Euler angle is 0
+
+
+def check_form(form: str) -> None:
+    """Raise OptionError where ``form`` is no representation."""
+    if form not in FORMS:
+        raise OptionError(f"rotations as {form!r}: one of {', '.join(FORMS)}")
+
+
+def check_order(order: str) -> None:
+    """Raise OptionError where ``order`` is no order of Euler angles: three axes, XYZ or xyz."""
+    letters = order.lower()
+    same_case = order in (letters, order.upper())
+    apart = len(order) == 3 and letters[0] != letters[1] != letters[2]
+    if not (same_case and apart and set(letters) <= set("xyz")):
+        raise OptionError(
+            f"Euler order {order!r}: three axes, such as ZXY (about axes that turn along) or zxy "
+            "(about fixed axes)"
+        )
+
+
+def from_matrices(matrices: Floats, form: str, order: str = "XYZ") -> Floats:
+    """Matrices (n_frames, n, 3, 3) as ``form``, a key of ``FORMS``.
+
+    Quaternions have w first and keep their sign from frame to frame: of the first frame, and of
+    one after a gap, w >= 0. "6d" is the first column, then the second. Rotation vectors and Euler
+    angles are in radians.
+    """
+    if form == "matrix":
+        return matrices
+    if form == "6d":
+        return np.concatenate([matrices[..., 0], matrices[..., 1]], axis=-1)
+    flat = matrices.reshape(-1, 3, 3)
+    known = np.isfinite(flat).all(axis=(1, 2))
+    out = np.full((len(flat), *FORMS[form]), np.nan)
+    if known.any():
+        out[known] = _convert_finite(flat if known.all() else flat[known], form, order)
+    shaped = out.reshape(*matrices.shape[:-2], *FORMS[form])
+    return continuous_signs(shaped) if form == "quat" else shaped
+
+
+def _convert_finite(matrices: Floats, form: str, order: str) -> Floats:
+    """Finite matrices (n, 3, 3) as quaternions, rotation vectors or Euler angles."""
+    quaternions = quaternions_of_matrices(np.moveaxis(matrices, 0, 2))
+    if form == "quat":
+        return quaternions.T
+    if form == "rotvec":
+        return vectors_of_quaternions(quaternions).T
+    return _euler_angles(quaternions, order)
+
+
+def _euler_angles(quaternions: Floats, order: str) -> Floats:
+    """Euler angles, (n, 3), of quaternions of length 1, (4, n), first to last of ``order``.
+
+    E. Bernardes and S. Viollet 2022, "Quaternion to Euler angles conversion: A direct, general and
+    computationally efficient method". The second angle is in [0, pi] where the first axis is also
+    the last, else in [-pi/2, pi/2]; the others are in [-pi, pi]. In gimbal lock the third is 0.
+    """
+    turning = order.isupper()  # about axes that turn along: as about fixed ones, reversed
+    i, j, k = ("xyz".index(letter) for letter in (order.lower()[::-1] if turning else order))
+    proper = i == k
+    k = 3 - i - j if proper else k
+    sign = (i - j) * (j - k) * (k - i) // 2
+    w, x, y, z = quaternions[0], *(quaternions[1 + axis] for axis in (i, j, k))
+    a, b, c, d = (w, x, y, sign * z) if proper else (w - y, x + sign * z, y + w, sign * z - x)
+    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
+    second = 2 * np.arctan2(np.hypot(c, d), np.hypot(a, b))
+    ends = [half_sum - half_difference, half_sum + half_difference]
+    low, high = second <= LOCKED, np.pi - second <= LOCKED
+    first, third = (1, 0) if turning else (0, 1)
+    ends[first][low] = 2 * half_sum[low]
+    ends[first][high] = (2 if turning else -2) * half_difference[high]
+    ends[third][low | high] = 0.0
+    if not proper:
+        ends[1] *= sign
+        second -= np.pi / 2
+    for angles in ends:
+        angles -= 2 * np.pi * np.rint(angles / (2 * np.pi))
+    return np.stack([ends[first], second, ends[third]], axis=1)
+
+
+def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
+    """The inverse of ``from_matrices``: (..., *FORMS[form]) to (..., 3, 3).
+
+    Quaternions may have any length but 0; of 6D vectors the second is made orthogonal to the first.
+    Raises OptionError where the shape does not fit.
+    """
+    check_form(form)
+    given: Floats = np.asarray(values, np.float64)
+    tail = FORMS[form]
+    if given.shape[-len(tail) :] != tail:
+        raise OptionError(f"rotations as {form!r} of shape {given.shape}: ends in {tail}")
+    if form == "matrix":
+        return given
+    lead = given.shape[: -len(tail)]
+    flat = given.reshape(-1, *tail)
+    if form == "6d":
+        return _from_6d(flat).reshape(*lead, 3, 3)
+    if form == "euler":
+        check_order(order)
+    known = np.isfinite(flat).all(axis=1)
+    if form == "quat":
+        known &= flat.any(axis=1)
+    out = np.full((len(flat), 3, 3), np.nan)
+    if known.any():
+        parts = flat[known].T
+        if form == "quat":
+            turns = matrices_of_quaternions(parts / np.abs(parts).max(axis=0))
+        elif form == "rotvec":
+            turns = matrices_of_vectors(parts)
+        else:
+            turns = _matrices_of_euler_angles(parts, order)
+        out[known] = np.moveaxis(turns, 2, 0)
+    return out.reshape(*lead, 3, 3)
+
+
+def _matrices_of_euler_angles(angles: Floats, order: str) -> Floats:
+    """The rotations, (3, 3, n), by angles (3, n)."""
+    steps = list(zip(order.lower(), angles, strict=True))  # about fixed axes: as turned, reversed
+    turns = IDENTITY
+    for letter, angle in steps if order.isupper() else reversed(steps):
+        turns = rotate_axes(turns, "xyz".index(letter), angle)
+    return turns
+
+
+def _from_6d(flat: Floats) -> Floats:
+    """Zhou et al. 2019, "On the Continuity of Rotation Representations", equation 15."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first = flat[:, :3] / np.linalg.norm(flat[:, :3], axis=1, keepdims=True)
+        second = flat[:, 3:] - (first * flat[:, 3:]).sum(axis=1, keepdims=True) * first
+        second /= np.linalg.norm(second, axis=1, keepdims=True)
+    return np.stack([first, second, np.cross(first, second)], axis=2)
+
+
+def continuous_signs(quaternions: Floats) -> Floats:
+    """Quaternions (n_frames, n, 4), w first, with the signs that keep neighbours near each other.
+
+    w >= 0 in the first frame and in each after a gap.
+    """
+    if not len(quaternions):
+        return quaternions
+    steps = np.ones(quaternions.shape[:-1])
+    dots = np.einsum("fnk,fnk->fn", quaternions[1:], quaternions[:-1])
+    steps[1:][dots < 0] = -1.0
+    signs = np.cumprod(steps, axis=0)
+    fresh = np.concatenate([np.ones((1, *dots.shape[1:]), np.bool_), np.isnan(dots)])
+    fresh &= ~np.isnan(quaternions[..., 0])
+    wrong = fresh & (signs * quaternions[..., 0] < 0)
+    right = fresh & ~wrong
+    # From each fresh start on, what its own sign asks for holds up to the next one.
+    frames = np.arange(len(signs))[:, None]
+    last_wrong = np.maximum.accumulate(np.where(wrong, frames, -1), axis=0)
+    last_right = np.maximum.accumulate(np.where(right, frames, -1), axis=0)
+    signs[last_wrong > last_right] *= -1.0
+    return quaternions * signs[..., None]
+
+
+def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
+    """Matrices (n, 3, 3) a ``share``, (n,), of the shortest way from ``first`` to ``second``."""
+    out = np.full(first.shape, np.nan)
+    known = np.isfinite(first).all(axis=(1, 2)) & np.isfinite(second).all(axis=(1, 2))
+    if known.any():
+        start = first[known]
+        way = np.swapaxes(start, 1, 2) @ second[known]
+        vectors = vectors_of_quaternions(quaternions_of_matrices(np.moveaxis(way, 0, 2)))
+        part = np.moveaxis(matrices_of_vectors(vectors * share[known]), 2, 0)
+        out[known] = start @ part
+    return out

@@ -1,0 +1,215 @@
+"""Positions, velocities and accelerations of points, and the root."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics import first_points
+from mcz.kinematics import point_names as names_of_points
+from mcz.kinematics.chain import Floats
+from mcz.kinematics.poses.conversions import from_matrices
+from mcz.kinematics.poses.derivatives import accelerations_of, velocities_of
+from mcz.kinematics.poses.motion_like import (
+    Frames,
+    MotionLike,
+    as_type,
+    frame_range,
+    joint_numbers,
+    poses_of,
+    scale_to,
+    values_of,
+)
+from mcz.model.clock import known_timeline
+from mcz.model.motion import Skeleton
+from mcz.model.skeleton import Joints, column_of, joint_list, signs_of
+from mcz.model.text_format import among, brief
+from mcz.model.types import Reals
+
+
+def point_names(moving: MotionLike | Skeleton, joints: Joints = None) -> tuple[str, ...]:
+    """The names of the points whose ``positions`` are given, in their order.
+
+    That is the name of the joint, with " end" where a point is an end site of a BVH. Of Acclaim a
+    joint's point is the end of its bone.
+    """
+    skeleton = moving if isinstance(moving, Skeleton) else moving.skeleton
+    names = names_of_points(skeleton)
+    return names if joints is None else tuple(names[p] for p in chosen_points(skeleton, joints))
+
+
+def chosen_points(skeleton: Skeleton, joints: Joints) -> list[int]:
+    """The points of these names, and the first point of each joint of these names or indices.
+
+    Raises MotionError where there is none.
+    """
+    names = names_of_points(skeleton)
+    if joints is None:
+        return list(range(len(names)))
+    firsts, points = first_points(skeleton), []
+    for wanted in joint_list(joints):
+        if isinstance(wanted, str) and wanted in names and wanted not in skeleton.addresses():
+            points.append(names.index(wanted))  # an end site
+            continue
+        try:
+            points.append(firsts[skeleton.find(wanted)])
+        except MotionError:
+            raise MotionError(f"no point {wanted!r} among {among(names, wanted)}") from None
+    return points
+
+
+def positions(
+    moving: MotionLike,
+    joints: Joints = None,
+    frames: Frames = None,
+    *,
+    unit: str | None = None,
+    dtype: DTypeLike = np.float64,
+) -> Reals:
+    """World positions of the points of a Motion or Clip, (n_frames, n_points, 3).
+
+    ``joints`` by index or name, or points by the names of ``point_names``; None: all points, those
+    of ``point_names``. ``frames`` (a, b) or a slice. In length units of the skeleton, or in
+    ``unit``: "mm", "cm", "m", "in", "ft". A point that depends on an invalid value is NaN.
+    Raises OptionError, and MotionError where the skeleton has no kinematics: its angle unit is
+    unknown, or all of its channels are plain scalars.
+    """
+    scale = scale_to(moving.skeleton, unit)
+    places = _positions(moving, joints, frame_range(moving, frames))
+    return as_type(places if scale == 1.0 else places * scale, dtype)
+
+
+def _positions(moving: MotionLike, joints: Joints, span: tuple[int, int]) -> Floats:
+    points = chosen_points(moving.skeleton, joints)
+    poses = poses_of(moving.skeleton)
+    needed = poses.above(poses.joints_of(points))
+    return poses.positions(values_of(moving, span, needed), points)
+
+
+def velocities(
+    moving: MotionLike,
+    joints: Joints = None,
+    frames: Frames = None,
+    *,
+    unit: str | None = None,
+    dtype: DTypeLike = np.float64,
+) -> Reals:
+    """Velocities of the points, (n_frames, n_points, 3), in length units (or ``unit``) per second.
+
+    Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate where these are
+    uniform; one-sided at the ends of the clip, beside unknown positions and beside missing frames,
+    over which no difference is taken: a frame alone between two gaps has none, NaN. A part of the
+    frames has the numbers of the whole. Arguments and errors are those of ``positions``;
+    OptionError also where the times are unknown.
+    """
+    window = _read_window(moving, joints, frames, unit, 1)
+    return as_type(_cut_window(velocities_of(window.places, window.steps), window), dtype)
+
+
+def accelerations(
+    moving: MotionLike,
+    joints: Joints = None,
+    frames: Frames = None,
+    *,
+    unit: str | None = None,
+    dtype: DTypeLike = np.float64,
+) -> Reals:
+    """Accelerations of the points, in length units (or ``unit``) per second squared.
+
+    (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or beside a gap that of
+    the frame next to it, NaN in a run of fewer than three. Otherwise as ``velocities``.
+    """
+    window = _read_window(moving, joints, frames, unit, 2)
+    return as_type(_cut_window(accelerations_of(window.places, window.steps), window), dtype)
+
+
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """Places of some frames and of those around them; ``first`` and ``stop`` among ``places``.
+
+    ``steps`` are the seconds from each of them to the next, NaN across a gap.
+    """
+
+    places: Floats
+    steps: Floats
+    first: int
+    stop: int
+
+
+def _read_window(
+    moving: MotionLike, joints: Joints, frames: Frames, unit: str | None, reach: int
+) -> _Window:
+    scale = scale_to(moving.skeleton, unit)
+    steps = known_timeline(moving.name, moving.timeline).steps
+    start, stop = frame_range(moving, frames)
+    low, high = max(0, start - reach), min(moving.n_frames, stop + reach)
+    places = _positions(moving, joints, (low, high)) * scale
+    return _Window(places, steps[low : max(low, high - 1)], start - low, stop - low)
+
+
+def _cut_window(values: Floats, near: _Window) -> Floats:
+    return values[near.first : near.stop]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Root:
+    """Position and rotation of the root in every frame.
+
+    ``positions`` (n_frames, 3) in length units (or the unit that was asked for), ``rotations``
+    (n_frames, 4), quaternions in the world, w first, ``joint`` its name, ``up_axis`` "x" to
+    "-z", or "" while unknown.
+    """
+
+    joint: str
+    positions: Reals
+    rotations: Reals
+    up_axis: str
+
+    __repr__ = brief
+
+    @property
+    def headings(self) -> Reals:
+        """Rotation of the root about the up axis, (n_frames,), in radians.
+
+        0 in the rest pose, continuous over turns: the twist of the rotation. Raises OptionError
+        where nobody says what is up.
+        """
+        if not self.up_axis:
+            raise OptionError(f"root {self.joint!r}: the axis that points up is unknown (up=)")
+        column = column_of(self.up_axis)
+        sign = float(signs_of(self.up_axis)[column])
+        twist = self.rotations[:, 1 + column].astype(np.float64) * sign
+        angles = 2.0 * np.arctan2(twist, self.rotations[:, 0].astype(np.float64))
+        known = np.isfinite(angles)
+        angles[known] = np.unwrap(angles[known])
+        return angles.astype(self.rotations.dtype)
+
+
+def root(
+    moving: MotionLike,
+    frames: Frames = None,
+    *,
+    joint: int | str | None = None,
+    unit: str | None = None,
+    dtype: DTypeLike = np.float64,
+) -> Root:
+    """World position and rotation of the root joint.
+
+    ``joint`` is another than the first. Raises as ``positions``, and MotionError where the skeleton
+    has no joint.
+    """
+    skeleton, span = moving.skeleton, frame_range(moving, frames)
+    scale = scale_to(skeleton, unit)
+    (number,) = joint_numbers(skeleton, 0 if joint is None else joint)
+    poses = poses_of(skeleton)
+    values = values_of(moving, span, poses.above([number]))
+    turns = from_matrices(poses.world(values, [number]), "quat")
+    return Root(
+        skeleton.addresses()[number],
+        as_type(poses.origins(values, [number])[:, 0] * scale, dtype),
+        as_type(turns[:, 0], dtype),
+        skeleton.up_axis,
+    )

@@ -1,0 +1,65 @@
+"""Matching of joints between skeletons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from mcz.errors import OptionError
+from mcz.kinematics.retargeting.channels import turns
+from mcz.model.motion import Skeleton
+from mcz.model.text_format import among
+
+
+def matched(
+    source: Skeleton, target: Skeleton, joint_map: Mapping[str, str] | None
+) -> dict[int, int]:
+    """The joints of ``source``, by the joint of ``target`` that each turns, in joint order.
+
+    ``joint_map`` maps names of the source to names of the target; None: the same names, of which
+    all that turn have to be in both. Raises OptionError, which names the joint.
+    """
+    ours, theirs = target.joint_names, source.joint_names
+    if joint_map is None:
+        _check_names(source, target)
+        joint_map = {name: name for name in theirs if name in ours}
+    pairs: dict[int, int] = {}
+    for name, other in joint_map.items():
+        if name not in theirs:
+            raise OptionError(
+                f"retarget: joint_map: no joint {name!r} in the motion, among {among(theirs, name)}"
+            )
+        if other not in ours:
+            raise OptionError(
+                f"retarget: joint_map: no joint {other!r} in the skeleton, among "
+                f"{among(ours, other)}"
+            )
+        number = ours.index(other)
+        if number in pairs:
+            raise OptionError(
+                f"retarget: joint_map: {theirs[pairs[number]]!r} and {name!r} both stand for "
+                f"{other!r}"
+            )
+        pairs[number] = theirs.index(name)
+    if not pairs:
+        raise OptionError("retarget: joint_map names no joint")
+    return dict(sorted(pairs.items()))
+
+
+def _check_names(source: Skeleton, target: Skeleton) -> None:
+    """Every joint that turns in one is in the other."""
+    for one, other, where in ((source, target, "skeleton"), (target, source, "motion")):
+        known = set(other.joint_names)
+        for name, joint in zip(one.joint_names, one.joints, strict=True):
+            if turns(joint.channels) and name not in known:
+                raise OptionError(
+                    f"retarget: the {where} has no joint {name!r}, which turns; joint_map= says "
+                    "which joints stand for each other, and leaves out the rest"
+                )
+
+
+def nearest_above(skeleton: Skeleton, joint: int, chosen: Mapping[int, int]) -> int:
+    """The nearest joint above ``joint`` that is in ``chosen``, -1 where there is none."""
+    parent = skeleton.joints[joint].parent
+    while parent >= 0 and parent not in chosen:
+        parent = skeleton.joints[parent].parent
+    return parent

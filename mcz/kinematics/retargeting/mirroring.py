@@ -1,0 +1,141 @@
+"""A motion in the mirror: left and right change places.
+
+With S the reflection, a joint with axes W becomes its counterpart with axes S W S. A reflected
+turn about one of the mirror's own axes is a turn about the same axis, one about any other axis has
+the other sign. So numbers change places and signs, and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics.retargeting.channels import check_channels, edited
+from mcz.kinematics.retargeting.sides import counterparts
+from mcz.model.motion import (
+    POSITION_KINDS,
+    TURNING_KINDS,
+    Exceptions,
+    Joint,
+    Motion,
+    Signal,
+    Skeleton,
+    Vector,
+    joint_columns,
+)
+
+AXES = ("x", "y", "z")
+
+
+def mirror(motion: Motion, axis: str = "x", pairs: Mapping[str, str] | None = None) -> Motion:
+    """``motion`` reflected through the plane normal to ``axis`` of the world, at its origin.
+
+    ``axis`` is "x", "y" or "z": the one from side to side. Left and right joints change places: of
+    each the positions are exactly the mirrored ones of its counterpart. So its bones are as long
+    as the counterpart's were, and its channels are the counterpart's. Names, order and parents are
+    kept. Numbers stay on their grids.
+
+    Counterparts are found by name, as "LeftArm" and "RightArm", "lfemur" and "rfemur", "Hand_L"
+    and "Hand_R" are; what says no side is its own. ``pairs`` maps names to names where they do not
+    say it. What is returned has no source.
+
+    Raises OptionError for a side without counterpart, for pairs that hang on joints that are none,
+    and for another axis. Raises MotionError for plain scalars and for signals beside the motion,
+    of which is not known how they look in a mirror.
+    """
+    if axis not in AXES:
+        raise OptionError(f"mirror: axis {axis!r} is not one of {', '.join(AXES)}")
+    _check(motion)
+    skeleton = motion.skeleton
+    others = counterparts(skeleton.joint_names, pairs)
+    _check_tree(skeleton, others)
+    joints = tuple(
+        replace(_reflected(skeleton.joints[other], axis), name=joint.name, parent=joint.parent)
+        for joint, other in zip(skeleton.joints, others, strict=True)
+    )
+    mirrored = replace(skeleton, joints=joints, base=None, source=None)
+    signal = motion.signals[0].of_columns(joint_columns(skeleton, others))
+    return edited(motion, mirrored, _turned_about(signal, mirrored, axis))
+
+
+def _check(motion: Motion) -> None:
+    check_channels(motion)
+    if len(motion.signals) > 1:
+        names = ", ".join(signal.name for signal in motion.signals[1:])
+        raise MotionError(
+            f"how its signals {names} look in a mirror is not known; "
+            "mirror the motion without them (dataclasses.replace, signals=motion.signals[:1])",
+            clip=motion.name,
+        )
+    for name, joint in zip(motion.skeleton.joint_names, motion.skeleton.joints, strict=True):
+        if any(not channel.kind for channel in joint.channels):
+            raise MotionError(
+                f"joint {name!r} has plain scalars, and how they look in a mirror is not known"
+            )
+
+
+def _check_tree(skeleton: Skeleton, others: list[int]) -> None:
+    """Counterparts hang on counterparts."""
+    names = skeleton.joint_names
+    for index, other in enumerate(others):
+        parent, there = skeleton.joints[index].parent, skeleton.joints[other].parent
+        if (others[parent] if parent >= 0 else -1) != there:
+            on = [names[k] if k >= 0 else "nothing" for k in (parent, there)]
+            raise OptionError(
+                f"mirror: {names[index]!r} hangs on {on[0]!r} and its counterpart "
+                f"{names[other]!r} on {on[1]!r}, which are no counterparts; pairs= names those "
+                "that are"
+            )
+
+
+def _reflected(joint: Joint, axis: str) -> Joint:
+    x, y, z = (
+        0.0 - angle if angle and letter != axis else angle
+        for letter, angle in zip(AXES, joint.axis, strict=True)
+    )
+    return replace(
+        joint,
+        offset=_reflected_vector(joint.offset, axis),
+        tails=tuple(_reflected_vector(tail, axis) for tail in joint.tails),
+        axis=(x, y, z),
+    )
+
+
+def _reflected_vector(vector: Vector, axis: str) -> Vector:
+    x, y, z = (
+        0.0 - part if part and letter == axis else part
+        for letter, part in zip(AXES, vector, strict=True)
+    )
+    return x, y, z
+
+
+def _turned_about(signal: Signal, skeleton: Skeleton, axis: str) -> Signal:
+    """The signal with the other sign where a mirror changes it."""
+    flipped = np.array([_flips(c.kind, axis) for c in skeleton.channels], np.bool_)
+    # 0 - v rather than -v: no zero becomes -0, which other grids lack.
+    values = np.where(flipped, 0 - signal.values, signal.values)
+    return replace(
+        signal,
+        values=values,
+        stored=values if signal.scaling is None else signal.scaling.stored(values, signal.stored),
+        exceptions=_without(signal.exceptions, flipped),
+        ordinals=None,
+    )
+
+
+def _flips(kind: str, axis: str) -> bool:
+    """Return True if a channel of this kind changes its sign."""
+    if kind in POSITION_KINDS:
+        return kind[1] == axis
+    return kind in TURNING_KINDS and kind != "qw" and kind[1] != axis
+
+
+def _without(exceptions: Exceptions, flipped: NDArray[np.bool_]) -> Exceptions:
+    """The texts of those numbers that are as they were."""
+    at = np.arange(len(flipped))
+    at[flipped] = -1
+    return exceptions.moved(at)

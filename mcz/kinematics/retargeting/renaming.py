@@ -1,0 +1,57 @@
+"""Joints under other names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+from mcz.errors import OptionError
+from mcz.kinematics.retargeting.channels import edited
+from mcz.model.motion import Motion, Skeleton
+from mcz.model.text_format import among
+
+Named = TypeVar("Named", Motion, Skeleton)
+
+
+def rename(named: Named, mapping: Mapping[str, str]) -> Named:
+    """A motion or skeleton whose joints are called as ``mapping`` says, from old name to new.
+
+    Joints that it does not name keep theirs; where a name repeats, ``name#1`` is the second joint
+    of that name, as in ``Skeleton.joint_names``. Numbers stay as they are. What is returned has no
+    source: a file's text has the old names. Other signals keep the names of their channels.
+
+    Raises OptionError for a joint that is not there, and for a name that two joints would have.
+    """
+    skeleton = named if isinstance(named, Skeleton) else named.skeleton
+    names = _names(skeleton, mapping)
+    joints = tuple(
+        replace(joint, name=name) for joint, name in zip(skeleton.joints, names, strict=True)
+    )
+    renamed = replace(skeleton, joints=joints, base=None, source=None)
+    if isinstance(named, Skeleton):
+        return renamed
+    return edited(named, renamed, named.signals[0])
+
+
+def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
+    """The new name of every joint; raises OptionError."""
+    addresses = skeleton.joint_names
+    names = [joint.name for joint in skeleton.joints]
+    given: set[int] = set()
+    for old, new in mapping.items():
+        if old not in addresses:
+            raise OptionError(f"rename: no joint {old!r} among {among(addresses, old)}")
+        if not isinstance(new, str) or not new:
+            raise OptionError(f"rename: {new!r} is no name for joint {old!r}")
+        index = addresses.index(old)
+        names[index] = new
+        given.add(index)
+    for index in sorted(given):
+        if names.count(names[index]) > 1:
+            held = [addresses[k] for k, name in enumerate(names) if name == names[index]]
+            raise OptionError(
+                f"rename: {names[index]!r} would be the name of {len(held)} joints: "
+                f"{', '.join(held)}"
+            )
+    return names

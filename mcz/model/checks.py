@@ -1,0 +1,181 @@
+"""Fields of the data model, checked and put in their usual form when a part of it is made."""
+
+from __future__ import annotations
+
+import math
+import operator
+import reprlib
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mcz.errors import MotionError
+from mcz.model.types import Items
+
+
+class Rule(NamedTuple):
+    """A form of a field in words, and the function that gives it; TypeError or ValueError."""
+
+    words: str
+    form: Callable[[Any], Any]
+
+
+def check_fields(thing: object, rules: Mapping[str, Rule]) -> None:
+    """Give fields of a frozen dataclass the form of their rules; MotionError names the field."""
+    for name, rule in rules.items():
+        value = getattr(thing, name)
+        try:
+            found = rule.form(value)
+        except (TypeError, ValueError, OverflowError, AttributeError):
+            kind = type(thing).__name__.lower()
+            shown = " ".join(reprlib.repr(value).split())  # in one line
+            raise MotionError(f"{kind}: {name} is {shown}, not {rule.words}") from None
+        if found is not value:
+            object.__setattr__(thing, name, found)
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return str(value)
+
+
+def _name(value: object) -> str:
+    text = _text(value)
+    text.encode()  # UnicodeEncodeError, a ValueError, of half a surrogate pair
+    return text
+
+
+def _integer(value: Any) -> int:
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError
+    return operator.index(value)
+
+
+def _truth(value: object) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError
+    return bool(value)
+
+
+def _data(value: object) -> bytes:
+    if not isinstance(value, (bytes, bytearray, memoryview)):
+        raise TypeError
+    return bytes(value)
+
+
+def _hash(value: object) -> bytes:
+    data = _data(value)
+    if len(data) not in (0, 32):
+        raise ValueError
+    return data
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, (str, bytes, bool, np.bool_, np.ndarray)):
+        raise TypeError
+    number = float(value)
+    if not math.isfinite(number):  # SKEL-08
+        raise ValueError
+    return number
+
+
+def _vector(value: Any) -> tuple[float, float, float]:
+    x, y, z = map(_number, value)
+    return x, y, z
+
+
+def _texts(value: object) -> tuple[bytes, ...]:
+    return tuple(map(_data, _items(value)))
+
+
+def _text_map(value: object) -> Mapping[str, str]:
+    if not isinstance(value, Mapping):
+        raise TypeError
+    for pair in value.items():
+        list(map(_text, pair))
+    return value
+
+
+def _items(value: object) -> tuple[object, ...]:
+    if isinstance(value, tuple):
+        return value
+    if not isinstance(value, list):
+        raise TypeError
+    return tuple(value)
+
+
+def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
+    """The rule of a field that is a ``kind``."""
+
+    def form(value: object) -> object:
+        if not isinstance(value, kind):
+            raise TypeError
+        return value
+
+    return Rule(words, form)
+
+
+def one_of(choices: Collection[str]) -> Rule:
+    """The rule of a field that is one of some words."""
+
+    def form(value: object) -> str:
+        if value not in choices:
+            raise ValueError
+        return str(value)
+
+    return Rule(f"one of {', '.join(filter(None, choices))}", form)
+
+
+def several(rule: Rule, words: str) -> Rule:
+    """The rule of a tuple, or a list, of what another rule is of."""
+
+    def form(value: object) -> tuple[object, ...]:
+        items = _items(value)
+        formed = tuple(map(rule.form, items))
+        same = items is value and all(map(operator.is_, formed, items))
+        return items if same else formed
+
+    return Rule(words, form)
+
+
+def optional(rule: Rule) -> Rule:
+    """The rule of a field that may be None as well."""
+    return Rule(f"{rule.words} or None", lambda value: None if value is None else rule.form(value))
+
+
+def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
+    """The rule of an array of types such as "f8", in the byte order and memory layout of C.
+
+    A masked array counts as one only where nothing is masked.
+    """
+
+    def form(value: object) -> Items:
+        if type(value) is not np.ndarray and np.ma.is_masked(value):  # imports numpy.ma
+            raise ValueError
+        array = np.asarray(value)
+        if f"{array.dtype.kind}{array.dtype.itemsize}" not in kinds.split():
+            raise TypeError
+        if array.ndim != n_dimensions:
+            raise ValueError
+        return plain(array)
+
+    return Rule(words, form)
+
+
+def plain(array: Items) -> Items:
+    """``array`` in the byte order of the machine, aligned and in C order; itself if it is."""
+    flags = array.flags
+    if array.dtype.isnative and flags.c_contiguous and flags.aligned:
+        return array
+    return np.array(array, array.dtype.newbyteorder("="), order="C")
+
+
+TEXT, INTEGER, TRUTH = Rule("text", _text), Rule("an integer", _integer), Rule("a bool", _truth)
+NAME = Rule("text that UTF-8 can hold", _name)
+DATA, HASH = Rule("bytes", _data), Rule("32 bytes or none", _hash)
+NUMBER = Rule("a finite number", _number)
+VECTOR = Rule("three finite numbers", _vector)
+TEXT_MAP = Rule("text to text", _text_map)
+DATA_ITEMS = Rule("several bytes", _texts)

@@ -1,0 +1,213 @@
+"""Encoder choice of the grid of a run of tokens; not normative."""
+
+from __future__ import annotations
+
+import importlib
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mcz.model.numbers import printed, textgrids
+from mcz.model.numbers.grid import Grid
+from mcz.model.numbers.printed_choice import printed_bits, printed_candidates
+from mcz.model.numbers.rules import CHECKED_KINDS, DECIMAL_KINDS, FIXED_TEXT, GridFlag, GridKind
+from mcz.model.numbers.tokens import Bools, Ints, Tokens
+
+if TYPE_CHECKING:
+    from mcz.model.numbers.survey_kernels import Survey
+
+FEW = 2**14  # tokens of which all candidates are tried in order
+_SAMPLE = 4096  # tokens that are looked at for candidates; all of them are counted
+_STEP = 2_654_435_761  # from one of them to the next: a prime, so that all columns are seen
+_EXCEPTION_BITS = 200  # row, channel and text, a guess
+_DIGIT_BITS = 3.33
+_SIGN_AND_RANGE_BITS = 8.0
+
+Rule = tuple[GridKind, int, int, float, int]  # kind, digits, flags, scale, style
+Candidate = tuple[float, Rule]  # bits of an ordinal, and what makes its grid
+
+
+def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
+    return bits * n_tokens + _EXCEPTION_BITS * n_exceptions
+
+
+def _survey(tokens: Tokens, n_counted: int) -> Survey:
+    loops = _surveys()
+    sizes = loops.MOST_DECIMALS + 1, loops.MOST_DIGITS + 1, loops.N_STYLES
+    survey: Survey = loops.Survey(*(np.zeros(size, np.int64) for size in sizes))
+    loops.count(tokens.fields, _STEP, n_counted, survey)
+    return survey
+
+
+def _candidates(tokens: Tokens, n_sample: int) -> list[Candidate]:
+    """Grids worth a try, by a sample of the tokens, from the fewest bits on."""
+    survey = _survey(tokens, n_sample)
+    found = [(bits, (*rule, 1.0, 0)) for bits, rule in _plain_candidates(survey)]
+    n_known, n_plain = int(survey.significant.sum()), int(survey.decimals.sum())
+    if 2 * (n_known - n_plain) > n_known or survey.significant[10:].any():
+        found += printed_candidates(_sampled(tokens, n_sample))
+    return sorted(found)
+
+
+def _sampled(tokens: Tokens, n_sample: int) -> Tokens:
+    return tokens[np.arange(n_sample) * _STEP % len(tokens)] if n_sample < len(tokens) else tokens
+
+
+def _plain_candidates(survey: Survey) -> Iterator[tuple[float, tuple[GridKind, int, int]]]:
+    """All grids but PRINTED."""
+    decimals, significant = survey.decimals.tolist(), survey.significant.tolist()
+    if not any(significant):
+        yield 0.0, (GridKind.FIXED, 0, 0)
+        return
+    sign, tail, exponent = _styles(survey.styles.tolist())
+    fixed = decimals.index(max(decimals))
+    is_plain = any(decimals)
+    if is_plain:
+        point = GridFlag.POINT if fixed == 0 and tail == GridFlag.POINT else 0
+        style = sign & ~GridFlag.NO_ZERO | point if fixed == 0 else sign
+        if fixed <= 22:
+            yield _bits(fixed), (GridKind.FIXED, fixed, style)
+        for digits in _ends(decimals):
+            if 1 <= digits <= 22:
+                yield _bits(digits) + 1, (GridKind.TRIMMED, digits, sign | tail)
+    flags = sign | tail | exponent
+    for digits in sorted({*_ends(significant), 6}):
+        if 1 <= digits <= 15:
+            yield _bits(digits) + 2, (GridKind.GENERAL, digits, flags)
+    if any(significant[7:]):
+        yield 40.0, (GridKind.TEXT32, 0, flags)
+    if any(significant[10:]):
+        for digits in (0, 1, 16, 17):
+            yield 64.0, (GridKind.TEXT64, digits, flags)
+        if is_plain and 10 <= fixed <= 40:
+            yield 66.0, (GridKind.TEXT64, FIXED_TEXT + fixed, 0)
+
+
+def _bits(digits: int) -> float:
+    return _SIGN_AND_RANGE_BITS + _DIGIT_BITS * digits
+
+
+def _ends(histogram: Sequence[int]) -> list[int]:
+    """The count that 99 % do not exceed, and the largest: a stray long token costs little."""
+    ranks = list(accumulate(histogram))
+    n = ranks[-1]
+    return sorted({bisect_right(ranks, rank) for rank in (n - 1, (n * 99 - 1) // 100)})
+
+
+def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
+    """Flags of the sign and the leading zero, of integral numbers, of the exponent: majorities."""
+    loops = _surveys()
+    sign = GridFlag.PLUS if counts[loops.SIGNED] > counts[loops.UNSIGNED] else 0
+    if counts[loops.NO_ZERO] > counts[loops.BARE_INTEGER]:
+        sign |= GridFlag.NO_ZERO
+    points, bare, zeros = (
+        counts[style] for style in (loops.POINT_ONLY, loops.NO_POINT, loops.POINT_ZERO)
+    )
+    tail = 0
+    if points > bare and points > zeros:
+        tail = int(GridFlag.POINT)
+    elif zeros > points + bare:
+        tail = int(GridFlag.POINT_ZERO)
+    exponent = 0
+    if counts[loops.THREE] > counts[loops.TWO]:
+        exponent = int(GridFlag.EXPONENT3)
+    elif counts[loops.ONE] > counts[loops.TWO_OF_ONE]:
+        exponent = int(GridFlag.EXPONENT1)
+    if counts[loops.CAPITAL] > counts[loops.SMALL]:
+        exponent |= GridFlag.UPPER
+    return int(sign), tail, int(exponent)
+
+
+def _surveys() -> ModuleType:
+    """The compiled loops, imported on first use."""
+    return importlib.import_module("mcz.model.numbers.survey_kernels")
+
+
+def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
+    """The grid of ``fit``, for who needs no ordinals yet."""
+    return fit(tokens, prefer)[0]
+
+
+def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]:
+    """The text grid that needs the fewest bytes for ``tokens``, exceptions counted.
+
+    With it, what its ``ordinals_of_tokens`` gives. The first of ``prefer`` without exceptions is
+    taken at once, and the first that has no more exceptions than the best of all others.
+    """
+    if not (tokens.known or tokens.bad().any()):
+        tokens.values()  # several grids ask for them, and for those of some of the tokens
+    wanted = []
+    for grid in prefer:
+        wanted.append((grid, *grid.ordinals_of_tokens(tokens)))
+        if wanted[-1][2].all():
+            return wanted[-1]
+    n_sample = min(len(tokens), _SAMPLE)
+    ranked = _candidates(tokens, n_sample)
+    order: Sequence[int] = range(len(ranked))
+    if len(tokens) > FEW:
+        order = _likeliest_first(_sampled(tokens, n_sample), ranked)
+    least = float("inf"), len(ranked)  # the lowest price, and the first candidate that has it
+    for rank in order:
+        bits, rule = ranked[rank]
+        if (cost(len(tokens), bits, 0), rank) >= least:
+            continue
+        tried = _tried(tokens, rule, least[0] - cost(len(tokens), bits, 0))
+        misses = len(tokens) if tried is None else len(tokens) - int(np.count_nonzero(tried[1]))
+        price = cost(len(tokens), bits, misses), rank
+        if tried is not None and price < least:
+            least, fewest, best = price, misses, (Grid(*rule), *tried)
+    return next((fitted for fitted in wanted if np.count_nonzero(~fitted[2]) <= fewest), best)
+
+
+def _likeliest_first(sample: Tokens, ranked: Sequence[Candidate]) -> list[int]:
+    """The candidates, with that one first that all others are likely to lose against.
+
+    They are then given up early. Only grids that are quick to try come first.
+    """
+    prices = [
+        cost(len(sample), bits, _fewest_misses(sample, rule))
+        if rule[0] in DECIMAL_KINDS
+        else float("inf")
+        for bits, rule in ranked
+    ]
+    first = prices.index(min(prices))
+    return [first, *(rank for rank in range(len(ranked)) if rank != first)]
+
+
+def _tried(tokens: Tokens, rule: Rule, spare: float) -> tuple[Ints, Bools] | None:
+    """Ordinals and printed tokens; None where exceptions cost more than ``spare`` bits."""
+    kind, digits, flags, _, _ = rule
+    allowed = int(min(spare / _EXCEPTION_BITS, len(tokens))) + 1  # prices decide, not this
+    if kind in DECIMAL_KINDS:
+        ordinals, known, misses = textgrids.match(tokens, kind, digits, flags, allowed)
+        return (ordinals, known) if misses <= allowed else None
+    if _fewest_misses(tokens, rule) > allowed:
+        return None
+    return Grid(*rule).ordinals_of_tokens(tokens)
+
+
+def bits_of(grid: Grid) -> float:
+    """Estimate the bits of an ordinal without context, for ``candidates``."""
+    match grid.kind:
+        case GridKind.TEXT32:
+            return 40.0
+        case GridKind.TEXT64:
+            return 64.0
+        case GridKind.PRINTED:
+            return printed_bits(grid.digits, grid.style)
+    return _bits(grid.digits)
+
+
+def _fewest_misses(tokens: Tokens, rule: Rule) -> int:
+    """Tokens that the shape alone rules out, which spares grids that are costly to try."""
+    kind, digits, flags, _, style = rule
+    if kind == GridKind.PRINTED:
+        return int(np.count_nonzero(~printed.plausible(tokens, style)))
+    bound = textgrids.match(tokens, kind, digits, flags)[2]
+    if kind in CHECKED_KINDS and bound:
+        bound -= int(np.count_nonzero(textgrids.long(tokens)))
+    return bound

@@ -1,0 +1,73 @@
+"""Scaling of a signal's stored numbers to its unit: an offset and a factor per channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.model.checks import Rule, array_of, check_fields
+from mcz.model.types import Values
+
+Floats = NDArray[np.float64]
+MAX_INTEGER = 2.0**53  # what a binary64 holds exactly
+
+
+_FLOATS = array_of("f8", 1, "float64 of one dimension")
+SCALING = {"offsets": _FLOATS, "scales": _FLOATS, "general": Rule("a number", float)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scaling:
+    """``(number - offset) * scale * general``, in this order, in binary64.
+
+    ``offsets`` and ``scales`` have shape (n_channels,). Offsets are in stored numbers; scale and
+    general scale together are in units a stored number.
+    """
+
+    offsets: Floats
+    scales: Floats
+    general: float = 1.0
+
+    def check(self, n_channels: int) -> None:
+        """Raise MotionError where this is no scaling of so many channels."""
+        check_fields(self, SCALING)
+        shapes = {self.offsets.shape, self.scales.shape}
+        if shapes != {(n_channels,)}:
+            raise MotionError(f"scaling: offsets and scales do not match {n_channels} channels")
+
+    def says(self, other: Scaling | None) -> bool:
+        """Return True if both scale alike."""
+        if other is None:
+            return False
+        pairs = (
+            (self.offsets, other.offsets),
+            (self.scales, other.scales),
+            ([self.general], [other.general]),
+        )
+        return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+
+    def values(self, stored: Values, channels: slice | list[int] = slice(None)) -> Floats:
+        """Stored numbers, (n_rows, n_channels), in units; ``channels`` says which these are."""
+        with np.errstate(over="ignore", invalid="ignore"):  # files say what they like
+            moved = stored.astype(np.float64) - self.offsets[channels]
+            scaled: Floats = moved * self.scales[channels] * self.general
+        return scaled
+
+    def stored(self, values: Values, numbers: Values) -> Values:
+        """The stored numbers that mean ``values``: ``numbers``, but where a value is another.
+
+        What is new is the number that means it or, among integers, the nearest one; NaN or 0 where
+        no number means it.
+        """
+        meant = self.values(numbers)
+        same = (meant == values) | (np.isnan(meant) & np.isnan(values))
+        if same.all():
+            return numbers
+        with np.errstate(all="ignore"):
+            new = np.asarray(values, np.float64) / (self.scales * self.general) + self.offsets
+        if numbers.dtype == np.int64:
+            new = np.clip(np.rint(np.nan_to_num(new)), -MAX_INTEGER, MAX_INTEGER)
+        return np.where(same, numbers, new.astype(numbers.dtype))

@@ -1,0 +1,212 @@
+"""Numbers in text: where they stand, how they are written, which binary64 they are.
+
+SPEC.md, "Decimal and binary64", is normative for ``nearest``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import SourceError
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the one NaN that values hold
+EXACT_POWER = 22  # 10^22 is the last power of ten that a binary64 holds exactly
+TENS = np.array([float(f"1e{power}") for power in range(EXACT_POWER + 1)])
+
+_NAN_TEXT = re.compile(rb"[-+]?(nan(\(\w*\))?|\d\.#(q?nan|snan|ind)\d*)", re.IGNORECASE)  # TEXT-04
+_INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)  # TEXT-04
+
+
+def kernels() -> ModuleType:
+    """The compiled loops, imported on first use."""
+    return importlib.import_module("mcz.model.numbers.kernels")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Texts:
+    """Texts one after the other: text i is ``buffer[offsets[i]:offsets[i + 1]]``."""
+
+    buffer: NDArray[np.uint8]
+    offsets: Ints
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    def __getitem__(self, index: int) -> bytes:
+        return self.buffer[self.offsets[index] : self.offsets[index + 1]].tobytes()
+
+    def __iter__(self) -> Iterator[bytes]:
+        return iter(self.tolist())
+
+    def equal(self, other: Texts) -> Bools:
+        """Mask of the equal texts; both have the same number of texts."""
+        same_length = np.array_equal(self.offsets, other.offsets)
+        if same_length and np.array_equal(self.buffer, other.buffer):
+            return np.ones(len(self), np.bool_)
+        sizes = np.diff(self.offsets)
+        same: Bools = sizes == np.diff(other.offsets)
+        chosen = np.flatnonzero(same & (sizes > 0))
+        if len(chosen):
+            n = sizes[chosen]
+            first = np.cumsum(n) - n
+            within = np.arange(first[-1] + n[-1]) - np.repeat(first, n)
+            mine = self.buffer[within + np.repeat(self.offsets[chosen], n)]
+            theirs = other.buffer[within + np.repeat(other.offsets[chosen], n)]
+            same[chosen] = ~np.logical_or.reduceat(mine != theirs, first)
+        return same
+
+    def tolist(self) -> list[bytes]:
+        whole = self.buffer.tobytes()
+        edges = self.offsets.tolist()
+        return [whole[a:b] for a, b in pairwise(edges)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tokens:
+    """Tokens ``text[start[i]:stop[i]]`` and, in ``fields`` (n, 3), how each is written.
+
+    Indexing with a slice, a mask or an array of indices gives the Tokens chosen.
+    """
+
+    text: NDArray[np.uint8]
+    start: Ints
+    stop: Ints
+    fields: Ints  # columns as in mcz.model.numbers.kernels
+    known: list[Floats] = field(default_factory=list, repr=False)  # the values, once they are asked
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def __getitem__(self, index: Any) -> Tokens:
+        if isinstance(index, int | np.integer):
+            raise TypeError("a single token is a slice of one, or token(i)")
+        fields = np.ascontiguousarray(self.fields[index])  # the rest is seldom looked at
+        known = [values[index] for values in self.known]
+        return Tokens(self.text, self.start[index], self.stop[index], fields, known)
+
+    def token(self, index: int) -> bytes:
+        """The text of one token."""
+        return self.text[self.start[index] : self.stop[index]].tobytes()
+
+    def texts(self) -> Texts:
+        """The texts of all tokens, copied out of the buffer."""
+        sizes = self.stop - self.start
+        offsets = np.concatenate(([0], np.cumsum(sizes)))
+        indices = np.arange(offsets[-1]) + np.repeat(self.start - offsets[:-1], sizes)
+        return Texts(self.text[indices], offsets)
+
+    def bad(self) -> Bools:
+        """Mask of the tokens that are no numbers; nan and inf are numbers here."""
+        bad: Bools = (self.fields[:, 2] & kernels().BAD) != 0
+        return bad
+
+    def values(self) -> Floats:
+        """The nearest binary64 of each token; SourceError names the first that is no number."""
+        if not self.known:
+            self.known.append(self._values())
+        return self.known[0].copy()
+
+    def _values(self) -> Floats:
+        loops = kernels()
+        out, slow = np.empty(len(self)), np.zeros(len(self), np.bool_)
+        if not loops.values(self.fields, TENS, out, slow):
+            return out
+        odd = np.flatnonzero(slow)
+        hard = self[odd]
+        bad = np.flatnonzero(hard.bad())
+        if len(bad):
+            first = int(bad[0])
+            raise SourceError(
+                f"{hard.token(first)[:40]!r} is not a number", offset=hard.start[first]
+            )
+        special = hard.fields[:, 2] & loops.SPECIAL != 0
+        texts = zip(hard.texts().tolist(), special.tolist(), strict=True)
+        out[odd] = [_value(text) if is_special else float(text) for text, is_special in texts]
+        return out
+
+
+def scan(
+    text: bytes | memoryview | NDArray[np.uint8],
+    start: Sequence[int] | Ints,
+    stop: Sequence[int] | Ints,
+) -> Tokens:
+    """Describe the tokens ``text[start[i]:stop[i]]`` of a buffer; a view of it is kept."""
+    whole = text.view() if isinstance(text, np.ndarray) else np.frombuffer(text, np.uint8)
+    whole.flags.writeable = False  # nobody writes to it
+    start = np.ascontiguousarray(start, np.int64)
+    stop = np.ascontiguousarray(stop, np.int64)
+    if len(start) != len(stop) or (
+        len(start) and not (start.min() >= 0 and (start <= stop).all() and stop.max() <= len(whole))
+    ):
+        raise IndexError(f"tokens outside of a text of {len(whole)} bytes")
+    loops = kernels()
+    fields = np.empty((len(start), 3), np.int64)
+    n_bad = loops.scan(whole, start, stop, fields)
+    tokens = Tokens(whole, start, stop, fields)
+    for index in np.flatnonzero(fields[:, 2] & loops.BAD).tolist() if n_bad else ():
+        if not np.isfinite(_value(tokens.token(index), fallback=0.0)):
+            fields[index, 2] = loops.SPECIAL
+    return tokens
+
+
+def scan_texts(texts: Sequence[str]) -> Tokens:
+    """Tokens of texts that stand by themselves."""
+    stop = np.cumsum([len(text) + 1 for text in texts], dtype=np.int64)
+    start = np.concatenate(([0], stop))[:-1]
+    return scan(" ".join((*texts, "")).encode(), start, stop - 1)
+
+
+def values_of_texts(texts: Sequence[bytes]) -> tuple[Floats, Bools]:
+    """The values of texts that stand by themselves, and which are no numbers at all (value 0)."""
+    stop = np.cumsum([len(text) + 1 for text in texts], dtype=np.int64)
+    start = np.concatenate(([0], stop))[:-1]
+    tokens = scan(b" ".join((*texts, b"")), start, stop - 1)
+    bad = tokens.bad()
+    values = np.zeros(len(texts))
+    values[~bad] = tokens[~bad].values()
+    return values, bad
+
+
+def _value(text: bytes, fallback: float | None = None) -> float:
+    """The binary64 of one token, by exact conversion; ``fallback`` for what is no number."""
+    if _NAN_TEXT.fullmatch(text):
+        return float(NAN)
+    if _INF_TEXT.fullmatch(text):
+        return float("-inf" if text[:1] == b"-" else "inf")  # TEXT-04
+    return float(text) if fallback is None else fallback
+
+
+def nearest(mantissa: Ints, power: Ints) -> Floats:
+    """The binary64 nearest to ``mantissa * 10^power``, mantissa >= 0; ties to even."""
+    out, slow = scale(mantissa, power)
+    if slow.any():
+        pairs = zip(mantissa[slow].tolist(), power[slow].tolist(), strict=True)
+        out[slow] = [float(f"{m}e{p}") for m, p in pairs]
+    return out
+
+
+def scale(mantissa: Ints, power: Ints) -> tuple[Floats, Bools]:
+    """``mantissa * 10^power`` in binary64, and where that may not be the nearest.
+
+    One product or quotient of two exact factors is correctly rounded: they are exact where the
+    mantissa is at most 2^53 and the power at most 22 either way.
+    """
+    out = mantissa.astype(np.float64)
+    np.divide(out, TENS[np.clip(-power, 0, EXACT_POWER)], out=out)
+    if power.max(initial=0) > 0:
+        np.multiply(out, TENS[np.clip(power, 0, EXACT_POWER)], out=out)
+    slow = (mantissa > 2**53) | (np.abs(power) > EXACT_POWER)
+    return out, slow & (mantissa != 0)

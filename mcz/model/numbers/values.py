@@ -1,0 +1,115 @@
+"""Values and ordinals of a whole matrix, whose channels have grids of their own."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.kernels import SPARE, lacks_compiled_kernels
+from mcz.model.numbers import textgrids
+from mcz.model.numbers.blocks import grid_blocks
+from mcz.model.numbers.grid import Grid
+from mcz.model.numbers.magnitudes import POWERS
+from mcz.model.numbers.rules import DECIMAL_KINDS, MIN_POWER, GridKind
+from mcz.model.numbers.tokens import TENS, Bools, Floats, Ints
+from mcz.model.types import Values
+
+Bytes = NDArray[np.uint8]
+
+
+def values_of(
+    ordinals: Values,
+    grids: Sequence[Grid],
+    changes: Sequence[tuple[int, int, Grid]] = (),
+    out: Values | None = None,
+) -> Floats:
+    """The binary64 of each ordinal, (rows, channels); see ``Signal.grid_changes``.
+
+    As ``Grid.values`` gives them, and refuses them. They go to ``out`` where that is given.
+    """
+    values = np.empty(ordinals.shape) if out is None else np.asarray(out, np.float64)
+    if not changes and ordinals.flags.c_contiguous:
+        left = np.ones(len(grids), np.int64)
+        if not lacks_compiled_kernels():
+            left[:] = 0
+            _kernels("value").fill(ordinals, _rules(tuple(grids)), TENS, values, left)
+        for grid, columns in _left(left, grids):
+            values[:, columns] = grid.values(ordinals[:, columns])
+        return values
+    for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
+        values[rows, columns] = grid.values(ordinals[rows][:, columns])
+    return values
+
+
+def ordinals_of(values: Values, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
+    """The ordinal of each value, (rows, channels), and whether it gives exactly this value back.
+
+    As ``Grid.ordinals`` finds them.
+    """
+    values = np.ascontiguousarray(values, np.float64)
+    ordinals, exact = np.empty(values.shape, np.int64), np.empty(values.shape, np.uint8)
+    left = np.zeros(len(grids), np.int64)
+    _kernels("ordinal").fill(values, _rules(tuple(grids)), TENS, POWERS, ordinals, exact, left)
+    for grid, columns in _left(left, grids):
+        ordinals[:, columns], exact[:, columns] = grid.ordinals(values[:, columns])
+    return ordinals, exact.view(np.bool_)
+
+
+def print_values(
+    values: Values, grids: Sequence[Grid], base: int, start: Ints, size: Ints
+) -> Bytes:
+    """The texts of the numbers nearest to values, (rows, channels), on their decimal grids.
+
+    ``start``, counted from ``base``, and ``size`` say where each lies, but not of other grids,
+    of values beyond their grid, and of those that no product or quotient of tens gives.
+    """
+    loops = _kernels("print")
+    rules = {grid: _print_rule(grid) for grid in dict.fromkeys(grids)}
+    of_channels = np.array([rules[grid] for grid in grids], np.int64).reshape(-1, loops.RULE_SIZE)
+    out = np.empty(values.size * textgrids.WIDEST + SPARE, np.uint8)
+    numbers = np.asarray(values, np.float64)
+    used = loops.fill(numbers, of_channels, TENS, POWERS, out, base, start, size)
+    return out[:used].copy()
+
+
+def _print_rule(grid: Grid) -> tuple[int, ...]:
+    """The rules by which the compiled loop prints numbers of a grid."""
+    loops = _kernels("value")
+    if grid.kind not in DECIMAL_KINDS:
+        return loops.OTHER, *[0] * 7
+    digits, *exponents = textgrids.exponents(grid.kind, grid.digits)
+    trim = int(grid.kind != GridKind.FIXED)
+    return digits, grid.digits, grid.limit, trim, *exponents, grid.flags, 0
+
+
+def _left(left: Ints, grids: Sequence[Grid]) -> Iterator[tuple[Grid, list[int]]]:
+    """The channels that a compiled loop left, by grid."""
+    others = np.flatnonzero(left).tolist()
+    for grid in dict.fromkeys(grids[c] for c in others):
+        yield grid, [c for c in others if grids[c] == grid]
+
+
+@lru_cache(maxsize=64)
+def _rules(grids: tuple[Grid, ...]) -> Ints:
+    """Conversion rules of each grid for the kernel."""
+    loops = _kernels("value")
+    rules = np.empty((len(grids), loops.RULE_SIZE), np.int64)
+    for rule, grid in zip(rules, grids, strict=True):
+        match grid.kind:
+            case GridKind.GENERAL:
+                rule[:] = grid.digits, MIN_POWER + 1 - grid.digits, grid.limit
+            case GridKind.FIXED | GridKind.TRIMMED:
+                rule[:] = loops.FIXED, grid.digits, grid.limit
+            case _:
+                rule[:] = loops.OTHER, 0, 0
+    return rules
+
+
+def _kernels(what: str) -> ModuleType:
+    """The compiled loops, imported on first use."""
+    return importlib.import_module(f"mcz.model.numbers.{what}_kernels")

@@ -1,0 +1,214 @@
+"""Records: every structure of the format, declared once, as a dataclass over a construct schema.
+
+::
+
+    class Head(Record):
+        "HEAD, the first chunk."
+
+        major: int = field(Int8ul, "format version of the writer, major")
+        extension: bytes = field(EXTENSION, "ignored, kept", default=b"")
+
+    parse(Head, payload, "HEAD").major
+    build(Head(major=1), "HEAD")
+
+The type after the colon is that of the value; the first argument of ``field`` is how construct
+reads and writes it, with its bounds; the second is its meaning in the table of SPEC.md. ``parse``
+and ``build`` are the one door to construct: what it refuses becomes an error of ours that names
+the field and the value. SPEC.md, "Conventions", is normative.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from io import BytesIO
+from itertools import takewhile
+from typing import Any, TypeVar, cast, dataclass_transform
+
+import construct
+from construct.core import CodeGen
+
+from mcz.errors import FormatError, MczError, TruncatedError
+from mcz.model.schema.types import CheckedBeside, Exactly, Kind, as_construct, field_path
+
+COMPILED_FROM = 4096  # bytes from which a schema is worth compiling, some milliseconds
+# What a value raises that is none of a field: of another type, too large, not there.
+NO_VALUE = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, struct.error)
+
+
+def field(kind: Kind, docs: str, *, default: Any = dataclasses.MISSING) -> Any:
+    """A field of a record: its construct type, and its meaning, with units and bounds.
+
+    ``kind`` may be a record, too.
+    """
+    metadata = {"construct": kind, "docs": docs}
+    if isinstance(default, list):
+        return dataclasses.field(default_factory=lambda: list(default), metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclass_transform(kw_only_default=True, field_specifiers=(field,))
+class Record:
+    """A structure of the format; its fields are those of its subclass, given by keyword."""
+
+    def __init_subclass__(cls) -> None:
+        dataclasses.dataclass(kw_only=True)(cls)
+
+    @classmethod
+    @cache
+    def construct_type(cls, before: str | None = None) -> RecordType:
+        """The construct type of the record, or of its fields before ``before`` alone."""
+        return RecordType(cls, before)
+
+    @classmethod
+    @cache
+    def compiled_type(cls, before: str | None = None) -> construct.Construct:
+        """The same, compiled: it reads faster, and does not know which field is at fault."""
+        return RecordType(cls, before).compile()
+
+
+R = TypeVar("R", bound=Record)
+T = TypeVar("T")
+
+
+class RecordType(construct.Adapter):
+    """Construct's Struct of the fields of ``record``, whose values are records."""
+
+    def __init__(self, record: type[Record], before: str | None = None) -> None:
+        self.record, self.is_whole = record, before is None
+        rows = [(f.name, as_construct(f.metadata["construct"])) for f in _fields(record)]
+        self.rows = list(takewhile(lambda row: row[0] != before, rows))
+        super().__init__(construct.Struct(*(name / item for name, item in self.rows)))
+
+    def made(self, **values: object) -> Record:
+        """The record of these values; of the first fields alone, the others are not there."""
+        if self.is_whole:
+            return self.record(**values)
+        record = object.__new__(self.record)
+        vars(record).update(values)
+        return record
+
+    def _decode(self, obj: construct.Container, context: construct.Container, path: str) -> Record:
+        return self.made(**{name: obj[name] for name, _ in self.rows})
+
+    def _encode(self, obj: Record, context: construct.Container, path: str) -> dict[str, object]:
+        return {name: getattr(obj, name) for name, _ in self.rows}
+
+    def _emitparse(self, code: CodeGen) -> str:
+        """Emit a function that reads the fields, with a context of theirs where one is needed."""
+        code.linkedinstances[id(self)] = self.record if self.is_whole else self.made
+        lines = [f"def parse_{id(self)}(io, this):"]
+        has_context = any(_looks_back(item) for _, item in self.rows)
+        if has_context:
+            lines.append("    states = dict(_parsing=True, _building=False, _sizing=False)")
+            lines.append("    this = Container(_=this, _params=this['_params'], **states)")
+        for name, item in self.rows:
+            kept = f"{name} = this[{name!r}]" if has_context else name
+            lines.append(f"    {kept} = {item._compileparse(code)}")
+        names = ", ".join(f"{name}={name}" for name, _ in self.rows)
+        lines.append(f"    return linkedinstances[{id(self)}]({names})")
+        code.append("\n".join(lines))
+        return f"parse_{id(self)}(io, this)"
+
+
+def _looks_back(item: construct.Construct) -> bool:
+    """Return whether a type needs the fields before it."""
+    if isinstance(item, Exactly):
+        return callable(item.length)
+    return isinstance(item, construct.IfThenElse | CheckedBeside)
+
+
+def parse(record: type[R], data: bytes, where: str, limits: Mapping[str, int] | None = None) -> R:
+    """The record of ``data``, all of which it must consume.
+
+    ``limits`` says how many items of some kinds, see ``Counted``, there may be in all. Raises
+    TruncatedError, LimitError or FormatError; ``where`` opens the message.
+    """
+
+    def read(schema: construct.Construct) -> R:
+        stream = BytesIO(data)
+        found = schema.parse_stream(stream, left=dict(limits or {}))
+        if stream.tell() < len(data):  # CONV-12
+            raise FormatError(f"{len(data) - stream.tell()} bytes behind its end")
+        return cast(R, found)
+
+    return _read(read, record, where, compiled=len(data) >= COMPILED_FROM)
+
+
+def parse_until(record: type[R], data: bytes, where: str, before: str) -> R:
+    """The record of ``data`` with the fields before ``before`` alone; the others are not there.
+
+    For a look at many records. Raises what ``parse`` does of these fields.
+    """
+
+    def read(schema: construct.Construct) -> R:
+        return cast(R, schema.parse_stream(BytesIO(data)))
+
+    return _read(read, record, where, before=before, compiled=True)
+
+
+def parse_all(record: type[R], data: bytes, where: str) -> list[R]:
+    """The records that ``data`` is, one behind the other; raises what ``parse`` does."""
+
+    def read(schema: construct.Construct) -> list[R]:
+        stream, found = BytesIO(data), []
+        while stream.tell() < len(data):
+            found.append(schema.parse_stream(stream))
+        return found
+
+    return _read(read, record, where, compiled=len(data) >= COMPILED_FROM)
+
+
+def _read(
+    read: Callable[[construct.Construct], T],
+    record: type[Record],
+    where: str,
+    *,
+    before: str | None = None,
+    compiled: bool,
+) -> T:
+    """Read with the compiled schema, if asked to, and with the plain one where that fails."""
+    if compiled:
+        try:
+            return read(record.compiled_type(before))
+        except (MczError, construct.ConstructError, *NO_VALUE):
+            pass  # the plain one knows which field is at fault
+    with _our_errors(where):
+        return read(record.construct_type(before))
+
+
+def build(record: Record, where: str) -> bytes:
+    """The bytes of ``record``; raises FormatError where its schema does not admit a value."""
+    with _our_errors(where):
+        return bytes(record.construct_type().build(record))
+
+
+@contextmanager
+def _our_errors(where: str) -> Iterator[None]:
+    """Turn errors of construct into ours, which say the field at fault."""
+    try:
+        yield
+    except construct.StreamError as error:  # CONV-13
+        raise TruncatedError(_message(error), where=_place(where, error)) from None
+    except construct.ConstructError as error:
+        raise FormatError(_message(error), where=_place(where, error)) from None
+    except MczError as error:
+        error.add(where=where)
+        raise
+    except NO_VALUE as error:
+        raise FormatError(f"{type(error).__name__}: {error}", where=where) from None
+
+
+def _message(error: construct.ConstructError) -> str:
+    return str(error).partition("\n")[2] or str(error)
+
+
+def _place(where: str, error: construct.ConstructError) -> str:
+    return ": ".join(filter(None, (where, field_path(error.path or ""))))
+
+
+def _fields(record: type[Record]) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(record)  # type: ignore[arg-type]  # __init_subclass__ made it one

@@ -1,0 +1,306 @@
+"""A signal: values of some channels over time, their grids, marks and exceptions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from operator import itemgetter
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.model import text_format
+from mcz.model.checks import (
+    INTEGER,
+    NAME,
+    Rule,
+    array_of,
+    check_fields,
+    of_type,
+    one_of,
+    optional,
+    several,
+)
+from mcz.model.numbers import Grid, GridKind, ordinals_of
+from mcz.model.numbers.blocks import grid_blocks
+from mcz.model.numbers.exceptions import Exceptions
+from mcz.model.numbers.scaling import Scaling
+from mcz.model.skeleton import CHANNELS, Channel
+from mcz.model.types import Values
+
+ROLES = (
+    "",
+    "motion",
+    "times",
+    "residuals",
+    "analog",
+    "outputs",
+    "rotations",
+    "confidence",
+)  # by id
+
+
+class Sampled(Protocol):
+    """The facts of a signal, in memory or in a file, that say whether its rows are poses."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...] | None: ...
+    @property
+    def samples_per_frame(self) -> int: ...
+    @property
+    def has_poses(self) -> bool: ...
+
+
+def check_poses(name: str, signal: Sampled) -> None:
+    """Raise MotionError where the rows of the first signal of ``name`` are no poses of frames."""
+    if not signal.has_poses:
+        raise MotionError("its channels are not those of its skeleton", clip=name)
+    if signal.samples_per_frame != 1:
+        raise MotionError(
+            f"{signal.samples_per_frame} samples a frame are not one pose a frame", clip=name
+        )
+
+
+def _grid_change(value: Any) -> tuple[int, int, Grid]:
+    row, channel, grid = value
+    return INTEGER.form(row), INTEGER.form(channel), GRID.form(grid)
+
+
+GRID = of_type(Grid, "a Grid")
+MASK = array_of("b1", 2, "a bool for each value")
+VALUES = array_of("f8 i8", 2, "float64 or int64 of two dimensions (2-D)")
+SIGNAL = {
+    "name": NAME,
+    "values": VALUES,
+    "grids": several(GRID, "Grids"),
+    "samples_per_frame": INTEGER,
+    "mask": optional(MASK),
+    "exceptions": of_type(Exceptions, "Exceptions"),
+    "grid_changes": several(Rule("", _grid_change), "rows, channels and Grids"),
+    "channels": optional(CHANNELS),
+    "ordinals": optional(array_of("i8", 2, "int64 of two dimensions")),
+    "scaling": optional(of_type(Scaling, "a Scaling")),
+    "stored": optional(VALUES),
+    "role": optional(one_of(ROLES)),
+    "of": optional(INTEGER),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """Values of some channels over time.
+
+    ``values`` has shape (n_frames * samples_per_frame, n_channels): binary64 in source units, or
+    int64 where every grid is INTEGER. ``grids`` has one grid a channel; ``grid_changes`` lists
+    (row, channel, grid) from that row on. ``mask`` (bool, same shape) is True where the value is
+    valid; None means valid everywhere. Stored coordinates are kept beneath an invalid mark.
+
+    Where the file stores other numbers than it means (words of a converter), ``scaling`` says what
+    they mean, ``values`` are binary64 in units, and ``stored`` are the numbers of the file, which
+    grids, grid changes, exceptions and ordinals speak of. Elsewhere ``stored`` are the values.
+
+    ``role`` is one of ``ROLES``, names of the registry in the order of their ids; None until the
+    signal is in a Motion, whose first signal then is its "motion" and any other has none, "".
+    ``of`` is the index of the signal whose "residuals" these are.
+    """
+
+    values: Values
+    grids: tuple[Grid, ...] = ()
+    name: str = "motion"
+    samples_per_frame: int = 1
+    mask: NDArray[np.bool_] | None = None
+    exceptions: Exceptions = field(default_factory=Exceptions)
+    grid_changes: tuple[tuple[int, int, Grid], ...] = ()
+    channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
+    ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
+    scaling: Scaling | None = None
+    stored: Values = None  # type: ignore[assignment]  # set below where it is not given
+    role: str | None = None
+    of: int | None = None
+
+    __repr__ = text_format.signal_text
+
+    def __post_init__(self) -> None:
+        if type(self.values) is not np.ndarray and isinstance(self.values, np.ma.MaskedArray):
+            self._take_mask(self.values)
+        check_fields(self, SIGNAL)
+        if self.scaling is None or self.stored is None:
+            object.__setattr__(self, "stored", self.values)
+        if self.stored.shape != self.values.shape:
+            raise MotionError(f"signal {self.name!r}: stored numbers do not match the values")
+        if not self.grids:
+            kind = GridKind.BINARY64 if self.stored.dtype == np.float64 else GridKind.INTEGER
+            object.__setattr__(self, "grids", (Grid(kind),) * self.n_channels)
+        if len(self.grids) != self.n_channels:
+            raise MotionError(
+                f"signal {self.name!r}: {len(self.grids)} grids, {self.n_channels} channels"
+            )
+        integers = self.n_channels > 0 and all(g.kind == GridKind.INTEGER for g in self.grids)
+        if integers != (self.stored.dtype == np.int64):
+            raise MotionError(
+                f"signal {self.name!r}: {self.stored.dtype} values on {self.grids[:1]}"
+            )
+        if self.samples_per_frame < 1 or len(self.values) % self.samples_per_frame:
+            raise MotionError(
+                f"signal {self.name!r}: {len(self.values)} rows at {self.samples_per_frame} a frame"
+            )
+        self._check_order()
+        for name, array in (("ordinals", self.ordinals), ("mask", self.mask)):
+            if array is not None and array.shape != self.values.shape:
+                raise MotionError(f"signal {self.name!r}: {name} does not match the values")
+        if self.channels is not None and len(self.channels) != self.n_channels:
+            raise MotionError(
+                f"signal {self.name!r}: {len(self.channels)} channels, {self.n_channels} columns"
+            )
+        if self.scaling is not None:
+            self.scaling.check(self.n_channels)
+
+    def _take_mask(self, values: np.ma.MaskedArray[Any, Any]) -> None:
+        """Let what a masked array masks be invalid; its numbers are kept beneath."""
+        valid = ~np.ma.getmaskarray(values)
+        object.__setattr__(self, "values", values.data)
+        if self.mask is not None:
+            valid = valid & MASK.form(self.mask)
+        object.__setattr__(self, "mask", valid)
+
+    def _check_order(self) -> None:
+        """Exceptions and grid changes lie in the signal, exceptions in order."""
+        rows, channels = self.exceptions.rows, self.exceptions.channels
+        cells = rows * max(1, self.n_channels) + channels
+        inside = (rows >= 0) & (rows < self.n_rows) & (channels >= 0) & (channels < self.n_channels)
+        if not inside.all() or (np.diff(cells) <= 0).any():
+            raise MotionError(f"signal {self.name!r}: exceptions outside of it or out of order")
+        for row, channel, grid in self.grid_changes:
+            whole = row >= 0 and row % self.samples_per_frame == 0
+            if not (whole and 0 <= channel < self.n_channels):
+                raise MotionError(f"signal {self.name!r}: grid change at {row}, {channel}")
+            if (grid.kind == GridKind.INTEGER) != (self.stored.dtype == np.int64):
+                raise MotionError(f"signal {self.name!r}: {self.stored.dtype} values on {grid}")
+        changes = sorted(self.grid_changes, key=itemgetter(0))
+        if len(rows) and not all(g.is_text for g in (*self.grids, *(c[2] for c in changes))):
+            is_text = np.array([grid.is_text for grid in self.grids])[channels]
+            for row, channel, grid in changes:
+                is_text[(channels == channel) & (rows >= row)] = grid.is_text
+            if not is_text.all():
+                raise MotionError(f"signal {self.name!r}: exceptions on a grid without text")
+
+    @property
+    def has_poses(self) -> bool:
+        """True of a motion whose channels are those of the skeleton."""
+        return self.role == "motion" and self.channels is None
+
+    @property
+    def n_rows(self) -> int:
+        return int(self.values.shape[0])
+
+    @property
+    def n_channels(self) -> int:
+        return int(self.values.shape[1])
+
+    @property
+    def n_frames(self) -> int:
+        return self.n_rows // self.samples_per_frame
+
+    def grid_blocks(self) -> Iterator[tuple[slice, list[int], Grid]]:
+        """Blocks (rows, columns, grid) that cover the signal, each of one grid."""
+        return grid_blocks(self.n_rows, self.grids, self.grid_changes)
+
+    def cut(self, start: int, stop: int) -> Signal:
+        """Frames start <= f < stop alone, with the grids that are in force there."""
+        first, last = start * self.samples_per_frame, stop * self.samples_per_frame
+        grids, changes = list(self.grids), []
+        for row, channel, grid in sorted(self.grid_changes, key=itemgetter(0)):
+            if row <= first:
+                grids[channel] = grid
+            elif row < last:
+                changes.append((row - first, channel, grid))
+        low, high = np.searchsorted(self.exceptions.rows, (first, last)).tolist()
+        return replace(
+            self,
+            values=self.values[first:last],
+            grids=tuple(grids),
+            mask=None if self.mask is None else self.mask[first:last],
+            exceptions=Exceptions(
+                self.exceptions.rows[low:high] - first,
+                self.exceptions.channels[low:high],
+                self.exceptions.texts[low:high],
+            ),
+            grid_changes=tuple(changes),
+            ordinals=None if self.ordinals is None else self.ordinals[first:last],
+            stored=self.stored[first:last],
+        )
+
+    def of_columns(self, columns: Sequence[int]) -> Signal:
+        """These columns alone, in the order given, each once, with their grids and their masks."""
+        chosen = np.array(columns, np.int64)
+        at = np.full(self.n_channels, -1, np.int64)
+        at[chosen] = np.arange(len(chosen))
+        given = self.channels
+        scaling = self.scaling
+        if scaling is not None:
+            scaling = replace(
+                scaling, offsets=scaling.offsets[chosen], scales=scaling.scales[chosen]
+            )
+        return replace(
+            self,
+            values=np.ascontiguousarray(self.values[:, chosen]),
+            grids=tuple(self.grids[column] for column in chosen),
+            mask=None if self.mask is None else np.ascontiguousarray(self.mask[:, chosen]),
+            exceptions=self.exceptions.moved(at),
+            grid_changes=tuple(
+                (row, int(at[column]), grid)
+                for row, column, grid in self.grid_changes
+                if at[column] >= 0
+            ),
+            channels=None if given is None else tuple(given[column] for column in chosen),
+            ordinals=None if self.ordinals is None else self.ordinals[:, chosen],
+            scaling=scaling,
+            stored=np.ascontiguousarray(self.stored[:, chosen]),
+        )
+
+    def in_units(self, scaling: Scaling | None) -> Signal:
+        """The same with ``values`` that mean what ``scaling`` says of the stored numbers."""
+        if scaling is None:
+            return self
+        values = scaling.values(self.stored)
+        return replace(self, values=values, stored=self.stored, scaling=scaling)
+
+    def as_stored(self) -> Signal:
+        """The same with the stored numbers as its values: what codecs and formats want."""
+        if self.scaling is None:
+            return self
+        stored = self.scaling.stored(self.values, self.stored)
+        return replace(self, values=stored, stored=stored, scaling=None)
+
+    def to_ordinals(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The ordinal of every value, and whether it gives exactly this value back.
+
+        A binary grid has many NaNs, of which ``values`` shows only that they are NaN: where
+        ``ordinals`` are given and still mean the value that is there, they are taken.
+        """
+        if self.scaling is not None:
+            return self.as_stored().to_ordinals()
+        if self.ordinals is None and not self.grid_changes:
+            return ordinals_of(self.values, self.grids)
+        ordinals = np.empty(self.values.shape, np.int64)
+        exact = np.empty(self.values.shape, np.bool_)
+        for rows, columns, grid in self.grid_blocks():
+            block = np.ascontiguousarray(self.values[rows][:, columns])
+            found, on_grid = grid.ordinals(block)
+            if self.ordinals is not None:
+                given = np.ascontiguousarray(self.ordinals[rows][:, columns])
+                meant = grid.values(given)
+                same = (meant.view(np.int64) == block.view(np.int64)) | (
+                    np.isnan(meant) & np.isnan(block)
+                )
+                found, on_grid = np.where(same, given, found), on_grid | same
+            ordinals[rows, columns], exact[rows, columns] = found, on_grid
+        return ordinals, exact
+
+    def masked(self) -> Values:
+        """The values with NaN where the mask says invalid."""
+        if self.mask is None:
+            return self.values
+        return np.where(self.mask, self.values, np.nan)

@@ -1,0 +1,289 @@
+"""``mcz.render``: a motion as a film, a still or a sheet of poses."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from mcz.errors import MotionError, OptionError
+from mcz.files.writing.atomic import replacing
+from mcz.hints import Hint, Remark
+from mcz.kinematics.poses.motion_like import Frames, MotionLike, frame_range
+from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
+from mcz.model.clock import Timeline
+from mcz.show.pictures.bodies import Ints
+from mcz.show.pictures.cameras import Viewport
+from mcz.show.pictures.canvases import Canvas
+from mcz.show.pictures.encoders import film
+from mcz.show.pictures.libraries import library
+from mcz.show.pictures.sheets import sheet_drawing, sheet_size
+from mcz.show.pictures.stages import AROUND, Stage, drawing_of, stage_of, words_around
+from mcz.show.pictures.themes import Theme, theme_of
+from mcz.show.pictures.tracks import track_of
+
+FILMS = {".gif": Fraction(25), ".mp4": Fraction(30), ".webm": Fraction(30)}
+STILLS = (".png", ".svg")
+NEEDED = {
+    ".gif": ("matplotlib", "PIL"),
+    ".mp4": ("av", "matplotlib"),  # the extra that has av has both
+    ".webm": ("av", "matplotlib"),
+}
+USUAL_RATE = Fraction(120)  # frames a second where nobody says: that of CMU's AMC files
+SIZE, SIZE_OF_GIF = (640, 640), (480, 480)
+SMALLEST, GREATEST = 64, 4096
+FASTEST = 120  # frames a second of a film
+MOST_POSES = 400
+MOST_PICTURES = 10**6  # of a film
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Rendered:
+    """A written rendering: ``n_pictures`` of ``width`` x ``height``, in ``n_bytes``.
+
+    ``fps`` is None of a still. ``notes`` say what was assumed.
+    """
+
+    path: str
+    n_bytes: int
+    n_pictures: int
+    width: int
+    height: int
+    fps: float | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Options of drawing; ``size`` None: the usual one, ``follow`` None: if needed."""
+
+    view: str = "three-quarter"
+    theme: Theme = field(default_factory=lambda: theme_of("light"))
+    size: tuple[int, int] | None = None
+    follow: bool | None = None
+
+
+def render(
+    moving: MotionLike,
+    path: str | os.PathLike[str],
+    *,
+    frames: Frames = None,
+    sheet: int | None = None,
+    view: str = "three-quarter",
+    theme: str = "light",
+    size: tuple[int, int] | None = None,
+    fps: float | Fraction | None = None,
+    speed: float = 1.0,
+    follow: bool | None = None,
+    rate: float | Fraction | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Rendered:
+    """Draw a Motion or a Clip into ``path``: a film (.gif, .mp4, .webm) or a still (.png, .svg).
+
+    A still is the middle one of ``frames`` (a, b), or with ``sheet`` that many poses, evenly over
+    them. ``view`` "front", "side", "top" or "three-quarter" is from where the figure faces first;
+    ``theme`` "light" or "dark"; ``size`` (width, height) in pixels. A film has ``fps`` pictures a
+    second and plays ``speed`` times as fast as the motion was. ``follow``: the camera goes along;
+    None lets it where the figure would be small otherwise. ``rate`` in frames a second, ``unit``
+    and ``up`` are for motions that do not say theirs; what is assumed else, the result says.
+
+    Raises OptionError, also where a library is not installed, MotionError where there is nothing to
+    draw, ExistsError where ``path`` exists and not ``force``.
+    """
+    suffix = _kind(path, sheet)
+    look = Look(view, theme_of(theme), checked_size(size), follow)
+    notes: list[str] = []
+    if has_no_lengths(moving.skeleton):
+        notes.append(
+            f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
+        )
+    timeline = _timeline(moving, rate)
+    first, stop = frame_range(moving, frames)
+    if first == stop:
+        raise MotionError(f"{moving.name!r} has no frame there: nothing to draw")
+    told = progress or (lambda *_: None)
+    job = _Job(moving, path, look, timeline, (unit, up), force, told, notes)
+    if suffix in FILMS:
+        wanted = _fps(fps, FILMS[suffix])
+        if timeline is None:
+            text = f"its frame rate is unknown: {USUAL_RATE} a second assumed"
+            notes.append(Remark(text, Hint.RATE))
+            shown = drawn_frames(first, stop, USUAL_RATE, wanted, speed)
+        else:
+            shown = first + _shown_at(timeline.cut(slice(first, stop)), wanted, speed)
+        return job.film(shown, wanted, suffix)
+    if sheet is not None:
+        return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
+    return job.still(np.array([(first + stop - 1) // 2], np.int64))
+
+
+def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
+    """The suffix of what is drawn, whose libraries are there; raises OptionError."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in (*FILMS, *STILLS):
+        known = ", ".join((*FILMS, *STILLS))
+        raise OptionError(f"a picture is one of {known}, by its suffix", path=path)
+    if sheet is not None and suffix in FILMS:
+        raise OptionError("a sheet is a .png or a .svg, no film", path=path)
+    if sheet is not None and not 1 <= sheet <= MOST_POSES:
+        raise OptionError(f"a sheet of {sheet} poses: 1 to {MOST_POSES}")
+    for name in NEEDED.get(suffix, ("matplotlib", "PIL")):
+        library(name)  # before any work
+    return suffix
+
+
+def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
+    """``size``; OptionError where a picture cannot have it."""
+    if size is not None and not all(SMALLEST <= each <= GREATEST for each in size):
+        raise OptionError(
+            f"a picture of {size[0]} x {size[1]} pixels: each is {SMALLEST} to {GREATEST}"
+        )
+    return size
+
+
+def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: float) -> Ints:
+    """The frame that each picture of a film shows, the nearest in time; at least one.
+
+    Raises OptionError for a speed that is no positive number.
+    """
+    if not 0 < speed < np.inf:
+        raise OptionError(f"speed {speed:g} is not a number above 0")
+    step = float(rate) * speed / float(fps)
+    wanted = (stop - 1 - first) / step + 1e-9 if step else np.inf
+    if wanted >= MOST_PICTURES:
+        raise OptionError(
+            f"a film of {wanted:.3g} pictures: below {MOST_PICTURES:,}", hint=Hint.FILM
+        )
+    count = max(1, int(wanted) + 1)
+    found: Ints = (first + np.floor(np.arange(count) * step + 0.5)).astype(np.int64)
+    return np.minimum(found, stop - 1)
+
+
+def _shown_at(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
+    """``drawn_frames`` by times: where frames are missing, the one before them stays."""
+    period = timeline.period or 1.0 / USUAL_RATE
+    places = np.rint((timeline.even - timeline.even[0]) / period)
+    rate, known = Fraction(1 / period).limit_denominator(2**20), timeline.rate
+    rate = known if known and abs(float(known) * period - 1) < 1e-6 else rate or Fraction(1, 2**20)
+    shown = drawn_frames(0, int(places[-1]) + 1, rate, fps, speed)
+    return np.asarray(np.searchsorted(places, shown, side="right") - 1, np.int64)
+
+
+def _timeline(moving: MotionLike, rate: float | Fraction | None) -> Timeline | None:
+    """The times of frames, at the motion's or else the caller's rate; None while unknown."""
+    if moving.timeline is not None or rate is None:
+        return moving.timeline
+    if not 0 < rate < np.inf:
+        raise OptionError(f"frame rate {rate} is not positive")
+    known = Fraction(rate).limit_denominator(2**20) or Fraction(1, 2**20)
+    return Timeline(np.arange(moving.n_frames) / float(known), known)
+
+
+def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
+    if fps is None:
+        return usual
+    if not 0 < fps <= FASTEST:
+        raise OptionError(f"{float(fps):g} pictures a second: above 0, up to {FASTEST}")
+    return Fraction(fps).limit_denominator(1001)
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """One picture to make."""
+
+    moving: MotionLike
+    path: str | os.PathLike[str]
+    look: Look
+    timeline: Timeline | None  # None while unknown: no time is shown
+    facts: tuple[str | None, str | None]  # unit and up axis of a motion without
+    force: bool
+    progress: Progress
+    notes: list[str]
+
+    def film(self, frames: Ints, fps: Fraction, suffix: str) -> Rendered:
+        width, height = self.look.size or (SIZE if suffix != ".gif" else SIZE_OF_GIF)
+        if suffix != ".gif":
+            width, height = width // 2 * 2, height // 2 * 2  # as these codecs want it
+        stage = self._stage(frames, width, height, float(fps))
+        canvas = Canvas(width, height, self.look.theme)
+        with replacing(self.path, force=self.force) as stream:
+            with film(stream, suffix[1:], width, height, fps) as taken:
+                for number, (frame, nodes) in enumerate(stage.track):
+                    self.progress(number, len(frames), f"frame {frame}")
+                    words = words_around(stage, width, height, self.moving.name, self._when(frame))
+                    canvas.draw(drawing_of(stage, number, nodes, words))
+                    taken.add(canvas.pixels())
+            size = stream.tell()
+        return self._rendered(size, len(frames), width, height, float(fps))
+
+    def still(self, frames: Ints) -> Rendered:
+        width, height = self.look.size or SIZE
+        stage = self._stage(frames, width, height, 1.0)
+        canvas = Canvas(width, height, self.look.theme)
+        ((frame, nodes),) = stage.track
+        words = words_around(stage, width, height, self.moving.name, self._when(frame))
+        canvas.draw(drawing_of(stage, 0, nodes, words))
+        return self._rendered(self._written(canvas), 1, width, height, None)
+
+    def sheet(self, frames: Ints) -> Rendered:
+        layout = sheet_size(len(frames), self.look.size)
+        port = Viewport(0, 0, *layout.cell)
+        # Each pose is looked at where it is, from the same side and as far.
+        stage = self._stage(frames, *layout.cell, rate=0.0, follow=True, port=port, around=0.6)
+        canvas = Canvas(layout.width, layout.height, self.look.theme)
+        title = f"{self.moving.name}"
+        canvas.draw(sheet_drawing(stage, layout, title, self._when))
+        size = self._written(canvas)
+        return self._rendered(size, len(frames), layout.width, layout.height, None)
+
+    def _stage(
+        self,
+        frames: Ints,
+        width: int,
+        height: int,
+        rate: float,
+        follow: bool | None = None,
+        port: Viewport | None = None,
+        around: float = AROUND,
+    ) -> Stage:
+        track = track_of(self.moving, frames, *self.facts)
+        if track.up_assumed:
+            self.notes.append(Remark(f"its up axis is unknown: {track.up} up assumed", Hint.UP))
+        if port is None:
+            port = Viewport(0, 0.06 * height, width, 0.87 * height)
+        follow = self.look.follow if follow is None else follow
+        return stage_of(track, self.look.theme, self.look.view, port, follow, rate, around)
+
+    def _when(self, frame: int) -> str:
+        if self.timeline is None:
+            return f"frame {frame}"
+        return f"frame {frame}  {self.timeline.even[frame]:.2f} s"
+
+    def _written(self, canvas: Canvas) -> int:
+        """Write a still; its bytes."""
+        with replacing(self.path, force=self.force) as stream:
+            write_still(canvas, stream, Path(self.path).suffix.lower(), self.moving.name)
+            return stream.tell()
+
+    def _rendered(
+        self, size: int, count: int, width: int, height: int, fps: float | None
+    ) -> Rendered:
+        return Rendered(str(self.path), size, count, width, height, fps, tuple(self.notes))
+
+
+def write_still(canvas: Canvas, stream: BinaryIO, suffix: str, title: str) -> None:
+    if suffix == ".svg":
+        canvas.svg(stream, title)
+        return
+    image = library("PIL.Image").fromarray(canvas.pixels())
+    image.save(stream, format="PNG", optimize=True)

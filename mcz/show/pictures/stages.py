@@ -1,0 +1,159 @@
+"""A frame of a track as a drawing: camera, floor, shadow, figure, and what is written around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcz.kinematics.chain import Floats
+from mcz.show.pictures.bodies import LEFT, RIGHT, known_places
+from mcz.show.pictures.cameras import Camera, Viewport, axes_of, framed
+from mcz.show.pictures.canvases import Drawing, Word
+from mcz.show.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
+from mcz.show.pictures.floors import floor_lines, length_text, square_of
+from mcz.show.pictures.themes import Theme
+from mcz.show.pictures.tracks import Track
+
+ROAM = 1.1  # sizes of the figure that it may move about before the camera follows
+STILL = 0.35  # seconds over which a camera that follows is steadied
+AROUND = 1.25  # of the figure's size, how far the floor reaches beyond it
+ROOM = 0.10  # of its size, left free around the figure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """View of a track's frames; ``targets`` (n_frames, 3), points looked at, or None: one."""
+
+    track: Track
+    theme: Theme
+    camera: Camera
+    targets: Floats | None
+    reach: Floats
+    square: float
+
+    def camera_of(self, number: int) -> Camera:
+        """The camera of the frame of that number in the track."""
+        return self.camera if self.targets is None else self.camera.at(self.targets[number])
+
+    def add(self, shadows: Shapes, figures: Shapes, camera: Camera, nodes: Floats) -> None:
+        """Draw a frame, whose nodes are (n_nodes, 3), as ``camera`` sees it."""
+        body, size = self.track.body, self.track.size
+        pieces = pieces_of(self.track, nodes, self.theme.sides()[body.sides])
+        add_shadow(shadows, camera, pieces, self.track.floor, self.theme)
+        add_figure(figures, camera, pieces, self.theme, size)
+
+    def floor(self, camera: Camera) -> tuple[Floats, Floats]:
+        middle = camera.target[:2]
+        return floor_lines(camera, middle, self.reach, self.track.floor, self.square, self.theme)
+
+    @property
+    def grid_text(self) -> str:
+        return f"grid {length_text(self.square, self.track.unit)}"
+
+
+def stage_of(
+    track: Track,
+    theme: Theme,
+    view: str,
+    port: Viewport,
+    follow: bool | None,
+    rate: float,
+    around: float = AROUND,
+) -> Stage:
+    """Choose a view that shows all of a track; ``rate`` its frames a second,
+    ``around`` how far the floor reaches, of the figure's size.
+
+    With ``follow`` the camera goes along, with None only where the figure would be small otherwise.
+    """
+    axes = axes_of(view, track.forward)
+    known = known_places(track.centers)
+    centers = track.centers[known]
+    travel = (centers.max(axis=0) - centers.min(axis=0))[:2]
+    if follow is None:
+        follow = bool(travel.max() > ROAM * track.size)
+    targets = steadied(track.centers, rate) if follow else None
+    low, high = _box(track, axes, targets)
+    margin = ROOM * track.size
+    camera = framed(axes, low - margin, high + margin, port)
+    if targets is not None:
+        camera_targets = targets + camera.target
+        reach = np.full(2, around * track.size)
+    else:
+        camera_targets, reach = None, travel / 2 + around * track.size
+    square = square_of(track.size, float(reach.max()))
+    return Stage(track, theme, camera, camera_targets, reach, square)
+
+
+def steadied(centers: Floats, rate: float) -> Floats:
+    """Targets of a following camera: ``centers`` (n, 3), gaps bridged and smoothed."""
+    found = centers.copy()
+    frames = np.arange(len(found))
+    known = known_places(found)
+    for axis in range(3):
+        found[:, axis] = np.interp(frames, frames[known], found[known, axis])
+    half = min(int(STILL * rate), len(found) - 1)
+    if half > 0:
+        window = np.hanning(2 * half + 3)[1:-1]
+        padded = np.pad(found, ((half, half), (0, 0)), mode="edge")
+        for axis in range(3):
+            found[:, axis] = np.convolve(padded[:, axis], window / window.sum(), mode="valid")
+    return found
+
+
+def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Floats]:
+    """Extent that the camera must see, along its axes: about ``targets``, or about the origin."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    shown, done = track.body.shown, 0
+    for frames, places in track.blocks():
+        about = 0.0 if targets is None else targets[done : done + len(frames)][:, None]
+        seen = (places[:, shown] - about) @ axes.T
+        centers = (track.centers[done : done + len(frames)][:, None] - about) @ axes.T
+        with np.errstate(invalid="ignore"):
+            near = np.abs(seen - centers).max(axis=2) <= 3 * track.size
+        known = seen[known_places(seen) & near]
+        done += len(frames)
+        if len(known):
+            low, high = np.minimum(low, known.min(axis=0)), np.maximum(high, known.max(axis=0))
+    if not np.isfinite(low).all():
+        middle = np.nan_to_num(track.centers[0] @ axes.T)
+        low, high = middle - track.size / 2, middle + track.size / 2
+    return low, high
+
+
+def words_around(stage: Stage, width: int, height: int, title: str, when: str) -> list[Word]:
+    """Words around a picture."""
+    theme, letter = stage.theme, max(9.0, min(15.0, height / 42))
+    edge = 0.9 * letter
+    top, bottom = height - edge - letter, edge
+    fits = max(4, int((width - 2 * edge) / (0.66 * letter)) - len(when) - 2)
+    words = [
+        Word(edge, top, shortened(title, fits), theme.ink, letter, bold=True),
+        Word(width - edge, top, when, theme.quiet, letter, "right"),
+        Word(width - edge, bottom, stage.grid_text, theme.quiet, letter, "right"),
+    ]
+    x = edge
+    sides = stage.track.body.sides[stage.track.body.shown]
+    if (sides == LEFT).any() and (sides == RIGHT).any():
+        for text, color in (("left", theme.left), ("right", theme.right)):
+            words.append(Word(x, bottom, f"\u25cf {text}", color, letter))
+            x += (len(text) + 2.4) * 0.66 * letter
+    if stage.track.up_assumed:
+        words.append(Word(x, bottom, f"{stage.track.up} up assumed", theme.quiet, letter))
+    return words
+
+
+def shortened(text: str, most: int) -> str:
+    """
+    >>> shortened("walk", 8), shortened("a very long name", 8)
+    ('walk', 'a very …')
+    """
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
+def drawing_of(stage: Stage, number: int, nodes: Floats, words: list[Word]) -> Drawing:
+    """The picture of one frame."""
+    camera = stage.camera_of(number)
+    shadows, figures = Shapes(), Shapes()
+    stage.add(shadows, figures, camera, nodes)
+    return Drawing(stage.floor(camera), shadows.arrays(), figures.arrays(), words)

@@ -1,0 +1,200 @@
+"""One page that holds player, decoder and files: it opens from a disk, and can be mailed."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from mcz.codecs import choose_name, codec_by_name
+from mcz.errors import LimitError, MczError
+from mcz.files.reading.file import File
+from mcz.files.reading.file import open as mcz_open
+from mcz.files.writing.atomic import replacing
+from mcz.hints import Hint, with_hint
+from mcz.kinematics.metrics.diff_document import diff_document
+from mcz.model.text_format import brief
+from mcz.model.types import JsonObject, Params, Target
+from mcz.show.viewing.file_registry import FACTS, Shelf, Shelved
+from mcz.show.viewing.page import Page
+from mcz.show.viewing.tables import deflated, tables_for
+
+MOST_BYTES = 50 * 2**20  # of a page, unless more is asked for: what mail and browsers take
+MOST_COMPARED = 32  # pairs of clips whose figures are put into the page; it finds the rest itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """Contents of a page: these clips, re-encoded if a codec is named."""
+
+    clips: Sequence[str] = ()
+    where: str | None = None
+    codec: str | None = None
+    effort: str | None = None
+    params: Params | None = None
+    max_decoded: int | None = None
+
+    @property
+    def is_coded(self) -> bool:
+        return bool(self.codec or self.effort or self.params)
+
+    @property
+    def is_cut(self) -> bool:
+        return bool(self.clips) or self.where is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Embedded:
+    """A file in a page: its name, its bytes as they are, the number of its clips."""
+
+    name: str
+    size: int
+    n_clips: int
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, slots=True)
+class PageWritten:
+    """A page that was written: its bytes, those of the player alone, and the files in it."""
+
+    size: int
+    player_size: int
+    files: tuple[Embedded, ...]
+
+    __repr__ = brief
+
+
+def write_page(
+    page: Page,
+    shelf: Shelf,
+    target: Target,
+    wanted: Wanted,
+    *,
+    most: int = MOST_BYTES,
+    force: bool = False,
+) -> PageWritten:
+    """Write ``page`` with the files of ``shelf`` in it.
+
+    The page is whole under the target's name, or not there. Raises LimitError where it would have
+    more than ``most`` bytes, and MczError for files that cannot be read, cut or coded so.
+    """
+    given = [file for _, file in shelf.given()]
+    inputs = [file.source for file in given]
+    with replacing(target, force=force, inputs=inputs) as stream, ExitStack() as stack:
+        held, left = {}, most
+        for number, file in enumerate(given):
+            data = _bytes_of(file, shelf, wanted, left)
+            left -= len(data) * 4 // 3
+            held[number] = data, stack.enter_context(_file(data, wanted.max_decoded))
+        files = [file for _, file in held.values()]
+        document: JsonObject = {
+            "files": [
+                {"name": given[number].name, "base64": base64.b64encode(data).decode()}
+                for number, (data, _) in held.items()
+            ],
+            "annex": deflated(set().union(*map(tables_for, files))),
+        }
+        if len(files) > 1:
+            names = [file.name for file in given]
+            document["diffs"] = list(_differences(files, names, shelf))
+        whole = (page.before + element(document) + page.after).encode()
+        if len(whole) > most:
+            raise _too_large(given[-1].name, most)
+        stream.write(whole)
+        found = (Embedded(given[n].name, file.size, len(file)) for n, (_, file) in held.items())
+        return PageWritten(len(whole), len(page.text.encode()), tuple(found))
+
+
+def element(document: Params) -> str:
+    """The element that holds a document; no text in it is markup, and nothing in it runs."""
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="embedded">{text}</script>'
+
+
+def _too_large(name: str, most: int) -> LimitError:
+    return LimitError(f"the page would have more than {most:,} bytes", path=name, hint=Hint.PAGE)
+
+
+def _file(data: bytes, max_decoded: int | None) -> File:
+    """The file in ``data``, in salvage where it is damaged."""
+    try:
+        return mcz_open(data, max_decoded=max_decoded)
+    except MczError:
+        return mcz_open(data, salvage=True, max_decoded=max_decoded)
+
+
+def _bytes_of(file: Shelved, shelf: Shelf, wanted: Wanted, most: int) -> bytes:
+    """The bytes of an ``.mcz`` that is put into the page; raises LimitError beyond ``most``."""
+    target = file.target()
+    if wanted.is_coded:
+        return _coded(target, shelf, wanted)
+    facts = ", ".join(fact for fact in FACTS if shelf.said.get(fact) is not None)
+    if facts and file.kind == "mcz":
+        text = f"{file.name}: copied as it is, without the {facts} that you give"
+        shelf.say(with_hint(text, Hint.NAME_CODEC, shelf.hints))
+    if wanted.is_cut:
+        return _cut(target, shelf, wanted)
+    contents = file.open()
+    try:
+        if contents.size * 4 // 3 > most:
+            raise _too_large(file.name, most)
+        return b"".join(contents.pieces(0, contents.size))
+    finally:
+        contents.close()
+
+
+def _cut(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
+    """Some clips of a file, copied as they are stored."""
+    from mcz.files.editing.extraction import extract
+
+    out = io.BytesIO()
+    extract(
+        target,
+        out,
+        clip=wanted.clips or None,
+        where=wanted.where,
+        salvage=shelf.salvage,
+        max_decoded=wanted.max_decoded,
+        copies=False,
+    )
+    return out.getvalue()
+
+
+def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
+    """The clips that are wanted, coded anew."""
+    from mcz.container.writer import Writer
+    from mcz.files.writing.planning import prepare, under_its_path
+    from mcz.files.writing.tuning import write_motion
+
+    codec, params = codec_by_name(choose_name(wanted.codec, wanted.effort)), wanted.params or {}
+    out = io.BytesIO()
+    with mcz_open(target, salvage=shelf.salvage, max_decoded=wanted.max_decoded) as file:
+        writer = Writer(out, profile=file.container.profile)
+        for clip in file.chosen(wanted.clips or None, wanted.where):
+            motion = shelf.told(clip.motion())
+            prepared = prepare(motion, codec, params, (under_its_path(motion.skeleton),))
+            write_motion(writer, prepared, codec, params)
+        writer.finish()
+    return out.getvalue()
+
+
+def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> Iterator[JsonObject]:
+    """Yield ``mcz diff --by-joint --json`` of every other file against the first."""
+    first, *others = files
+    for other, name in zip(others, names[1:], strict=True):
+        pairs = [(one, one) for one in first.clips if one in other.clips.rows]
+        if len(first) == len(other) == 1:
+            pairs = [(next(iter(first.clips)), next(iter(other.clips)))]
+        found, notes = [], []
+        for a, b in pairs[:MOST_COMPARED]:
+            try:
+                original = shelf.told(first.clips[a].motion())
+                coded = shelf.told(other.clips[b].motion())
+                found.append(diff_document(original, coded, by_joint=True))
+            except MczError as error:
+                notes.append(f"{a}: {error.describe(shelf.hints)}")
+        yield {"a": names[0], "b": name, "clips": found, "notes": notes}

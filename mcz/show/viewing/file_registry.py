@@ -1,0 +1,377 @@
+"""The files of a server: each as an ``.mcz``, the given ones as they are, others when asked for."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import stat
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path, PurePosixPath
+from threading import Lock, RLock
+from typing import BinaryIO, Protocol
+
+from mcz.container.source import ByteSource
+from mcz.errors import (
+    AccessError,
+    LimitError,
+    MczError,
+    OptionError,
+    reason_of,
+)
+from mcz.files.reading.file import open_bytes
+from mcz.files.reading.source_files import SourceOptions
+from mcz.hints import PYTHON_HINTS, Words, worded
+from mcz.model.motion import Motion
+from mcz.model.types import Params
+from mcz.show.viewing.contents import Contents, FarAway, OnDisk
+from mcz.sources import FORMATS, wants_skeleton
+from mcz.sources.text.find import skeletons_around
+
+Say = Callable[[str], None]
+Make = Callable[[BinaryIO], None]  # writes an .mcz
+
+MOST_RESULTS = 16  # files made of a clip in view: the oldest goes when there is one more
+MOST_UPLOADS = 256  # files that the page gave
+MCZ = ".mcz"
+FACTS = ("rate", "unit", "up")  # which files may not say themselves
+REST = 10  # a folder is looked through again after so many times as long as that took
+
+
+class Shelved(Protocol):
+    """A file on the shelf: ``kind`` is the format of what was given, such as "mcz" or "bvh"."""
+
+    name: str
+    kind: str
+    source: str  # the path or URL of what was given
+
+    @property
+    def size(self) -> int | None:
+        """Bytes of the ``.mcz``; None while it is not made."""
+        ...
+
+    def target(self) -> str:
+        """Target for ``mcz.open``, encoded on first use; raises MczError if that fails."""
+        ...
+
+    def open(self) -> Contents:
+        """Its bytes; raises as ``target`` does."""
+        ...
+
+
+class Stored:
+    """An ``.mcz`` on this machine."""
+
+    def __init__(self, name: str, path: Path, kind: str = "mcz") -> None:
+        self.name, self.kind, self.path, self.source = name, kind, path, str(path)
+
+    @property
+    def size(self) -> int | None:
+        try:
+            return self.path.stat().st_size
+        except OSError:
+            return None
+
+    def target(self) -> str:
+        return str(self.path)
+
+    def open(self) -> Contents:
+        return OnDisk(self.path)
+
+
+class Remote:
+    """An ``.mcz`` behind a URL, opened when it is first asked for."""
+
+    kind = "mcz"
+
+    def __init__(self, url: str) -> None:
+        self.name = PurePosixPath(url.partition("?")[0]).name or url
+        self.source, self._tag = url, f'"{secrets.token_hex(8)}"'
+        self._source: ByteSource | None = None
+        self._lock = Lock()
+
+    @property
+    def size(self) -> int | None:
+        return None if self._source is None else self._source.size
+
+    def target(self) -> str:
+        return self.source
+
+    def open(self) -> Contents:
+        with self._lock:
+            if self._source is None:
+                self._source = open_bytes(self.source)
+        return FarAway(self._source, self._tag)
+
+
+class Made:
+    """An ``.mcz`` that is made of ``source`` when it is first asked for, and when that changes."""
+
+    def __init__(self, shelf: Shelf, name: str, kind: str, source: Path, make: Make) -> None:
+        self.name, self.kind = name, kind
+        self.source = str(source)
+        self._shelf, self._make = shelf, make
+        self._lock = Lock()
+        self._stored: Stored | None = None
+        self._error: MczError | None = None
+        self._made_of: object = None
+        self._next_look = 0.0  # monotonic seconds
+
+    @property
+    def size(self) -> int | None:
+        return None if self._stored is None else self._stored.size
+
+    def target(self) -> str:
+        with self._lock:
+            if time.monotonic() >= self._next_look:
+                self._look()
+        if self._error is not None:
+            raise self._error
+        assert self._stored is not None
+        return self._stored.target()
+
+    def _look(self) -> None:
+        """Make it where what it is made of has changed; raises AccessError."""
+        began = time.monotonic()
+        now = _state(Path(self.source), self._shelf.said.get("skeleton"))
+        took = time.monotonic() - began
+        if self._made_of != now:
+            self._run()
+            self._made_of = now
+        if self.kind == "folder":  # pages ask for many ranges, and folders may be large
+            self._next_look = time.monotonic() + REST * took
+
+    def _run(self) -> None:
+        before, self._stored, self._error = self._stored, None, None
+        try:
+            self._stored = Stored(self.name, self._shelf.write(self._make))
+        except MczError as error:
+            error.add(path=self.source)
+            self._error = error
+            self._shelf.say(error.describe(self._shelf.hints))
+        if before is not None:
+            with suppress(OSError):
+                before.path.unlink()
+
+    def open(self) -> Contents:
+        return OnDisk(self.target())
+
+
+def _state(path: Path, skeleton: object = None) -> object:
+    """Stamp that changes with a file, a motion file below a folder, or the ASF of an AMC.
+
+    ``skeleton``: the ASF that was named, or None. Raises AccessError where there is no ``path``.
+    """
+    from mcz.files.editing.folders import files_below, motion_files
+
+    try:
+        is_folder, own = stat.S_ISDIR(path.stat().st_mode), _stamp(path)
+    except OSError as error:
+        raise AccessError(reason_of(error), path=path) from None
+    paths = motion_files(files_below(path, None)[0])[0] if is_folder else [path]
+    takes = {one.parent: one for one in paths if wants_skeleton(one)}
+    around = [found.path for take in takes.values() for found in skeletons_around(take)]
+    if takes and isinstance(skeleton, (str, os.PathLike)) and not is_folder:
+        around = [Path(skeleton)]
+    stamps = {str(one): _stamp(one) for one in (*paths, *around)}
+    return stamps if is_folder else (own, stamps)
+
+
+def _stamp(path: Path) -> tuple[int, int, int] | None:
+    """Time of change, size and number of a file; None if it is gone."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+class Shelf:
+    """Files by number, and the temporary folder of those that were made, gone with ``close``.
+
+    ``said`` is what files do not say themselves: arguments of ``mcz.encode`` such as ``unit``.
+    ``say`` is told, in a line, of what could not be made. ``salvage``: damaged files are read.
+    ``hints`` words the hints of errors.
+    """
+
+    def __init__(
+        self,
+        said: Params | None = None,
+        say: Say | None = None,
+        *,
+        salvage: bool = False,
+        hints: Words = PYTHON_HINTS,
+    ) -> None:
+        self.hints = hints
+        self.said, self.salvage = dict(said or {}), salvage
+        self.say: Say = say or (lambda line: None)
+        self._folder: Path | None = None
+        self._files: dict[int, Shelved] = {}
+        self._n_given = self._n_uploads = self._next = self._n_written = 0
+        self._results: deque[int] = deque()
+        self._lock = RLock()
+        self._is_closed = False
+
+    def __getitem__(self, number: int) -> Shelved:
+        """The file of that number; raises KeyError."""
+        with self._lock:
+            return self._files[number]
+
+    def told(self, motion: Motion) -> Motion:
+        """``motion`` with what is said of files that do not say it; raises OptionError."""
+        rate, unit, up = map(self.said.get, FACTS)
+        options = SourceOptions(rate=rate, unit=unit, up=up)
+        return options.completing(motion)
+
+    def given(self) -> list[tuple[int, Shelved]]:
+        """The files that were there from the beginning, with their numbers."""
+        with self._lock:
+            return list(self._files.items())[: self._n_given]
+
+    def give(self, file: Shelved) -> None:
+        """Add a file that is there from the beginning."""
+        with self._lock:
+            self._n_given += 1
+            self._add(file)
+
+    def _add(self, file: Shelved) -> int:
+        number, self._next = self._next, self._next + 1
+        self._files[number] = file
+        return number
+
+    def upload(self, name: str, kind: str, make: Make) -> tuple[int, Stored]:
+        """Make an ``.mcz`` of what the page gave; raises LimitError where it gave too much."""
+        with self._lock:
+            if self._n_uploads >= MOST_UPLOADS:
+                raise LimitError(f"{MOST_UPLOADS} files were given already; start mcz view anew")
+            self._n_uploads += 1
+        stored = Stored(name, self.write(make), kind)
+        with self._lock:
+            return self._add(stored), stored
+
+    def result(self, name: str, make: Make) -> tuple[int, Stored]:
+        """Make an ``.mcz`` of a clip in view; one of ``MOST_RESULTS`` before it goes."""
+        stored = Stored(name, self.write(make))
+        with self._lock:
+            number = self._add(stored)
+            self._results.append(number)
+            while len(self._results) > MOST_RESULTS:
+                old = self._files.pop(self._results.popleft())
+                assert isinstance(old, Stored)
+                with suppress(OSError):
+                    old.path.unlink()
+        return number, stored
+
+    def write(self, make: Make) -> Path:
+        """A new file of the temporary folder, written by ``make``."""
+        with self._lock:
+            path = self.folder() / f"{self._n_written}{MCZ}"
+            self._n_written += 1
+        try:
+            with path.open("xb+") as stream:
+                make(stream)
+        except BaseException:
+            with suppress(OSError):
+                path.unlink()
+            raise
+        return path
+
+    def folder(self) -> Path:
+        """The temporary folder, which nobody else can read; raises OptionError once closed."""
+        with self._lock:
+            if self._is_closed:
+                raise OptionError("the viewer is closed")
+            if self._folder is None:
+                self._folder = Path(tempfile.mkdtemp(prefix="mcz-view-"))
+            return self._folder
+
+    def spare_folder(self) -> Path:
+        """A new folder below the temporary one, for files that are made into an ``.mcz``."""
+        return Path(tempfile.mkdtemp(dir=self.folder(), prefix="given-"))
+
+    def close(self) -> None:
+        """Take away the temporary folder; what still writes into it finds it gone."""
+        with self._lock:
+            self._is_closed = True
+            folder, self._folder = self._folder, None
+        for _ in range(10):
+            if folder is None or not folder.exists():
+                return
+            shutil.rmtree(folder, ignore_errors=True)
+            if folder.exists():
+                time.sleep(0.05)
+
+
+def put(shelf: Shelf, path: str) -> None:
+    """Put a file, a folder or a URL on the shelf; raises AccessError or OptionError.
+
+    Of a folder these are its ``.mcz`` files, and one archive of all its other motion files.
+    """
+    if "://" in path:
+        if not path.partition("?")[0].lower().endswith(MCZ):
+            raise OptionError("of files far away only those called .mcz can be seen", path=path)
+        shelf.give(Remote(path))
+        return
+    place = Path(path)
+    if path and place.is_dir():
+        _put_folder(shelf, place)
+        return
+    if not (path and place.is_file()):
+        text = "not a file" if path and place.exists() else "no such file"
+        raise AccessError(text, path=path or repr(path))
+    kind = kind_of(place)
+    if kind == "mcz":
+        shelf.give(Stored(place.name, place))
+    else:
+        shelf.give(Made(shelf, place.name, kind, place, lambda out: encode(place, out, shelf.said)))
+
+
+def kind_of(path: Path) -> str:
+    """The format of a file by its suffix; raises OptionError for one that cannot be shown."""
+    suffix = path.suffix.lower()
+    motions = [source_format for source_format in FORMATS.values() if not source_format.is_skeleton]
+    known = {MCZ: "mcz"} | {s: f.name for f in reversed(motions) for s in f.suffixes}
+    if suffix not in known:
+        raise OptionError(f"its suffix is none of {' '.join(sorted(known))}", path=path)
+    return known[suffix]
+
+
+def encode(source: Path, out: BinaryIO, said: Params) -> None:
+    """Write ``source`` as an ``.mcz``, fast."""
+    from mcz.files.writing.file import encode
+
+    skeleton = said.get("skeleton") if wants_skeleton(source) else None
+    encode(source, out, **{**said, "skeleton": skeleton})
+
+
+def _put_folder(shelf: Shelf, folder: Path) -> None:
+    from mcz.files.editing.folders import files_below, motion_files
+
+    paths, _ = files_below(folder, None)
+    for path in paths:
+        if path.suffix.lower() == MCZ:
+            shelf.give(Stored(path.relative_to(folder).as_posix(), path))
+    motions, _ = motion_files(paths)
+    if motions:
+        name = folder.resolve().name or "motions"
+        shelf.give(Made(shelf, name, "folder", folder, lambda out: pack(folder, out, shelf)))
+    elif not shelf.given():
+        raise OptionError("there is no motion file in it", path=folder)
+
+
+def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
+    """Write all motion files below ``folder`` as one ``.mcz``; what cannot be read is said."""
+    from mcz.files.editing.archive import pack
+    from mcz.model import threads
+
+    said = {key: value for key, value in shelf.said.items() if key != "skeleton"}
+    report = pack(folder, out, jobs=threads.processors(), copies=False, **said)
+    for outcome in report.outcomes:
+        if outcome.result == "failed":
+            shelf.say(worded(outcome.message, shelf.hints))
+    if not any(outcome.result == "parsed" for outcome in report.outcomes):
+        raise OptionError("none of its motion files can be read", path=folder)

@@ -1,0 +1,260 @@
+"""Tasks of the server for the page: convert, re-encode, compare, export."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from functools import cache, partial
+from importlib import import_module
+from itertools import islice
+from pathlib import Path
+from threading import BoundedSemaphore, Lock
+from typing import Any, BinaryIO
+
+from mcz.codecs.parameters import Dial
+from mcz.errors import MczError, OptionError
+from mcz.files.reading.clip import Clip
+from mcz.files.reading.file import File
+from mcz.files.reading.file import open as mcz_open
+from mcz.files.reading.source_files import SourceOptions
+from mcz.model.motion import Motion
+from mcz.model.types import JsonObject, Params
+from mcz.show.viewing.file_registry import Shelf, Shelved, encode, kind_of, pack
+from mcz.show.viewing.multipart import Readable, boundary_of, save_files
+from mcz.show.viewing.requests import Refused, object_of, params_of, text_of
+from mcz.sources import FORMATS
+
+MOST_POSTED = 2**30  # bytes of the files that the page may give at once
+MOST_WAITING = 8  # requests that wait for their turn
+MOST_HELD, HELD_BYTES = 2, 2**28  # decoded motions that are at hand, and bytes of each at most
+RATIOS = ("cr_source", "cr_float32", "cr_40B")
+OWN_BASES = "basis"  # the one parameter that may name a file
+
+
+class Work:
+    """The tasks of a server, one at a time: each of them uses all processors by itself."""
+
+    most_posted = MOST_POSTED
+
+    def __init__(self, shelf: Shelf) -> None:
+        self._shelf = shelf
+        self._turn, self._waiting = Lock(), BoundedSemaphore(MOST_WAITING)
+        self._held: deque[tuple[object, Motion]] = deque(maxlen=MOST_HELD)
+
+    @contextmanager
+    def turn(self, is_gone: Callable[[], bool] = lambda: False) -> Iterator[None]:
+        """Wait until it is one's turn; Refused where many wait, or nobody wants it any longer."""
+        if not self._waiting.acquire(blocking=False):
+            raise Refused(503, "too much is asked for at once")
+        try:
+            with self._turn:
+                if is_gone():
+                    raise Refused(499, "nobody waits for the answer")
+                yield
+        finally:
+            self._waiting.release()
+
+    def document(self) -> JsonObject:
+        """First document of the page: ``api.json``."""
+        return {
+            "version": import_module("mcz").__version__,
+            "files": self.files(),
+            "diff": len(self._shelf.given()) == 2,
+            "salvage": self._shelf.salvage,
+            "codecs": lossy_codecs(),
+            "canEncode": True,
+            "canConvert": True,
+            "canGlb": glb_writer() is not None,
+            "suffixes": sorted({suffix for f in FORMATS.values() for suffix in f.suffixes}),
+        }
+
+    def files(self) -> list[JsonObject]:
+        """The files that were given; the size of one that is not made yet is None."""
+        return [
+            {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
+            for number, file in self._shelf.given()
+        ]
+
+    def convert(self, stream: Readable, size: int, content_type: str) -> JsonObject:
+        """Make an ``.mcz`` of the files of a form; of several motions one archive."""
+        boundary = boundary_of(content_type)
+        folder = self._shelf.spare_folder()
+        try:
+            paths = save_files(stream, size, boundary, folder)
+            with self.turn():
+                return self._converted(folder, paths)
+        except OSError as error:
+            raise Refused(507, f"the files could not be kept: {error.strerror}") from None
+        except MczError as error:
+            if error.path is not None:
+                error.path = error.path.removeprefix(f"{folder}{os.sep}")  # which nobody knows
+            raise
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _converted(self, folder: Path, paths: list[Path]) -> JsonObject:
+        motions = [path for path in paths if path.suffix.lower() != ".asf"]
+        if not motions:
+            raise Refused(400, "there is no motion file among what was given")
+        kinds = [kind_of(path) for path in motions]
+        if "mcz" in kinds:
+            raise OptionError("an .mcz needs no converting; the page reads it")
+        if len(motions) == 1:
+            name, kind = motions[0].name, kinds[0]
+            make = partial(encode, motions[0], said=self._shelf.said)
+        else:
+            name, kind = f"{len(motions)} files", "folder"
+            make = partial(pack, folder, shelf=self._shelf)
+        number, stored = self._shelf.upload(name, kind, make)
+        return {"url": url_of(number), "name": name, "size": stored.size}
+
+    def encode(self, asked: Params) -> JsonObject:
+        """Code a clip anew with a codec and its parameters; say what that makes of it."""
+        from mcz.codecs import codec_by_name
+        from mcz.files.reading.sizes import clip_sizes
+        from mcz.files.writing.file import write
+
+        codec, params = text_of(asked, "codec"), params_of(asked)
+        codec_by_name(codec).options(params)
+        refuse_files(params)
+        unit = None if asked.get("unit") is None else text_of(asked, "unit")
+        motion = SourceOptions(unit=unit).applied_to(self._motion(asked))
+        quality: dict[str, str] = {}
+
+        def make(out: BinaryIO) -> None:
+            written = write(motion, out, codec, **params)
+            quality.update(written.clips[0].quality or {})
+
+        began = time.monotonic()
+        number, stored = self._shelf.result(f"{motion.name} ({codec})", make)
+        seconds = time.monotonic() - began
+        with mcz_open(stored.target()) as file:
+            payload = clip_sizes(file.container, file.only_clip()).payload
+        return {
+            "url": url_of(number),
+            "name": stored.name,
+            "size": stored.size,
+            "payload": payload,
+            "quality": quality,
+            "seconds": round(seconds, 3),
+        }
+
+    def diff(self, asked: Params) -> JsonObject:
+        """Compare two clips, as ``mcz diff --by-joint --json`` does."""
+        from mcz.files.reading.differences import document_of
+        from mcz.files.reading.sizes import clip_ratios
+        from mcz.kinematics.metrics.diff_document import diff_document
+
+        sides = [object_of(asked, key) for key in "ab"]
+        ratios = []
+        for side in sides:
+            with self._opened(side) as (file, clip):
+                found = clip_ratios(file, clip)
+                ratios.append({key: found[key] for key in RATIOS})
+        one, other = map(self._motion, sides)
+        document = diff_document(one, other, by_joint=True)
+        document |= {"differences": document_of(one, other)}
+        document |= {"ratios_a": ratios[0], "ratios_b": ratios[1]}
+        names = [self._file(side).name for side in sides]
+        return {"a": names[0], "b": names[1], "clips": [document]}
+
+    def glb(self, asked: Params) -> bytes:
+        """A clip as the bytes of a GLB."""
+        writer = glb_writer()
+        if writer is None:
+            raise Refused(501, "this version writes no GLB")
+        rate = asked.get("rate")
+        found: bytes = writer(self._motion(asked), rate=rate).data
+        return found
+
+    def _file(self, asked: Params) -> Shelved:
+        match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
+        try:
+            return self._shelf[int(match[1]) if match else -1]
+        except KeyError:
+            raise Refused(404, "there is no such file, or no longer") from None
+
+    @contextmanager
+    def _opened(self, asked: Params) -> Iterator[tuple[File, Clip]]:
+        """The file and the clip, by name or by its place in the file, that are asked for."""
+        wanted = asked.get("clip")
+        with mcz_open(self._file(asked).target(), salvage=self._shelf.salvage) as file:
+            if isinstance(wanted, int) and not isinstance(wanted, bool):
+                if not 0 <= wanted < len(file):
+                    raise Refused(404, f"the file has {len(file)} clips, not {wanted}")
+                yield file, next(islice(file, wanted, None))
+            elif wanted is None or isinstance(wanted, str):
+                yield file, file.only_clip(wanted or None)
+            else:
+                raise Refused(400, "clip is neither a name nor a number")
+
+    def _motion(self, asked: Params) -> Motion:
+        """The motion of a clip; those that were decoded last are at hand."""
+        file = self._file(asked)
+        with closing(file.open()) as contents:
+            key = (asked["url"], contents.tag, asked.get("clip"))
+        for held, motion in self._held:
+            if held == key:
+                return motion
+        with self._opened(asked) as (_, clip):
+            motion = clip.motion()
+        motion = self._shelf.told(motion)
+        if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
+            self._held.append((key, motion))
+        return motion
+
+
+def url_of(number: int) -> str:
+    """URL of the file of a number, relative to the page."""
+    return f"files/{number}"
+
+
+@cache
+def lossy_codecs() -> list[JsonObject]:
+    """Lossy codecs for a slider: their parameters, and the range of the dial.
+
+    The keys are those of ``mcz codecs --json``, and ``dial``. The one that is called "lossy" is the
+    first.
+    """
+    from mcz.codecs import CODECS, codec_by_name
+    from mcz.codecs.listing import codec_document
+
+    lossy = sorted(
+        (codec for codec in CODECS.values() if not codec.lossless),
+        key=lambda codec: codec is not codec_by_name("lossy"),
+    )
+    return [codec_document(codec) | {"dial": dial_of(codec.dial)} for codec in lossy]
+
+
+def dial_of(dial: Dial | None) -> JsonObject | None:
+    """The one parameter that trades quality for size, and between what it may lie."""
+    if dial is None:
+        return None
+    return {
+        "parameter": dial.parameter,
+        "low": dial.low,
+        "high": dial.high,
+        "rises": dial.rises,
+        "whole": dial.whole,
+    }
+
+
+def refuse_files(params: Params) -> None:
+    """Raise OptionError for a parameter that names a file of this machine, not one of ours."""
+    name = params.get(OWN_BASES)
+    if isinstance(name, str) and not re.fullmatch(r"[a-z0-9_]{1,40}", name):
+        raise OptionError(f"{OWN_BASES}: the page cannot name files of this machine")
+
+
+def glb_writer() -> Callable[..., Any] | None:
+    """Writer of GLB; None if this version has none."""
+    try:
+        writer: Callable[..., Any] = import_module("mcz.exchange.conversion.scenes").to_glb
+    except ModuleNotFoundError:
+        return None
+    return writer

@@ -1,0 +1,255 @@
+"""The structure of a ZIP archive: its members, and the fields that follow from them.
+
+Members are never inflated, and what their bytes are is no matter here. A ZIP says most things
+twice; where the two disagree about where a member lies, it is refused.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+from mcz.errors import SourceError
+from mcz.sources.arrays.layout import Kind
+
+LOCAL, CENTRAL, END = b"PK\3\4", b"PK\1\2", b"PK\5\6"
+END64, LOCATOR64, DESCRIPTOR = b"PK\6\6", b"PK\6\7", b"PK\7\x08"
+STORED = 0
+ENCRYPTED, DESCRIBED = 1, 8  # flags of a member
+FULL32 = 0xFFFFFFFF  # the number is in the ZIP64 field
+ZIP64 = 1  # id of that extra field
+MAX_MEMBERS = 2**16
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A number at offset ``at`` that says what the bytes from ``start`` to ``stop`` are."""
+
+    at: int
+    kind: Kind
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A member: ``at`` is the offset of its local header, ``start`` and ``stop`` those of its
+    bytes; ``entry`` is that of its entry in the central directory."""
+
+    name: str
+    method: int
+    flags: int
+    at: int
+    start: int
+    stop: int
+    entry: int
+
+    @property
+    def is_stored(self) -> bool:
+        return self.method == STORED and not self.flags & ENCRYPTED
+
+
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """The members of a ZIP in the order of their bytes, and its fields that are true.
+
+    ``wrong``: members whose CRC-32 is another.
+    """
+
+    members: tuple[Member, ...]
+    fields: tuple[Field, ...]
+    wrong: tuple[str, ...]
+
+
+def _number(data: bytes, at: int, size: int) -> int:
+    return int.from_bytes(data[at : at + size], "little")
+
+
+def read_archive(data: bytes) -> Archive:
+    """The structure of a ZIP; raises SourceError, with the offset at fault."""
+    tail, end, start, n_members = _ends(data)
+    entries, at = [], start
+    for _ in range(n_members):
+        member, at = _entry(data, at, end)
+        entries.append(member)
+    _check_names(entries)
+    members = tuple(sorted(entries, key=lambda member: member.at))
+    for one, other in pairwise(members):
+        if one.stop > other.at:
+            raise SourceError(f"members {one.name!r} and {other.name!r} overlap", offset=other.at)
+    if members and members[-1].stop > start:
+        raise SourceError(f"member {members[-1].name!r} overlaps the directory", offset=start)
+    parts = (*_of_members(data, members), *_of_directory(data, start, end, tail))
+    wanted = sorted(parts, key=lambda field: field.at)
+    sums = {
+        (f.start, f.stop): zlib.crc32(memoryview(data)[f.start : f.stop])
+        for f in wanted
+        if f.kind == Kind.CRC
+    }
+    true, wrong, taken = [], set(), 0
+    for field in wanted:
+        size = 8 if field.kind == Kind.SIZE8 else 4
+        is_sum = field.kind == Kind.CRC
+        meant = sums[field.start, field.stop] if is_sum else field.stop - field.start
+        if field.at >= taken and _number(data, field.at, size) == meant:
+            true.append(field)
+            taken = field.at + size
+        elif is_sum and field.at >= start:
+            wrong |= {member.name for member in members if member.start == field.start}
+    return Archive(members, tuple(true), tuple(sorted(wrong)))
+
+
+def _ends(data: bytes) -> tuple[int, int, int, int]:
+    """Find the end record: its offset, the end and the start of the directory, its entries."""
+    low = max(0, len(data) - 22 - 0xFFFF)
+    end = data.rfind(END, low)
+    while end >= 0 and end + 22 + _number(data, end + 20, 2) != len(data):
+        end = data.rfind(END, low, end)
+    if end < 0:
+        raise SourceError("no end of a ZIP directory; no ZIP file, or cut off", offset=len(data))
+    n_members, size, start = (_number(data, end + k, n) for k, n in ((10, 2), (12, 4), (16, 4)))
+    stop = end
+    locator = end - 20
+    if locator >= 0 and data[locator : locator + 4] == LOCATOR64:
+        stop = _number(data, locator + 8, 8)
+        if data[stop : stop + 4] != END64 or stop + 56 > locator:
+            raise SourceError(f"no ZIP64 end of the directory at {stop}", offset=locator + 8)
+        n_members, size, start = (_number(data, stop + k, 8) for k in (32, 40, 48))
+    if start + size != stop:
+        raise SourceError(
+            f"a directory from {start} on of {size} bytes, but it ends at {stop}", offset=end
+        )
+    if n_members > min(MAX_MEMBERS, size // 46):
+        raise SourceError(f"{n_members} members in a directory of {size} bytes", offset=end)
+    return end, stop, start, n_members
+
+
+def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
+    """The member whose entry of the directory is at ``at``, and where the next entry is."""
+    if at + 46 > end or data[at : at + 4] != CENTRAL:
+        raise SourceError("no entry of the directory", offset=at)
+    sizes = [_number(data, at + k, 2) for k in (28, 30, 32)]
+    behind = at + 46 + sum(sizes)
+    if behind > end:
+        raise SourceError("an entry of the directory runs past its end", offset=at)
+    raw = data[at + 46 : at + 46 + sizes[0]]
+    name = raw.decode("utf-8" if _number(data, at + 8, 2) & 0x800 else "cp437", "replace")
+    size, packed, local = (value for value, _, _ in _wide_fields(data, at, sizes))
+    method, flags = _number(data, at + 10, 2), _number(data, at + 8, 2)
+    if local + 30 > len(data) or data[local : local + 4] != LOCAL:
+        raise SourceError(f"member {name!r} has no local header at {local}", offset=at)
+    start = local + 30 + _number(data, local + 26, 2) + _number(data, local + 28, 2)
+    if start + packed > len(data):
+        raise SourceError(f"member {name!r} of {packed} bytes runs past the end", offset=local)
+    member = Member(name, method, flags, local, start, start + packed, at)
+    if member.is_stored and size != packed:
+        raise SourceError(
+            f"member {name!r} is stored, but {packed} bytes are said to be {size}", offset=at
+        )
+    _check_local(data, member, raw)
+    return member, behind
+
+
+def _check_names(members: list[Member]) -> None:
+    """Raise SourceError for names of which NumPy and zipfile make one array."""
+    seen = set()
+    for member in members:
+        name = member.name.partition("\0")[0].removesuffix(".npy")
+        if name in seen:
+            raise SourceError(f"member {name!r} is there twice", offset=member.entry)
+        seen.add(name)
+
+
+def _check_local(data: bytes, member: Member, raw: bytes) -> None:
+    """Raise SourceError where the local header of a member is about something else."""
+    at = member.at
+    if data[at + 30 : at + 30 + _number(data, at + 26, 2)] != raw:
+        raise SourceError(f"member {member.name!r} has another name in its header", offset=at)
+    if _number(data, at + 8, 2) != member.method:
+        raise SourceError(f"member {member.name!r} has two methods", offset=at + 8)
+    packed, where, _ = _local_sizes(data, member)[1]
+    is_open = packed == FULL32 or _number(data, at + 6, 2) & DESCRIBED  # said elsewhere
+    if packed != member.stop - member.start and not is_open:
+        raise SourceError(
+            f"member {member.name!r} has {packed} bytes and {member.stop - member.start}",
+            offset=where,
+        )
+
+
+def _wide_fields(data: bytes, at: int, sizes: list[int]) -> list[tuple[int, int, int]]:
+    """Value, offset and bytes of the two sizes and the place of an entry, size first."""
+    plain = [(at + 24, 4), (at + 20, 4), (at + 42, 4)]
+    return _zip64_numbers(data, plain, at + 46 + sizes[0], sizes[1])
+
+
+def _local_sizes(data: bytes, member: Member) -> list[tuple[int, int, int]]:
+    """Value, offset and bytes of the two sizes of a local header, size first."""
+    at = member.at
+    extra = at + 30 + _number(data, at + 26, 2)
+    return _zip64_numbers(data, [(at + 22, 4), (at + 18, 4)], extra, member.start - extra)
+
+
+def _zip64_numbers(
+    data: bytes, plain: list[tuple[int, int]], extra: int, size: int
+) -> list[tuple[int, int, int]]:
+    """Numbers of 4 bytes, or of the 8 bytes of the extra field that stand for them."""
+    at, stop = _zip64(data, extra, extra + size)
+    numbers = []
+    for where, width in plain:
+        if _number(data, where, 4) == FULL32 and at + 8 <= stop:
+            where, width, at = at, 8, at + 8
+        numbers.append((_number(data, where, width), where, width))
+    return numbers
+
+
+def _zip64(data: bytes, at: int, stop: int) -> tuple[int, int]:
+    """Find the start and end of the ZIP64 field; (0, 0) if there is none."""
+    while at + 4 <= stop:
+        end = at + 4 + _number(data, at + 2, 2)
+        if _number(data, at, 2) == ZIP64:
+            return at + 4, min(end, stop)
+        at = end
+    return 0, 0
+
+
+def _of_members(data: bytes, members: tuple[Member, ...]) -> Iterator[Field]:
+    """The numbers of headers, entries and descriptors that may follow from the members."""
+    for member in members:
+        span = member.start, member.stop
+        sizes = [_number(data, member.entry + k, 2) for k in (28, 30, 32)]
+        yield Field(member.at + 14, Kind.CRC, *span)
+        yield Field(member.entry + 16, Kind.CRC, *span)
+        size, packed, place = _wide_fields(data, member.entry, sizes)
+        for _, at, width in (*_local_sizes(data, member), size, packed):
+            yield Field(at, _of_width(width), *span)
+        yield Field(place[1], _of_width(place[2]), 0, member.at)
+        if member.flags & DESCRIBED:
+            yield from _descriptor(data, member)
+
+
+def _of_directory(data: bytes, start: int, end: int, tail: int) -> Iterator[Field]:
+    """The numbers at the end, at ``tail``, that may follow from a directory."""
+    yield Field(tail + 12, Kind.SIZE4, start, end)
+    yield Field(tail + 16, Kind.SIZE4, 0, start)
+    if data[end : end + 4] == END64:
+        yield Field(end + 40, Kind.SIZE8, start, end)
+        yield Field(end + 48, Kind.SIZE8, 0, start)
+        yield Field(tail - 12, Kind.SIZE8, 0, end)
+
+
+def _descriptor(data: bytes, member: Member) -> Iterator[Field]:
+    """The fields of what may follow the bytes of a member."""
+    span, at = (member.start, member.stop), member.stop
+    at += 4 if data[at : at + 4] == DESCRIPTOR else 0
+    yield Field(at, Kind.CRC, *span)
+    size = member.stop - member.start
+    wide = _number(data, at + 4, 8) == size and _number(data, at + 12, 8) == size
+    width = 8 if wide else 4
+    yield Field(at + 4, _of_width(width), *span)
+    yield Field(at + 4 + width, _of_width(width), *span)
+
+
+def _of_width(width: int) -> Kind:
+    return Kind.SIZE8 if width == 8 else Kind.SIZE4

@@ -1,0 +1,165 @@
+"""The numbers of an array as columns on number grids.
+
+Which grid a column gets is a writer's choice; all bits of a column come back from any of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.model.motion import Channel, Signal
+from mcz.model.numbers import Grid, GridKind
+from mcz.model.types import Items, Values
+from mcz.sources.arrays.header import Head
+
+BINARY32, BINARY64, INTEGER = (
+    Grid(kind) for kind in (GridKind.BINARY32, GridKind.BINARY64, GridKind.INTEGER)
+)
+NANS = {2: 0x7E00, 4: 0x7FC00000, 8: 0x7FF8000000000000}  # the NaN that values have, by bytes
+MOST_DECIMALS = 9  # that are looked for in binary64
+LEAST_OF_MANY = 6  # decimals up to which they are preferred to binary32
+LARGEST = 2.0**51  # magnitudes of decimals are below it
+SAMPLE = 64  # rows that are looked at before all of a column are
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """Columns of one array, (rows, columns), binary64 or int64, and the grid of each.
+
+    ``ordinals`` are there where values do not say them: of NaNs with other bits than usual.
+    """
+
+    values: Values
+    grids: tuple[Grid, ...]
+    ordinals: NDArray[np.int64] | None = None
+
+
+def words_of(data: bytes, head: Head) -> Items:
+    """The numbers of an array as they are stored, a row for each index of its first axis."""
+    order = ">" if head.big_endian else "<"
+    n_words = head.size // int(head.code[1:])
+    words = np.frombuffer(data, order + head.code, n_words, head.start)
+    shaped = words.reshape(head.shape, order="F" if head.by_columns else "C")
+    return shaped.reshape(head.shape[0] if head.shape else 1, -1)
+
+
+def file_columns(head: Head) -> NDArray[np.int64]:
+    """The column of each number of a row, in the order in which the file has them."""
+    inner = head.shape[1:]
+    columns = np.arange(int(np.prod(inner, dtype=np.int64))).reshape(inner)
+    return columns.ravel(order="F" if head.by_columns else "C")
+
+
+def unfit(words: Items) -> str:
+    """Reason why no grid stores such numbers bit for bit, or ""."""
+    kind, size = words.dtype.kind, words.dtype.itemsize
+    if kind == "b":
+        return "a bool that is neither 0 nor 1" if (words.view("u1") > 1).any() else ""
+    if kind in "iu":
+        if size < 8 or not words.size:
+            return ""
+        most = 2**53
+        beyond = int(words.max()) > most or int(words.min()) < -most
+        return "an integer beyond 2^53" if beyond else ""
+    if size == 2:
+        bits = _bits(words)
+        if (np.isnan(words) & (bits != NANS[2])).any():
+            return "a NaN of 16 bits with a payload"
+    return ""
+
+
+def columns_of(words: Items) -> Columns:
+    """The columns of numbers (rows, columns) that are not ``unfit``."""
+    if words.dtype.kind != "f":
+        return Columns(words.astype(np.int64), (INTEGER,) * words.shape[1])
+    with np.errstate(invalid="ignore"):  # of NaNs that signal
+        values = np.require(words, np.float64, ("C", "A"))  # members lie at any offset
+    grids = (BINARY32,) * words.shape[1] if words.dtype.itemsize < 8 else _grids_of(values)
+    nan = np.isnan(values)
+    if not nan.any() or words.dtype.itemsize == 2:
+        return Columns(values, grids)
+    bits = _bits(words)
+    if (bits[nan] == NANS[words.dtype.itemsize]).all():
+        return Columns(values, grids)
+    grid = BINARY32 if words.dtype.itemsize == 4 else BINARY64
+    values = np.where(nan, np.nan, values)  # of one NaN, whatever its bits were
+    return Columns(values, (grid,) * len(grids), grid.ordinals_of_bits(bits))
+
+
+def _bits(words: Items) -> Items:
+    """The bits of floats, in this machine's order."""
+    plain = np.ascontiguousarray(words, words.dtype.newbyteorder("<"))
+    return plain.view(f"<u{words.dtype.itemsize}")
+
+
+def _grids_of(values: NDArray[np.float64]) -> tuple[Grid, ...]:
+    """The grid of each column of binary64: decimals where all are short, else binary."""
+    n_rows, n_columns = values.shape
+    sample = values[np.linspace(0, n_rows - 1, min(SAMPLE, n_rows)).astype(np.int64)]
+    places = np.array([_decimals(sample[:, c]) for c in range(n_columns)], np.int64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        narrow = (sample.astype(np.float32) == sample).all(axis=0)
+    grids = []
+    for column in range(n_columns):
+        digits = int(places[column])
+        grid = BINARY64
+        if digits >= 0 or narrow[column]:
+            whole = values[:, column]
+            digits = _decimals(whole, max(digits, 0)) if digits >= 0 else -1
+            with np.errstate(over="ignore"):
+                is_narrow = bool((whole.astype(np.float32) == whole).all())
+            if 0 <= digits <= (LEAST_OF_MANY if is_narrow else MOST_DECIMALS):
+                grid = Grid(GridKind.FIXED, digits)
+            elif is_narrow:
+                grid = BINARY32
+        grids.append(grid)
+    return tuple(grids)
+
+
+def _decimals(values: NDArray[np.float64], least: int = 0) -> int:
+    """The fewest decimals, ``least`` or more, of which all values are; -1: of none."""
+    if not np.isfinite(values).all():
+        return -1
+    largest = float(np.abs(values).max(initial=0.0))
+    for digits in range(least, MOST_DECIMALS + 1):
+        power = 10.0**digits
+        if largest * power >= LARGEST:
+            return -1
+        if (np.rint(values * power) / power == values).all():
+            return digits
+    return -1
+
+
+def signal_of(
+    parts: list[Columns],
+    name: str = "motion",
+    per_frame: int = 1,
+    channels: tuple[Channel, ...] | None = None,
+    role: str = "",
+) -> Signal:
+    """One signal of the columns of all parts, one behind the other; NaN is invalid."""
+    grids = tuple(grid for part in parts for grid in part.grids)
+    if all(grid.kind == GridKind.INTEGER for grid in grids):
+        values = np.hstack([part.values for part in parts])
+        return Signal(values, grids, name, per_frame, channels=channels, role=role)
+    floats = [part.values.astype(np.float64, copy=False) for part in parts]
+    values = floats[0] if len(parts) == 1 else np.hstack(floats)
+    nan = np.isnan(values)
+    ordinals = None
+    if any(part.ordinals is not None for part in parts):
+        ordinals = np.hstack([_ordinals(part) for part in parts])
+    mask = ~nan if nan.any() else None
+    return Signal(
+        values, grids, name, per_frame, mask, channels=channels, ordinals=ordinals, role=role
+    )
+
+
+def _ordinals(part: Columns) -> NDArray[np.int64]:
+    if part.ordinals is not None:
+        return part.ordinals
+    if part.values.dtype == np.int64:
+        return part.values.astype(np.int64, copy=False)
+    return Signal(part.values, part.grids).to_ordinals()[0]

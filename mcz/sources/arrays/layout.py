@@ -1,0 +1,197 @@
+"""Content of an array file beside its numbers: a template and a detail.
+
+SPEC.md, "Template of arrays", is normative and has the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from itertools import accumulate
+
+import numpy as np
+from construct import If, IfThenElse, Int8ul, this
+from numpy.typing import NDArray
+
+from mcz.errors import FormatError
+from mcz.model.schema import POSITIVE, SIZED, UVARINT, Record, build, counted, field, one_of, parse
+
+# Types of NumPy by their number in a template: |b1 to <f8, without byte order.
+TYPES = ("b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
+BIG_ENDIAN, BY_COLUMNS = 1, 2  # flags of a DATA piece
+MAX_PIECES, MAX_RUNS = 2**16, 2**18  # of a file
+
+
+class Kind(IntEnum):
+    """Kind of a piece of a file."""
+
+    TEXT = 0  # bytes that the template has
+    OWN = 1  # bytes that the detail has
+    COUNT = 2  # the number of rows, printed
+    DATA = 3  # the numbers of an array
+    CRC = 4  # CRC-32 of other pieces
+    SIZE4 = 5  # how many bytes other pieces have, u32
+    SIZE8 = 6  # the same, u64
+
+
+_OF_ROWS = (Kind.COUNT, Kind.DATA)
+_OF_PIECES = (Kind.CRC, Kind.SIZE4, Kind.SIZE8)
+
+
+def _if(kinds: Sequence[Kind], item: object) -> IfThenElse:
+    condition = this.kind == int(kinds[0])
+    for kind in kinds[1:]:
+        condition |= this.kind == int(kind)
+    return If(condition, item)
+
+
+class ArrayRun(Record):
+    """Channels in a row of an array, in ArrayPiece."""
+
+    channel: int = field(UVARINT, "first channel")
+    n_channels: int = field(POSITIVE, "channels, at least 1")  # ARRAY-03
+
+
+class ArrayPiece(Record):
+    """A piece of an array file."""
+
+    kind: int = field(one_of(Int8ul, tuple(Kind)), "what the piece is")  # ARRAY-01
+    text: bytes | None = field(_if((Kind.TEXT,), SIZED), "TEXT only: the bytes")
+    signal: int | None = field(_if(_OF_ROWS, UVARINT), "COUNT and DATA only: index of the signal")
+    after: bytes | None = field(_if((Kind.COUNT,), SIZED), "COUNT only: what follows the number")
+    size: int | None = field(
+        _if((Kind.COUNT,), UVARINT), "COUNT only: bytes, those of blanks included"
+    )
+    type: int | None = field(
+        _if((Kind.DATA,), one_of(Int8ul, tuple(range(len(TYPES))))), "DATA only: type of a number"
+    )  # ARRAY-02
+    flags: int | None = field(
+        _if((Kind.DATA,), one_of(Int8ul, (0, 1, 2, 3))),
+        "DATA only: bit 0: big-endian; 1: column after column",
+    )  # ARRAY-04
+    runs: list[ArrayRun] | None = field(
+        _if((Kind.DATA,), counted(ArrayRun, kind="runs")), "DATA only: its columns, in order"
+    )
+    start: int | None = field(_if(_OF_PIECES, UVARINT), "CRC and SIZE only: first piece")
+    stop: int | None = field(
+        _if(_OF_PIECES, UVARINT), "CRC and SIZE only: the piece behind the last"
+    )
+
+
+class ArrayTemplate(Record):
+    """Template of arrays."""
+
+    pieces: list[ArrayPiece] = field(
+        counted(ArrayPiece, MAX_PIECES), "the file, piece by piece"
+    )  # ARRAY-17
+
+
+class ArrayDetail(Record):
+    """Detail of arrays."""
+
+    parts: list[bytes] = field(counted(SIZED, MAX_PIECES), "bytes of the OWN pieces, in order")
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A piece of a file; what does not go with its kind is empty. See ArrayPiece."""
+
+    kind: Kind
+    text: bytes = b""  # of OWN pieces, too
+    signal: int = 0
+    after: bytes = b""
+    size: int = 0
+    type: int = 0
+    flags: int = 0
+    runs: tuple[tuple[int, int], ...] = ()  # (first channel, channels)
+    start: int = 0
+    stop: int = 0
+
+    @property
+    def n_columns(self) -> int:
+        return sum(n for _, n in self.runs)
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """The channels of all runs, in order."""
+        runs = [np.arange(first, first + n) for first, n in self.runs]
+        return np.concatenate(runs) if runs else np.zeros(0, np.int64)
+
+    @property
+    def dtype(self) -> str:
+        """The type of a number as NumPy writes it."""
+        return (">" if self.flags & BIG_ENDIAN else "<") + TYPES[self.type]
+
+
+def build_arrays(pieces: Sequence[Piece]) -> tuple[bytes, bytes]:
+    """The template and the detail of pieces."""
+    fields = [
+        ArrayPiece(
+            kind=int(piece.kind),
+            text=piece.text,
+            signal=piece.signal,
+            after=piece.after,
+            size=piece.size,
+            type=piece.type,
+            flags=piece.flags,
+            runs=[ArrayRun(channel=c, n_channels=n) for c, n in piece.runs],
+            start=piece.start,
+            stop=piece.stop,
+        )
+        for piece in pieces
+    ]
+    parts = [piece.text for piece in pieces if piece.kind == Kind.OWN]
+    return (
+        build(ArrayTemplate(pieces=fields), "source template"),
+        build(ArrayDetail(parts=parts), "source detail"),
+    )
+
+
+def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
+    """The inverse of ``build_arrays``; raises FormatError on bad bytes."""
+    limits = {"runs": MAX_RUNS}  # ARRAY-17
+    fields = parse(ArrayTemplate, template, "source template", limits).pieces
+    parts = list(parse(ArrayDetail, detail, "source detail").parts)
+    wanted = sum(row.kind == Kind.OWN for row in fields)
+    if wanted != len(parts):  # ARRAY-05
+        raise FormatError(f"source detail: {len(parts)} parts, but {wanted} pieces are its own")
+    own = iter(parts)
+    return tuple(
+        Piece(
+            Kind(row.kind),
+            next(own) if row.kind == Kind.OWN else row.text or b"",
+            row.signal or 0,
+            row.after or b"",
+            row.size or 0,
+            row.type or 0,
+            row.flags or 0,
+            tuple((run.channel, run.n_channels) for run in row.runs or ()),
+            row.start or 0,
+            row.stop or 0,
+        )
+        for row in fields
+    )
+
+
+def check_spans(pieces: Sequence[Piece]) -> None:
+    """Raise FormatError where pieces speak of others that there are not, or of themselves."""
+    spans = set()
+    checks = [0, *accumulate(piece.kind == Kind.CRC for piece in pieces)]
+    for piece in pieces:
+        if piece.kind not in _OF_PIECES:
+            continue
+        if not piece.start <= piece.stop <= len(pieces):  # ARRAY-06
+            raise FormatError(
+                f"source template: pieces {piece.start} to {piece.stop} of {len(pieces)}"
+            )
+        if piece.kind == Kind.CRC:
+            if checks[piece.start] != checks[piece.stop]:  # ARRAY-07
+                raise FormatError("source template: a CRC-32 of a CRC-32")
+            if piece.start < piece.stop:  # no pieces overlap none
+                spans.add((piece.start, piece.stop))
+    end = 0
+    for start, stop in sorted(spans):
+        if start < end:  # ARRAY-08
+            raise FormatError(f"source template: CRC-32 of pieces {start} to {stop}, which overlap")
+        end = stop

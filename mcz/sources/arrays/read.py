@@ -1,0 +1,108 @@
+"""NPY and NPZ: bytes -> Motion, and back.
+
+SPEC.md, "Template of arrays", is normative for the way back. ``meaning.py`` says which array is the
+motion, ``pieces.py`` what a file is made of.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+from mcz.errors import MotionError, SourceError
+from mcz.model.motion import Motion, Signal, Source
+from mcz.sources.arrays.archive import Archive
+from mcz.sources.arrays.columns import columns_of, signal_of
+from mcz.sources.arrays.files import Array, npy_array, npz_arrays
+from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Piece, build_arrays
+from mcz.sources.arrays.meaning import Meaning, meaning_of
+from mcz.sources.arrays.pieces import Placed, pieces_of
+from mcz.sources.arrays.restore import restore_arrays
+
+NO_ARCHIVE = Archive((), (), ())
+
+
+def read_npy(data: bytes, name: str = "motion") -> Motion:
+    """The motion in an NPY file; ``name`` becomes its name.
+
+    Raises SourceError, with the offset at fault or the reason why it is no motion.
+    """
+    return _motion("npy", data, name, [npy_array(data)], NO_ARCHIVE)
+
+
+def read_npz(data: bytes, name: str = "motion") -> Motion:
+    """The motion in an NPZ file; ``name`` becomes its name.
+
+    Members that are deflated, pickled or no arrays are kept as their bytes. Raises SourceError,
+    with the offset at fault or the reason why it is no motion.
+    """
+    return _motion("npz", data, name, *npz_arrays(data))
+
+
+def _motion(
+    format_name: str, data: bytes, name: str, arrays: Sequence[Array], archive: Archive
+) -> Motion:
+    meaning = meaning_of(arrays)
+    pieces = _pieces(data, arrays, archive, meaning)
+    n_runs = sum(len(piece.runs) for piece in pieces)
+    if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
+        raise SourceError(
+            f"{len(arrays)} arrays in {len(pieces)} pieces with {n_runs} runs of numbers are too "
+            f"many: {MAX_PIECES} pieces and {MAX_RUNS} runs at most"
+        )
+    template, detail = build_arrays(pieces)
+    digest = hashlib.sha256(data).digest()
+    return Motion(
+        meaning.skeleton,
+        tuple(_signals(meaning)),
+        meaning.rate,
+        meaning.rate_is_exact,
+        name,
+        _metadata(arrays, archive, meaning),
+        Source(format_name, template, detail, size=len(data), sha256=digest),
+    )
+
+
+def _signals(meaning: Meaning) -> list[Signal]:
+    return [
+        signal_of(
+            [columns_of(words) for words in part.words],
+            part.name,
+            part.per_frame,
+            part.channels,
+            part.role,
+        )
+        for part in meaning.parts
+    ]
+
+
+def _pieces(
+    data: bytes, arrays: Sequence[Array], archive: Archive, meaning: Meaning
+) -> list[Piece]:
+    placed = [Placed(arrays[k].head, *place) for k, place in sorted(meaning.places.items())]
+    kept = [
+        (array.head.start, array.stop)
+        for k, array in enumerate(arrays)
+        if k not in meaning.places and array.stop > array.head.start
+    ]
+    return pieces_of(data, placed, archive, kept)
+
+
+def _metadata(arrays: Sequence[Array], archive: Archive, meaning: Meaning) -> dict[str, str]:
+    """Metadata of the file: its words, and notes on oddities."""
+    notes = [f"{array.name} is {array.kept}" for array in arrays if array.is_loud]
+    notes += [f"the CRC-32 of {name} is not that of its bytes" for name in archive.wrong]
+    notes += meaning.notes
+    return meaning.metadata | ({"source-note": "; ".join(notes)} if notes else {})
+
+
+def write_arrays(motion: Motion) -> bytes:
+    """The array file that ``motion`` was made of, with its values.
+
+    Raises MotionError for a motion of another source: ``mcz.to_npz`` writes that one.
+    """
+    if motion.source is None or motion.source.format not in ("npy", "npz"):
+        raise MotionError(
+            f"motion {motion.name!r} was not made of arrays; to_npz writes it as some"
+        )
+    return restore_arrays(motion)

@@ -1,0 +1,158 @@
+"""Signals, template and detail -> the bytes of an array file.
+
+SPEC.md, "The bytes of arrays", is normative.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import FormatError, LimitError
+from mcz.model.motion import Motion, Signal
+from mcz.model.numbers import Grid, GridKind
+from mcz.model.types import Items
+from mcz.sources.arrays.layout import BY_COLUMNS, TYPES, Kind, Piece, check_spans, parse_arrays
+
+SIZE_LIMIT = 2**26  # a file may always be that large,
+SIZE_PER_VALUE = 64  # or that large for each value of the clip
+MAX_COLUMNS = 2**22  # of all arrays
+WIDEST = 2**53  # integers beyond it are on no grid
+BINARY = {4: Grid(GridKind.BINARY32), 8: Grid(GridKind.BINARY64)}
+
+
+def restore_arrays(motion: Motion) -> bytes:
+    """The file that the source and all signals of ``motion`` make.
+
+    Raises FormatError where the source does not belong to such a motion, and LimitError for a file
+    beyond the limits above.
+    """
+    source = motion.source
+    assert source is not None
+    pieces = parse_arrays(source.template, source.detail)
+    check_spans(pieces)
+    signals = [signal.as_stored() for signal in motion.signals]
+    sizes = [_size(piece, signals) for piece in pieces]
+    starts = [0, *accumulate(sizes)]
+    most = max(SIZE_LIMIT, SIZE_PER_VALUE * sum(signal.values.size for signal in signals))
+    if starts[-1] > most:
+        raise LimitError(f"source template: a file of {starts[-1]} bytes, limit {most}")
+    n_columns = sum(piece.n_columns for piece in pieces)
+    if n_columns > MAX_COLUMNS:
+        raise LimitError(f"source template: {n_columns} columns, limit {MAX_COLUMNS}")
+    out = bytearray(starts[-1])
+    for piece, at, size in zip(pieces, starts, sizes, strict=False):
+        if piece.kind != Kind.CRC:
+            out[at : at + size] = _bytes(piece, signals, starts)
+    known: dict[tuple[int, int], bytes] = {}
+    for piece, at in zip(pieces, starts, strict=False):
+        if piece.kind == Kind.CRC:  # ARRAY-15
+            span = starts[piece.start], starts[piece.stop]
+            if span not in known:
+                known[span] = zlib.crc32(memoryview(out)[slice(*span)]).to_bytes(4, "little")
+            out[at : at + 4] = known[span]
+    return bytes(out)
+
+
+def _size(piece: Piece, signals: Sequence[Signal]) -> int:
+    """The bytes of a piece; raises FormatError where it does not fit the signals."""
+    match piece.kind:
+        case Kind.TEXT | Kind.OWN:
+            return len(piece.text)
+        case Kind.COUNT:
+            _signal(piece, signals)
+            return piece.size
+        case Kind.DATA:
+            signal = _signal(piece, signals)
+            if any(first + n > signal.n_channels for first, n in piece.runs):  # ARRAY-10
+                raise FormatError(
+                    f"source template: a run beyond the {signal.n_channels} channels of signal "
+                    f"{signal.name!r}"
+                )
+            return signal.n_rows * piece.n_columns * int(TYPES[piece.type][1])
+    return 8 if piece.kind == Kind.SIZE8 else 4
+
+
+def _signal(piece: Piece, signals: Sequence[Signal]) -> Signal:
+    if piece.signal >= len(signals):  # ARRAY-09
+        raise FormatError(f"source template: signal {piece.signal} of {len(signals)}")
+    return signals[piece.signal]
+
+
+def _bytes(piece: Piece, signals: Sequence[Signal], starts: Sequence[int]) -> Any:
+    """The bytes of a piece of any kind but CRC."""
+    if piece.kind in (Kind.SIZE4, Kind.SIZE8):
+        size = 8 if piece.kind == Kind.SIZE8 else 4
+        number = starts[piece.stop] - starts[piece.start]
+        if number >= 256**size:  # ARRAY-12
+            raise FormatError(f"source template: a size of {number} in {size} bytes")
+        return number.to_bytes(size, "little")
+    if piece.kind == Kind.COUNT:  # ARRAY-13
+        text = b"%d" % signals[piece.signal].n_rows + piece.after
+        if len(text) > piece.size:  # ARRAY-11
+            raise FormatError(f"source template: {len(text)} bytes of a count, not {piece.size}")
+        return text.ljust(piece.size)
+    if piece.kind == Kind.DATA:
+        return array_words(signals[piece.signal], piece)
+    return piece.text
+
+
+def array_words(signal: Signal, piece: Piece) -> memoryview:
+    """The numbers of a DATA piece, as it stores them."""
+    kind, size = TYPES[piece.type][0], int(TYPES[piece.type][1])
+    columns: Any = piece.columns
+    if len(piece.runs) == 1:
+        columns = slice(piece.runs[0][0], sum(piece.runs[0]))
+    values = signal.values[:, columns]
+    if kind == "f":
+        words = _floats(signal, values, columns, f"f{size}")
+    else:
+        words = _integers(values, kind, size)
+    if piece.flags & BY_COLUMNS:
+        words = words.T
+    return np.ascontiguousarray(words, piece.dtype).reshape(-1).view(np.uint8).data
+
+
+def _floats(signal: Signal, values: Items, columns: Any, type_: str) -> Items:
+    """Items as floats of a type; NaNs keep the bits that a binary grid of that type has."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        words = values.astype(type_)  # ARRAY-14
+    invalid = np.isnan(words)
+    if signal.mask is not None:
+        invalid |= ~signal.mask[:, columns]
+    if not invalid.any():
+        return words
+    bits = words.view(f"u{words.itemsize}")
+    canonical = {2: 0x7E00, 4: 0x7FC00000, 8: 0x7FF8000000000000}[words.itemsize]
+    bits[invalid] = canonical
+    grid = BINARY.get(words.itemsize)
+    nan = np.isnan(values)
+    if grid is not None and nan.any():
+        ordinals = signal.to_ordinals()[0][:, columns]
+        stored = nan & _on_grid(signal, grid.kind)[:, columns]
+        bits[stored] = grid.bits(ordinals[stored])
+    return words
+
+
+def _on_grid(signal: Signal, kind: GridKind) -> NDArray[np.bool_]:
+    """Mask of the values on a grid of that kind, (rows, channels)."""
+    is_on_grid = np.zeros(signal.values.shape, np.bool_)
+    for rows, columns, grid in signal.grid_blocks():
+        if grid.kind == kind:
+            is_on_grid[rows, columns] = True
+    return is_on_grid
+
+
+def _integers(values: Items, kind: str, size: int) -> Items:
+    """Items as integers of a type, rounded and limited to what it holds."""
+    low, high = (-(2 ** (8 * size - 1)), 2 ** (8 * size - 1) - 1) if kind == "i" else (0, 1)
+    high = 2 ** (8 * size) - 1 if kind == "u" else high
+    if values.dtype == np.float64:
+        values = np.rint(np.where(np.isnan(values), 0, values))
+    limited: Items = np.clip(values, max(low, -WIDEST), min(high, WIDEST))  # ARRAY-14
+    return limited.astype(f"{'u' if kind == 'b' else kind}{size}")

@@ -1,0 +1,236 @@
+"""The words of a C3D file in its byte order, and its parameter section.
+
+Read leniently: a parameter that runs out of its section is left out, the first of a name counts.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import prod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import SourceError
+from mcz.model.numbers import Grid, GridKind
+
+BLOCK = 512
+WORD_OF_START = 16  # offset in the header: first block of the data
+MAX_BLOCKS = 255  # of a parameter section: its length is a byte
+INTEL, DEC, SGI = 84, 85, 86  # processor bytes
+TEXT, BYTE, INTEGER, FLOAT = -1, 1, 2, 4  # types of parameters; the magnitude is a size
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Byte order and float format of the processor that wrote a file."""
+
+    processor: int
+
+    @property
+    def prefix(self) -> str:
+        """For numpy and struct."""
+        return ">" if self.processor == SGI else "<"  # C3D-15
+
+    @property
+    def grid(self) -> Grid:
+        """Grid of a float."""
+        return Grid(GridKind.VAX_F if self.processor == DEC else GridKind.BINARY32)
+
+    def integer(self, data: bytes, at: int) -> int:
+        """The unsigned 16-bit integer at an offset, 0 beyond the end."""
+        word = data[at : at + 2]
+        return int(struct.unpack(f"{self.prefix}H", word)[0]) if len(word) == 2 else 0
+
+    def reals(self, data: bytes) -> Floats:
+        """All floats of ``data``, whose size is a multiple of 4."""
+        words = np.frombuffer(data, f"{self.prefix}u4")
+        return self.grid.values(self.grid.ordinals_of_bits(words))
+
+    def real(self, data: bytes, at: int) -> float:
+        """The float at an offset, 0 beyond the end."""
+        word = data[at : at + 4]
+        return float(self.reals(word)[0]) if len(word) == 4 else 0.0
+
+    def build_integer(self, value: int) -> bytes:
+        return struct.pack(f"{self.prefix}H", value)
+
+    def build_real(self, value: float) -> bytes:
+        ordinals, _ = self.grid.ordinals(np.array([value], np.float64))
+        return self.grid.bits(ordinals).astype(f"{self.prefix}u4").tobytes()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter: its type, its dimensions (the first one varies fastest), where its data lie."""
+
+    type: int
+    dims: tuple[int, ...]
+    at: int
+    data: bytes = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The parameters of a file by group and name, both in capitals."""
+
+    order: Order
+    start: int  # of the section
+    found: dict[tuple[str, str], Parameter]
+    end: int  # of the last entry
+
+    def get(self, group: str, name: str) -> Parameter | None:
+        return self.found.get((group, name))
+
+    def number(self, group: str, name: str) -> float | None:
+        """The first number of a parameter, integers unsigned; None where there is none."""
+        parameter = self.get(group, name)
+        if parameter is None or parameter.type == TEXT or not parameter.data:
+            return None
+        if parameter.type == FLOAT:
+            return self.order.real(parameter.data, 0)
+        if parameter.type == INTEGER:
+            return float(self.order.integer(parameter.data, 0))
+        return float(parameter.data[0])
+
+    def count(self, group: str, name: str) -> int | None:
+        """The first number of a parameter where it is a count, None where it is none."""
+        value = self.number(group, name)
+        return int(value) if value is not None and 0 <= value < 2**32 else None
+
+    def texts(self, group: str, name: str) -> list[bytes]:
+        """The texts of a parameter and of those that go on with it (LABELS, LABELS2, ...)."""
+        texts: list[bytes] = []
+        number = 1
+        while True:
+            parameter = self.get(group, name if number == 1 else f"{name}{number}")
+            if parameter is None or parameter.type != TEXT:
+                return texts
+            width = parameter.dims[0] if parameter.dims else 1
+            rows = range(0, len(parameter.data), width or 1)
+            texts += [parameter.data[k : k + width].rstrip(b"\0 ").lstrip(b" ") for k in rows]
+            number += 1
+
+    def numbers(self, group: str, name: str) -> list[float]:
+        """The numbers of a parameter and of those that go on with it, integers with a sign."""
+        numbers: list[float] = []
+        count = 1
+        while True:
+            parameter = self.get(group, name if count == 1 else f"{name}{count}")
+            if parameter is None or parameter.type == TEXT:
+                return numbers
+            numbers += self.numbers_of(parameter)
+            count += 1
+
+    def numbers_of(self, parameter: Parameter) -> list[float]:
+        """The numbers of one parameter that is no text, integers with a sign."""
+        if parameter.type == FLOAT:
+            numbers: list[float] = self.order.reals(parameter.data).tolist()
+            return numbers
+        kind = f"{self.order.prefix}i2" if parameter.type == INTEGER else "u1"
+        return list(map(float, np.frombuffer(parameter.data, kind)))
+
+    @cached_property
+    def first_frame(self) -> int | None:
+        """TRIAL:ACTUAL_START_FIELD."""
+        return self._long("ACTUAL_START_FIELD")
+
+    @cached_property
+    def last_frame(self) -> int | None:
+        """TRIAL:ACTUAL_END_FIELD."""
+        return self._long("ACTUAL_END_FIELD")
+
+    def _long(self, name: str) -> int | None:
+        """A number of TRIAL that is split into two words, the low one first."""
+        parameter = self.get("TRIAL", name)
+        if parameter is None or parameter.type != INTEGER or len(parameter.data) < 4:
+            return None
+        low, high = (self.order.integer(parameter.data, at) for at in (0, 2))
+        return low + (high << 16)
+
+
+def decode_texts(texts: list[bytes]) -> tuple[list[str], str]:
+    """Texts and their encoding: "utf-8" where all of them are, otherwise "latin-1"."""
+    encoding = "utf-8"
+    try:
+        b"".join(texts).decode(encoding)
+        return [text.decode(encoding) for text in texts], encoding
+    except UnicodeDecodeError:
+        return [text.decode("latin-1") for text in texts], "latin-1"
+
+
+def names_of(labels: list[str], n: int, what: str) -> list[str]:
+    """``n`` names: the labels, and ``what`` with a number from 1 for those that lack one."""
+    labels = labels[:n] + [""] * (n - len(labels))
+    return [label or f"{what} {number}" for number, label in enumerate(labels, 1)]
+
+
+def find_parameters(data: bytes) -> tuple[Order, int]:
+    """The byte order of a file and where its parameter section begins; raises SourceError."""
+    if len(data) < BLOCK:
+        raise SourceError("the file ends before the end of a C3D header", offset=len(data))
+    if data[1] != 0x50:
+        raise SourceError(f"offset 1: {data[1]:#04x} is not the 0x50 of a C3D file")
+    start = (data[0] - 1) * BLOCK
+    if start < BLOCK or start + 4 > len(data):
+        raise SourceError(
+            f"offset 0: block {data[0]}, where the parameters begin, is not in the file"
+        )
+    processor = data[start + 3]
+    if processor not in (INTEL, DEC, SGI):
+        raise SourceError(
+            f"processor {processor} is none of 84 (Intel), 85 (DEC), 86 (SGI)", offset=start + 3
+        )
+    return Order(processor), start
+
+
+def parse_parameters(data: bytes, order: Order, start: int) -> Parameters:
+    """The parameters of the section at ``start``, whose first four bytes are there."""
+    blocks = data[start + 2] or MAX_BLOCKS  # some files have more of them than they say
+    data_start = (order.integer(data, WORD_OF_START) - 1) * BLOCK
+    stop = min(max(start + blocks * BLOCK, data_start), start + MAX_BLOCKS * BLOCK, len(data))
+    groups: dict[int, str] = {}
+    entries: list[tuple[int, str, Parameter]] = []
+    at = start + 4
+    while at + 2 <= stop:
+        size, number = struct.unpack_from("bb", data, at)
+        after = at + 2 + abs(size)
+        if size == 0 or after + 2 > stop:
+            break
+        name = data[at + 2 : after].decode("latin-1").strip(" \0").upper()
+        if number < 0:
+            groups.setdefault(-number, name)
+        else:
+            parameter = _parameter(data, after + 2, stop)
+            if parameter is not None:
+                entries.append((number, name, parameter))
+        step = order.integer(data, after)
+        if step < 2:  # 0 marks the last entry; what lies before the next step is none
+            at = after
+            break
+        at = after + step
+    parameters: dict[tuple[str, str], Parameter] = {}
+    for number, name, parameter in entries:
+        if number in groups:
+            parameters.setdefault((groups[number], name), parameter)
+    return Parameters(order, start, parameters, min(at, stop))
+
+
+def _parameter(data: bytes, at: int, stop: int) -> Parameter | None:
+    """The parameter whose type stands at ``at``, None where it does not fit its section."""
+    if at + 2 > stop:
+        return None
+    kind, n_dims = struct.unpack_from("bB", data, at)
+    first = at + 2 + n_dims
+    if first > stop:
+        return None
+    dims = tuple(data[at + 2 : first])
+    size = abs(kind) * prod(dims)
+    if kind not in (TEXT, BYTE, INTEGER, FLOAT) or first + size > stop:
+        return None
+    return Parameter(kind, dims, first, data[first : first + size])

@@ -1,0 +1,211 @@
+"""A motion that did not come from C3D, laid out as a plain C3D file.
+
+Intel byte order, floats; integers where all coordinates are multiples of one scale and all analog
+samples are 16-bit integers. The parameter section holds POINT, TRIAL, ANALOG and FORCE_PLATFORM.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from mcz.errors import MotionError
+from mcz.model.motion import POSITION_KINDS, Channel, Motion, Signal, Source
+from mcz.model.numbers import Grid, GridKind
+from mcz.model.numbers.scaling import Scaling
+from mcz.sources.c3d.layout import Kind, Layout
+from mcz.sources.c3d.outputs import NAME as OUTPUTS
+from mcz.sources.c3d.outputs import describe_outputs
+from mcz.sources.c3d.parameters import BLOCK, INTEL, Order
+from mcz.sources.c3d.restore import field_bytes, valid_points
+from mcz.sources.c3d.section import SectionData, section_of
+from mcz.sources.c3d.shape import COUNTED, WORD_OF_FIRST, WORD_OF_LAST
+
+UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m", 2.54: "in"}
+KNOWN = ("residuals", "analog", OUTPUTS)  # roles of signals beside the points
+EVENTS_KEY = 12_345  # label and range data are of the kind that C3D has today
+FLOATS = Grid(GridKind.BINARY32)
+MOST_RATE = 1e30  # of frames: the samples of one second fit a binary32, too
+
+
+def plain(motion: Motion) -> Motion:
+    """``motion`` on the grids of a C3D file, with the source of a plain one.
+
+    Outputs of models follow the points. Raises MotionError for joints that are no markers, signals
+    other than residuals, analog and outputs, and whatever is too much for C3D.
+    """
+    for joint in motion.skeleton.joints:
+        if joint.parent >= 0 or tuple(c.kind for c in joint.channels) != POSITION_KINDS:
+            raise MotionError(f"C3D has markers only, and joint {joint.name!r} is none")
+    others = {signal.role: signal for signal in motion.signals[1:]}
+    if len(others) < len(motion.signals) - 1 or not set(others) <= set(KNOWN):
+        given = ", ".join(signal.name for signal in motion.signals[1:])
+        raise MotionError(f"C3D has no place for all of the signals {given}")
+    residuals, outputs = others.get("residuals"), others.get(OUTPUTS)
+    analog, scaling = _analog(others.get("analog"))
+    placed = [motion.signals[0], *([outputs] if outputs is not None else [])]
+    n_points = sum(signal.n_channels // 3 for signal in placed)
+    n_channels = analog.n_channels if analog else 0
+    subframes = analog.samples_per_frame if analog and n_channels else 1
+    if max(n_points, n_channels * subframes) > COUNTED:
+        raise MotionError(f"C3D has at most {COUNTED} points and analog samples a frame")
+    if residuals is not None and residuals.n_channels != n_points:
+        raise MotionError(f"{residuals.n_channels} residuals for {n_points} points")
+    names = [joint.name for joint in motion.skeleton.joints]
+    for name in names:
+        if not name or name != name.strip():
+            raise MotionError(
+                f"C3D cannot hold the name {name!r}: its labels are filled with blanks"
+            )
+    listed = describe_outputs(outputs)
+    both = {*names} & {*listed.labels}
+    if both or not all(listed.labels):
+        raise MotionError(f"C3D cannot tell outputs by their names from points: {sorted(both)}")
+    scale = _scale(placed, [signal for signal in (residuals, analog) if signal])
+    unsigned = scale is not None and analog is not None and _range(analog)[1] > 0x7FFF
+    grids = (Grid(GridKind.SCALED, scale=scale), Grid(GridKind.INTEGER)) if scale else (FLOATS,) * 2
+    if residuals is None:
+        residuals = _residuals(placed, motion.n_frames)
+    signals = [_on(signal, grids[0]) for signal in placed]
+    signals += [_on(signal, grids[1]) for signal in (residuals, analog) if signal is not None]
+    section_data = SectionData(
+        [*names, *listed.labels],
+        listed,
+        UNITS.get(motion.skeleton.unit_cm or 0.0, ""),
+        motion.skeleton.up_axis,
+        analog,
+        scaling,
+        unsigned,
+    )
+    layout = _layout(motion, scale, section_data, (n_channels, subframes))
+    template, detail = layout.build()
+    source = Source(layout.format, template, detail)
+    return replace(motion, signals=tuple(signals), source=source)
+
+
+def _analog(signal: Signal | None) -> tuple[Signal | None, Scaling | None]:
+    """The analog signal as stored and what its words mean, or its values, where C3D cannot say."""
+    if signal is None or signal.scaling is None:
+        return signal, None
+    offsets, scaling = signal.scaling.offsets, signal.scaling
+    words = (offsets == np.rint(offsets)) & (offsets >= -0x7FFF) & (offsets <= 0x7FFF)
+    factors = np.array([*scaling.scales, scaling.general])
+    with np.errstate(over="ignore"):
+        exact = (factors.astype(np.float32) == factors).all()
+    if words.all() and exact:
+        return signal.as_stored(), scaling
+    return replace(signal, scaling=None, grids=(), grid_changes=(), ordinals=None), None
+
+
+def _residuals(placed: Sequence[Signal], n_frames: int) -> Signal:
+    """The residuals of all points: 0 where they are valid, -1 elsewhere."""
+    parts = []
+    for signal in placed:
+        valid = valid_points(_without_nan(signal))
+        words = np.zeros((n_frames, signal.n_channels // 3))
+        if valid is not None:
+            words[~valid] = -1.0
+        parts.append(words)
+    words = np.concatenate(parts, axis=1)
+    n_points = words.shape[1]
+    channels = (Channel("", "residual"),) * n_points
+    grids = (FLOATS,) * n_points
+    return Signal(words, grids, "residuals", channels=channels, role="residuals", of=0)
+
+
+def _scale(placed: Sequence[Signal], others: Iterable[Signal]) -> float | None:
+    """The scale of a file of integers, None where floats are needed."""
+    grids = {grid for points in placed for grid in points.grids}
+    if len(grids) != 1 or next(iter(grids)).kind != GridKind.SCALED:
+        return None
+    scale = next(iter(grids)).scale
+    for points in placed:
+        ordinals, exact = points.to_ordinals()
+        low, high = ordinals.min(initial=0), ordinals.max(initial=0)
+        if points.grid_changes or not exact.all() or low < -0x8000 or high > 0x7FFF:
+            return None
+    if scale != np.float32(scale):
+        return None
+    for signal in others:
+        if signal.values.dtype != np.int64 and signal.n_channels:
+            return None
+        low, high = _range(signal)
+        if low < -0x8000 or high > (0xFFFF if low >= 0 and signal.role == "analog" else 0x7FFF):
+            return None
+    return scale
+
+
+def _range(signal: Signal) -> tuple[int, int]:
+    return int(signal.values.min(initial=0)), int(signal.values.max(initial=0))
+
+
+def _without_nan(points: Signal) -> Signal:
+    """The points, with a mask that leaves out NaN, too."""
+    nan = np.isnan(points.values)
+    if not nan.any():
+        return points
+    return replace(points, mask=~nan if points.mask is None else points.mask & ~nan)
+
+
+def _on(signal: Signal, grid: Grid) -> Signal:
+    """The signal on another grid; raises MotionError where that has no number nearby."""
+    if all(own == grid for own in signal.grids) and not signal.grid_changes:
+        return signal
+    ordinals, _ = grid.ordinals(signal.values.astype(np.float64))
+    values = ordinals if grid.kind == GridKind.INTEGER else grid.values(ordinals)
+    if (np.isinf(values) & np.isfinite(signal.values)).any():
+        raise MotionError(f"signal {signal.name!r}: a value is too large for a binary32")
+    return Signal(
+        values,
+        (grid,) * signal.n_channels,
+        signal.name,
+        signal.samples_per_frame,
+        signal.mask,
+        channels=signal.channels,
+        role=signal.role,
+        of=signal.of,
+    )
+
+
+def _layout(
+    motion: Motion, scale: float | None, section_data: SectionData, shape: tuple[int, int]
+) -> Layout:
+    """The layout of the file: header, parameter section, fields."""
+    order, n_points = Order(INTEL), len(section_data.names)
+    n_channels, subframes = shape
+    first = 1 if motion.frame_numbers is None or not motion.n_frames else motion.frame_numbers[0]
+    rate = Fraction(motion.frame_rate or 0)
+    if rate > MOST_RATE:
+        raise MotionError(f"C3D holds frame rates up to {MOST_RATE:.2g}, and this one is larger")
+    section = section_of(section_data, -1.0 if scale is None else scale, rate, shape)
+    start = BLOCK + len(section.data)
+    header = bytearray(BLOCK)
+    struct.pack_into("<BBHHHHHf", header, 0, 2, 0x50, n_points, n_channels * subframes, 0, 0, 0,
+                     -1.0 if scale is None else scale)  # fmt: skip
+    struct.pack_into("<HHf", header, 16, start // BLOCK + 1, subframes, float(rate))
+    struct.pack_into("<H", header, 298, EVENTS_KEY)
+    struct.pack_into("<H", section.data, section.data_start, start // BLOCK + 1)
+    fields = [(WORD_OF_FIRST, Kind.FIRST), (WORD_OF_LAST, Kind.LAST)]
+    fields += [(BLOCK + at, kind) for at, kind in section.fields]
+    head = header + section.data
+    for at, kind in fields:
+        head[at : at + kind.size] = field_bytes(order, kind, int(first), motion.n_frames, 0)
+    return Layout(
+        order,
+        4 if scale is None else 2,
+        n_points,
+        n_channels,
+        subframes,
+        section_data.unsigned,
+        motion.n_frames,
+        max(0, int(first)),
+        bytes(head),
+        tuple(fields),
+        outputs=(motion.skeleton.n_joints, len(section_data.listed.labels))
+        if section_data.listed.labels
+        else (),
+    )

@@ -1,0 +1,205 @@
+"""The times of a table: whether they follow from frame numbers, and their frame rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.model.numbers import Grid, GridKind, Tokens
+from mcz.sources.rates import DECIMAL, MAX_TERM
+from mcz.sources.tables.layout import Clock
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+UNITS = (Fraction(1), Fraction(1000, 1001), *(Fraction(1, 10**n) for n in (1, 2, 3)))
+MOST = 2**61  # of products, so that they are exact
+LARGEST_DENOMINATOR = 10**6  # of a rate that is no round number
+MOST_DECIMALS = 15
+ZEROS_IN = 8  # rows that show how many zeros end all times
+
+
+def stated_rate(text: str) -> Fraction | None:
+    """A rate as a header prints it; None where it is no positive number."""
+    text = text.strip()
+    if len(text) > 64 or not DECIMAL.fullmatch(text) or not 1e-9 <= float(text) <= 1e9:
+        return None
+    rate = Fraction(text)
+    return rate if max(rate.numerator, rate.denominator) <= MAX_TERM else None
+
+
+def find_clock(
+    tokens: Tokens, numbers: Ints, stated: Sequence[Fraction], seconds: Fraction = Fraction(1)
+) -> Clock | None:
+    """Find the clock that gives the times from the frame numbers, or None.
+
+    ``stated``: rates that the file states. Tried are these and round ones near the mean.
+    ``seconds``: what a unit of the times is.
+    """
+    if len(tokens) < 2:
+        return None
+    places = _decimals(tokens)
+    for grid in (Grid(GridKind.FIXED, places), Grid(GridKind.TRIMMED, max(places, 1))):
+        ordinals, known = grid.ordinals_of_tokens(tokens)
+        if known.all() and ordinals.min() >= 0:
+            break
+    else:
+        return None
+    distance = int(numbers[-1] - numbers[0])
+    if distance <= 0 or ordinals[-1] <= ordinals[0]:
+        return None
+    unit = 10**grid.digits / seconds
+    mean = Fraction(distance * unit, int(ordinals[-1] - ordinals[0]))
+    for rate in dict.fromkeys((*stated, *_round(mean))):
+        step = unit / rate  # in units of the last digit
+        offset = _offset(ordinals, numbers, step.numerator, step.denominator)
+        if offset is not None:
+            return Clock(grid, step.numerator, step.denominator, offset)
+    return None
+
+
+def _decimals(tokens: Tokens) -> int:
+    from mcz.model.numbers import kernels
+
+    places = int((tokens.fields[:, 2] >> kernels.FRACTION_DIGITS).max())
+    return min(places, MOST_DECIMALS)
+
+
+def _round(rate: Fraction) -> list[Fraction]:
+    """Round rates near ``rate``, and itself; none near 0."""
+    rounded = [round(rate / unit) * unit for unit in UNITS]
+    return [r for r in (*rounded, rate.limit_denominator(LARGEST_DENOMINATOR)) if r > 0]
+
+
+def _offset(ordinals: Ints, numbers: Ints, numerator: int, denominator: int) -> int | None:
+    """An offset with (number * numerator + offset) div denominator = ordinal for all; None: none.
+
+    The one nearest to 0 of those that there are.
+    """
+    largest = max(int(np.abs(ordinals).max()) + 1, 1) * denominator
+    if max(largest, int(np.abs(numbers).max()) * numerator) > MOST:
+        return None
+    least = ordinals * denominator - numbers * numerator
+    low, high = int(least.max()), int(least.min()) + denominator - 1
+    return None if low > high else min(max(low, 0), high)
+
+
+def rate_of_times(
+    times: Floats,
+    half_digits: Sequence[float],
+    stated: Sequence[Fraction] = (),
+    numbers: Ints | None = None,
+) -> tuple[Fraction | None, bool]:
+    """The rate of times that are whole frames apart, to half a unit of their last digit.
+
+    Frames are counted by ``numbers``, those of the frames in the file, else by rows, else, where
+    rows are missing that nothing counts, by the steps between the times, most of which are one
+    frame. ``half_digits`` are tried in order. Returns None where no count fits; and whether the
+    rate is a round or a stated one.
+    """
+    if len(times) < 2 or not np.isfinite(times).all() or not times[-1] > times[0]:
+        return None, True
+    counts = [np.arange(len(times)), *([numbers - numbers[0]] if numbers is not None else [])]
+    counts = [count for count in reversed(counts) if count[-1] > 0]
+    noise = 8 * float(np.spacing(np.abs(times).max()))
+    given = [(count, list(stated)) for count in counts]
+    near = [(count, _round(_mean_rate(times, count))) for count in counts]
+    run = _longest_run(times)
+    of_run = _round(_mean_rate(run, np.arange(len(run)))) if len(run) > 1 else []
+    for k, half_digit in enumerate(half_digits):
+        digits = _Digits(2 * half_digit, noise)
+        rates = chain(
+            _counted_rates(times, given, digits, 1.0),
+            _stepped_rates(
+                times, stated, digits, 0.99
+            ),  # all of a digit: halfway between two frames
+            _counted_rates(times, near, digits),
+            _stepped_rates(times, of_run, digits),
+            _counted_rates(times, near, digits, 1.0) if k == 0 else (),
+        )
+        rate = next(rates, None)
+        if rate is not None:
+            is_round = any((rate / unit).denominator == 1 for unit in UNITS)
+            return rate, rate in stated or is_round
+    return None, True
+
+
+@dataclass(frozen=True, slots=True)
+class _Digits:
+    """The last ``digit`` of some times, and the ``noise`` of their binary64."""
+
+    digit: float
+    noise: float
+
+    def fit(self, times: Floats, count: Floats | Ints, rate: Fraction, share: float = 0) -> bool:
+        """Return whether times are ``count`` frames from one start, each rounded to a digit.
+
+        Digits of more than a quarter of a frame fit almost any rate: only a ``share`` of them may
+        be missed.
+        """
+        spread = np.ptp(times - times[0] - count / float(rate))
+        allowed = self.digit if 4 * self.digit * rate <= 1 else share * self.digit
+        return bool(spread <= allowed + self.noise)
+
+
+def _counted_rates(
+    times: Floats,
+    candidates: Sequence[tuple[Ints, list[Fraction]]],
+    digits: _Digits,
+    share: float = 0,
+) -> Iterator[Fraction]:
+    """The rates of the candidates that fit, each with a count of the frames."""
+    for count, rates in candidates:
+        yield from (rate for rate in rates if digits.fit(times, count, rate, share))
+
+
+def _mean_rate(times: Floats, count: Ints) -> Fraction:
+    """Frames a second on average; 0 where that is absurd."""
+    with np.errstate(over="ignore", divide="ignore"):
+        mean = float(count[-1] / (times[-1] - times[0]))
+    return Fraction(mean) if 1e-9 < mean < 1e9 else Fraction(0)
+
+
+def _stepped_rates(
+    times: Floats, rates: Sequence[Fraction], digits: _Digits, share: float = 0
+) -> Iterator[Fraction]:
+    """The rates by which most of rising times follow each other by one frame, others by more."""
+    if not (np.diff(times) > 0).all():
+        return
+    for rate in rates:
+        count = np.rint((times - times[0]) * float(rate))
+        if not count[-1] < MOST:
+            continue
+        frames = np.diff(count)
+        usual = np.count_nonzero(frames == 1)
+        is_apart = bool((frames >= 1).all()) and 2 * usual > len(frames)
+        if is_apart and digits.fit(times, count, rate, share):
+            yield rate
+
+
+def _longest_run(times: Floats) -> Floats:
+    """The longest part of some times without a gap."""
+    steps = np.diff(times)
+    edges = np.flatnonzero(steps > 1.5 * np.median(steps))
+    starts, stops = np.append(0, edges + 1), np.append(edges, len(steps))
+    longest = int(np.argmax(stops - starts))
+    return times[starts[longest] : stops[longest] + 1]
+
+
+def half_digits_of(data: bytes, stop: Ints, tokens: Tokens) -> list[float]:
+    """Half a unit of the last digit that times have, as they are printed and without zeros.
+
+    ``stop``: where each token ends, which zeros may follow that all of them have. These are digits,
+    or say nothing.
+    """
+    places = _decimals(tokens)
+    zeros = 0
+    if places:
+        ends = [int(at) for at in stop[:ZEROS_IN]]
+        zeros = min(len(data[at : at + 32]) - len(data[at : at + 32].lstrip(b"0")) for at in ends)
+    return [0.5 * 10.0**-each for each in dict.fromkeys((places + zeros, places))]

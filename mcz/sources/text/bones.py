@@ -1,0 +1,115 @@
+"""Matching of the bones of an AMC file to the joints of a skeleton."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import degrees, radians
+
+from mcz.model.motion import ROTATION_KINDS, Channel, Joint, Skeleton
+
+Columns = dict[str, int]  # bone -> column of its first value
+ROOT = "root"  # every ASF has it, whatever else it describes
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """Match of an AMC file's bones with a skeleton.
+
+    ``lacking`` are the bones that it does not have, ``differing`` those that have other numbers of
+    values there; ``n_known`` counts the bones beside the root that it has.
+    """
+
+    lacking: tuple[str, ...]
+    differing: tuple[str, ...]
+    n_known: int
+
+    @property
+    def is_foreign(self) -> bool:
+        """True if the skeleton has none of the bones but the root, which all have."""
+        return bool(self.lacking) and not self.n_known
+
+
+def match_bones(skeleton: Skeleton, counts: Mapping[str, int]) -> Match:
+    """Match bones with these numbers of values to ``skeleton``."""
+    names = match_names(skeleton, counts)
+    channels: dict[str | None, int] = {j.name: len(j.channels) for j in skeleton.joints}
+    known = [bone for bone in counts if names[bone] is not None]
+    return Match(
+        lacking=tuple(bone for bone in counts if names[bone] is None),
+        differing=tuple(bone for bone in known if channels[names[bone]] != counts[bone]),
+        n_known=sum(bone.casefold() != ROOT for bone in known),
+    )
+
+
+def flat(counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:
+    """The skeleton of bones of which only the names and numbers of values are known."""
+    joints = [Joint(name, channels=_scalars(count)) for name, count in counts.items()]
+    skeleton = Skeleton(tuple(joints), "", angle_unit=angle_unit, intrinsic=False)
+    return skeleton, _columns(skeleton, {name: name for name in counts})
+
+
+def fit(skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:
+    """``skeleton``, or one derived from it where its channels are not those of the bones."""
+    names = match_names(skeleton, counts)
+    channels: dict[str | None, int] = {j.name: len(j.channels) for j in skeleton.joints}
+    fits = all(channels.get(names[bone]) == count for bone, count in counts.items())
+    if not fits or angle_unit != skeleton.angle_unit:
+        skeleton = derive(skeleton, counts, angle_unit)
+        names = match_names(skeleton, counts)
+    return skeleton, _columns(skeleton, names)
+
+
+def match_names(skeleton: Skeleton, bones: Mapping[str, int]) -> dict[str, str | None]:
+    """The joint of each bone: the one of its name, or the only one but for upper and lower case."""
+    joints = {joint.name for joint in skeleton.joints}
+    folded: dict[str, list[str]] = {}
+    for name in joints:
+        folded.setdefault(name.casefold(), []).append(name)
+    matched: set[str | None] = {*(joints & bones.keys())}
+    result: dict[str, str | None] = {}
+    for bone in bones:
+        alike = [name for name in folded.get(bone.casefold(), []) if name not in matched]
+        result[bone] = bone if bone in joints else alike[0] if len(alike) == 1 else None
+        matched.add(result[bone])
+    return result
+
+
+def derive(skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str = "") -> Skeleton:
+    """``skeleton`` with the channels that the bones of an AMC file have; ``base`` is b"".
+
+    A joint whose number of values differs has rx ry rz if there are 3, else plain scalars; a root
+    joint always has plain scalars then. Bones without a joint become root joints of plain scalars.
+    The axes are converted where the AMC has another ``angle_unit``.
+    """
+    names = match_names(skeleton, counts)
+    wanted = {names[bone]: count for bone, count in counts.items()}
+    angle_unit = angle_unit or skeleton.angle_unit
+    convert = degrees if angle_unit == "deg" else radians
+    joints = []
+    for joint in skeleton.joints:
+        count = wanted.get(joint.name, len(joint.channels))
+        if count != len(joint.channels):
+            turns = count == 3 and joint.parent >= 0
+            kinds = tuple(Channel(kind) for kind in ROTATION_KINDS)
+            joint = replace(joint, channels=kinds if turns else _scalars(count))
+        if angle_unit != skeleton.angle_unit:
+            x, y, z = map(convert, joint.axis)
+            joint = replace(joint, axis=(x, y, z))
+        joints.append(joint)
+    joints += [Joint(b, channels=_scalars(n)) for b, n in counts.items() if names[b] is None]
+    return replace(skeleton, joints=tuple(joints), angle_unit=angle_unit, base=b"", source=None)
+
+
+def _scalars(count: int) -> tuple[Channel, ...]:
+    return tuple(Channel("", str(k + 1)) for k in range(count))
+
+
+def _columns(skeleton: Skeleton, names: Mapping[str, str | None]) -> Columns:
+    """The first column of each bone."""
+    first: dict[str, int] = {}
+    column = 0
+    for joint in skeleton.joints:
+        first.setdefault(joint.name, column)
+        column += len(joint.channels)
+    return {bone: first[name or bone] for bone, name in names.items()}

@@ -1,0 +1,252 @@
+"""Frame layout of a text file: patterns of gaps and columns, and deviations.
+
+The text of a frame follows a *pattern*: runs of columns, each token behind the run's gap, and a
+tail. AMC and BVH share this; SPEC.md, "Source reconstruction", is normative and has the tables of
+Template, Detail and NOTES.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mcz.errors import FormatError, LimitError
+from mcz.kernels import SPARE
+from mcz.model.schema import (
+    SIZED,
+    SVARINT,
+    UVARINT,
+    Checked,
+    Record,
+    bounded,
+    build,
+    counted,
+    field,
+    parse,
+)
+from mcz.sources.text.text_items import Items
+
+FRAME_NUMBER = -1  # the column of the frame number
+MAX_PATTERNS = 1024
+MAX_GAPS = 2**20  # of a template, and of a detail (SRC-07)
+MAX_RUNS = 2**18  # of a template, and of a detail
+MAX_WIDTH = 255  # SRC-12
+MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
+
+
+# SRC-12
+_WIDTH = Checked(SVARINT, lambda width: -MAX_WIDTH <= width <= MAX_WIDTH and width != -1)
+BIT = bounded(UVARINT, 0, 1)  # SRC-13
+
+
+class RunFields(Record):
+    """Tokens of a frame behind equal gaps, in PATTERN."""
+
+    gap: int = field(UVARINT, "number of the gap that precedes every token of the run")
+    column: int = field(UVARINT, "first column: 0 the frame number, c + 1 channel c")
+    n_columns: int = field(UVARINT, "columns of the run, at least 1; 1 where column is 0")
+    width: int = field(
+        _WIDTH, "padding: 0 none, 1 blank for no sign, w > 1 right, w < -1 left justified"
+    )
+
+
+class PatternFields(Record):
+    """Layout of a frame's text."""
+
+    runs: list[RunFields] = field(
+        counted(RunFields, kind="runs"), "the tokens of a frame, in order"
+    )
+    tail: int = field(UVARINT, "number of the gap that ends the frame")
+
+
+class Template(Record):
+    """Template of AMC and BVH."""
+
+    header: list[bytes] = field(
+        counted(SIZED, 2), "text before the frames; the frame count stands between 2 parts"
+    )  # SRC-03
+    gaps: list[bytes] = field(counted(SIZED, MAX_GAPS), "gaps, numbered from 0")
+    patterns: list[PatternFields] = field(
+        counted(PatternFields, MAX_PATTERNS), "none, or the most common pattern, which is number 0"
+    )
+
+
+class Detail(Record):
+    """Detail of AMC and BVH, and of a section of a table."""
+
+    count: bytes = field(SIZED, "frame count as printed; empty: the number of rows in decimal")
+    rows: int = field(UVARINT, "number of rows for which count holds; 0 where count is empty")
+    gaps: list[bytes] = field(
+        counted(SIZED, MAX_GAPS), "further gaps, numbered on from the template's"
+    )
+    patterns: list[PatternFields] = field(
+        counted(PatternFields, MAX_PATTERNS), "further patterns, numbered on from the template's"
+    )
+    ends: int = field(BIT, "1: ending stands in place of the last row's tail; 0: the tail does")
+    ending: bytes = field(SIZED, "what follows the last token; empty where ends is 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """``n_columns`` columns from ``column`` on; tokens follow ``gap``, padded to ``width``."""
+
+    gap: bytes
+    column: int
+    n_columns: int = 1
+    width: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    runs: tuple[Run, ...]
+    tail: bytes
+
+    @property
+    def gap_size(self) -> int:
+        """Bytes of all gaps and the tail."""
+        return sum(run.n_columns * len(run.gap) for run in self.runs) + len(self.tail)
+
+    def arrays(self) -> Items:
+        """The pattern as compiled loops have it."""
+        gaps = [run.gap for run in self.runs]
+        repeats = [run.n_columns for run in self.runs]
+        sizes = np.array([*map(len, gaps), len(self.tail)], dtype=np.int64)
+        stops = np.cumsum(sizes)
+        per_item = np.repeat(np.arange(len(sizes)), [*repeats, 1])
+        ranges = [np.arange(run.column, run.column + run.n_columns) for run in self.runs]
+        return Items(
+            np.frombuffer(b"".join((*gaps, self.tail, bytes(SPARE))), np.uint8),
+            (stops - sizes)[per_item],
+            stops[per_item],
+            np.concatenate([np.empty(0, np.int64), *ranges]),
+            np.repeat(np.array([run.width for run in self.runs], dtype=np.int64), repeats),
+        )
+
+
+def runs_of(items: Iterable[tuple[bytes, int, int]]) -> tuple[Run, ...]:
+    """The runs of items (gap, column, width)."""
+    runs: list[Run] = []
+    for gap, column, width in items:
+        last = runs[-1] if runs else None
+        if last and column > 0 and (gap, column, width) == (
+            last.gap, last.column + last.n_columns, last.width,
+        ):  # fmt: skip
+            runs[-1] = Run(gap, last.column, last.n_columns + 1, width)
+        else:
+            runs.append(Run(gap, column, 1, width))
+    return tuple(runs)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A template and a detail, parsed: see Template and Detail; ``ending`` None: the usual tail."""
+
+    header: tuple[bytes, ...]
+    patterns: tuple[Pattern, ...] = ()
+    count: bytes = b""
+    rows: int = 0
+    ending: bytes | None = None
+
+    def build(self) -> tuple[bytes, bytes]:
+        """The bytes of the template and of the detail; LimitError for too many runs."""
+        shared, own = numbered_patterns(self.patterns)
+        template = Template(header=list(self.header), gaps=shared.gaps, patterns=shared.patterns)
+        return build(template, "source template"), build(self.detail(own), "source detail")
+
+    def detail(self, own: Numbered) -> Detail:
+        """The detail, whose gaps and patterns are ``own``."""
+        return Detail(
+            count=self.count,
+            rows=self.rows,
+            gaps=own.gaps,
+            patterns=own.patterns,
+            ends=int(self.ending is not None),
+            ending=self.ending or b"",
+        )
+
+
+class Numbered(NamedTuple):
+    """The gaps and patterns of a template or a detail."""
+
+    gaps: list[bytes]
+    patterns: list[PatternFields]
+
+
+def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[Numbered, Numbered]:
+    """Gaps and patterns of a template and of a detail; LimitError for too many runs."""
+    if sum(len(pattern.runs) for pattern in patterns) > MAX_RUNS:
+        raise LimitError(f"the frames are laid out in more than {MAX_RUNS} runs of columns")
+    gaps: dict[bytes, int] = {}
+    fields = []
+    n_shared = 0
+    for pattern in patterns:
+        fields.append(_pattern_fields(pattern, gaps))
+        n_shared = n_shared or len(gaps)
+    numbered = list(gaps)
+    return Numbered(numbered[:n_shared], fields[:1]), Numbered(numbered[n_shared:], fields[1:])
+
+
+def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> PatternFields:
+    """The fields of a pattern; numbers its gaps in ``gaps``."""
+    runs = [
+        RunFields(
+            gap=gaps.setdefault(run.gap, len(gaps)),
+            column=run.column + 1,
+            n_columns=run.n_columns,
+            width=run.width,
+        )
+        for run in pattern.runs
+    ]
+    return PatternFields(runs=runs, tail=gaps.setdefault(pattern.tail, len(gaps)))
+
+
+def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
+    """The layout of a clip of ``n_channels`` channels; raises FormatError on bad bytes."""
+    shared = parse(Template, template, "source template", {"runs": MAX_RUNS})
+    own = parse(Detail, detail, "source detail", {"runs": MAX_RUNS})
+    if len(shared.header) not in (1, 2):  # SRC-03
+        raise FormatError(f"source template: {len(shared.header)} parts of a header (1 or 2)")
+    return parsed_patterns(tuple(shared.header), shared, own, n_channels)
+
+
+def parsed_patterns(header: tuple[bytes, ...], shared: Any, own: Any, n_channels: int) -> Layout:
+    """The layout of the fields of a template and of a detail; raises FormatError."""
+    if len(shared.patterns) > 1:  # SRC-04
+        raise FormatError(f"source template: {len(shared.patterns)} patterns (0 or 1)")
+    if len(own.patterns) >= MAX_PATTERNS:  # SRC-06
+        raise LimitError(f"source detail: {len(own.patterns)} patterns, limit {MAX_PATTERNS - 1}")
+    if own.patterns and not shared.patterns:  # SRC-05
+        raise FormatError("source detail: patterns, though the template has none")
+    if (own.rows and not own.count) or (own.ending and not own.ends):  # SRC-14, SRC-15
+        raise FormatError("source detail: rows without count, or ending though ends is 0")
+    gaps = [*shared.gaps, *own.gaps]
+    patterns = [
+        _pattern(fields, gaps, n_channels, f"pattern {number}")
+        for number, fields in enumerate([*shared.patterns, *own.patterns])
+    ]
+    ending = own.ending if own.ends else None
+    return Layout(header, tuple(patterns), own.count, own.rows, ending)
+
+
+def _pattern(fields: Any, gaps: Sequence[bytes], n_channels: int, where: str) -> Pattern:
+    """PATTERN with its gaps in place, checked: no column twice, none beyond the channels."""
+    if any(run.gap >= len(gaps) for run in fields.runs) or fields.tail >= len(gaps):  # SRC-08
+        raise FormatError(f"{where}: a gap beyond the last, {len(gaps) - 1}")
+    spans = sorted((run.column, run.n_columns) for run in fields.runs)
+    free = 0
+    for column, n_columns in spans:
+        if column < free or n_columns < 1 or (column == 0 and n_columns > 1):  # SRC-09, SRC-10
+            raise FormatError(
+                f"{where}: {n_columns} columns from {column}, expected {free} or more"
+            )
+        free = column + n_columns
+    if free > n_channels + 1:  # SRC-11
+        raise FormatError(f"{where}: channel {free - 2}, but there are {n_channels}")
+    runs = [Run(gaps[r.gap], r.column - 1, r.n_columns, r.width) for r in fields.runs]
+    pattern = Pattern(tuple(runs), gaps[fields.tail])
+    if pattern.gap_size > MAX_ROW_GAPS:  # SRC-16
+        raise LimitError(f"{where}: {pattern.gap_size} bytes of gaps a row, limit {MAX_ROW_GAPS}")
+    return pattern

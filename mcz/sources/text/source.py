@@ -1,0 +1,81 @@
+"""The Source of a text file that was read, and its encoding."""
+
+from __future__ import annotations
+
+import hashlib
+
+from mcz.errors import SourceError
+from mcz.model.motion import Source
+from mcz.sources.text.layout import Layout
+from mcz.sources.text.rows import Rows
+
+BOM = b"\xef\xbb\xbf"  # U+FEFF in UTF-8: it may stand at the start of a file, and says nothing
+OTHERS = {  # how files of other encodings begin, longer marks first
+    b"\xff\xfe\0\0": "UTF-32",
+    b"\0\0\xfe\xff": "UTF-32",
+    b"\xff\xfe": "UTF-16",
+    b"\xfe\xff": "UTF-16",
+}
+LOOKED_AT = 64  # bytes in which every other one of UTF-16 is zero
+
+
+def text_encoding(data: bytes) -> str:
+    """ "utf-8" where all of ``data`` is, otherwise "latin-1", which every byte string is."""
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _wide_encoding(data: bytes) -> str | None:
+    for mark, name in OTHERS.items():
+        if data.startswith(mark):
+            return name
+    start = data[:LOOKED_AT]
+    for low, high in ((start[::2], start[1::2]), (start[1::2], start[::2])):
+        if len(high) > 7 and not any(high) and 0 not in low:
+            return "UTF-16 without a byte order mark"
+    return None
+
+
+def text_start(data: bytes) -> int:
+    """Offset of the text, after a UTF-8 byte order mark if there is one."""
+    return len(BOM) if data.startswith(BOM) else 0
+
+
+def check_text(data: bytes) -> None:
+    """Raise SourceError for UTF-16 and UTF-32, whose bytes no template restores."""
+    wide = _wide_encoding(data)
+    if wide is not None:
+        raise SourceError(f"the text is {wide}; save it as UTF-8 or ASCII", line=1)
+
+
+def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
+    """Raise SourceError where a byte order mark hides a line that means something.
+
+    ``ignored``: how lines begin that do not. In an ASF or AMC the mark belongs to the first word,
+    for every reader, as the skeleton of a file is compared with what its ASF describes.
+    """
+    line = data[len(BOM) :].split(b"\n", 1)[0].strip().lower()
+    if data.startswith(BOM) and line and not line.startswith(ignored):
+        raise SourceError(
+            f"a byte order mark of UTF-8 hides {line[:40]!r}; save the file without it", line=1
+        )
+
+
+def source_of(
+    format_name: str, data: bytes, header: tuple[bytes, ...], rows: Rows, count: bytes = b""
+) -> Source:
+    """The source of a file that was read as ``header`` and ``rows``; ``count``: as printed."""
+    usual = count in (b"", b"%d" % rows.n_rows)
+    layout = Layout(
+        header,
+        rows.patterns,
+        b"" if usual else count,
+        0 if usual else rows.n_rows,
+        rows.ending,
+    )
+    template, detail = layout.build()
+    digest = hashlib.sha256(data).digest()
+    return Source(format_name, template, detail, rows.notes, size=len(data), sha256=digest)
