@@ -16,8 +16,8 @@ from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEven
 from mcz.container.grammar import BODY, CLIP, GRAMMAR, INDEX, NAMED, OTHER, START
 from mcz.container.packets import END
 from mcz.container.parser_drivers import events
-from mcz.container.repeats import chunks_in
 from mcz.container.scanner import Scanner
+from mcz.container.segments import chunks_in
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 
