@@ -35,8 +35,9 @@ from mcz.container.packets import (
     head_size,
     implied_by,
 )
+from mcz.container.parser_drivers import chunks_in
 from mcz.container.scan import scan
-from mcz.container.segments import FRESH, SegmentHeader, build_segment, chunks_in
+from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.container.source import open_source
 from mcz.files.live.concealment import LiveFrame
 from mcz.files.live.reader_with_losses import MOST_MADE_UP

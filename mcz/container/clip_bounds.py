@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from mcz.container.chunks import FRAMING, ChunkType
-from mcz.container.segments import chunks_in
+from mcz.container.parser_drivers import chunks_in
 from mcz.errors import FormatError
 
 LEAST_BETWEEN = 2 * FRAMING  # bytes in which a CEND and the next CLIP can have been

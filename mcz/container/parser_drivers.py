@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import BinaryIO
 
-from mcz.container.chunks import Chunk
+from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
-from mcz.container.grammar import PACKETS, SIGNATURE
+from mcz.container.grammar import PACKETS, SIGNATURE, START
 from mcz.container.parser import PASS, Parser
 from mcz.container.source import ByteSource
+from mcz.errors import FormatError
 
 MOST_AT_ONCE = 64 * 1024  # bytes that are taken from a stream where it has them
 
@@ -89,3 +90,23 @@ class Stream:
             parser.end()
         self.size += len(data)
         parser.feed(data[max(0, len(data) - (self.size - at)) :])
+
+
+def chunks_in(payload: bytes, offset: int) -> list[ChunkEvent]:
+    """The chunks in the ``payload`` of a REPT, which begins at ``offset``; raises FormatError."""
+    stop = offset + len(payload)
+    parser, found = Parser(stop, at=offset, state=START), []
+    parser.feed(payload)
+    while parser.at < stop:
+        event = parser.next()
+        if isinstance(event, Fault):
+            raise event.error
+        if not isinstance(event, ChunkEvent):
+            raise FormatError(f"REPT before {offset} holds other things than chunks")
+        found.append(event)
+    kinds = [event.chunk.type for event in found]
+    middle = set(kinds[1:-1]) <= {ChunkType.SKEL, ChunkType.MODL}
+    if kinds[:1] != [ChunkType.HEAD] or kinds[-1:] != [ChunkType.CLIP] or not middle:
+        held = " ".join(kind.decode() for kind in kinds)
+        raise FormatError(f"REPT before {offset} holds {held or 'nothing'}")
+    return found

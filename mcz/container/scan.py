@@ -15,9 +15,8 @@ from mcz.container.directory import Found, SegmentRow
 from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.grammar import BODY, CLIP, GRAMMAR, INDEX, NAMED, OTHER, START
 from mcz.container.packets import END
-from mcz.container.parser_drivers import events
+from mcz.container.parser_drivers import chunks_in, events
 from mcz.container.scanner import Scanner
-from mcz.container.segments import chunks_in
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 

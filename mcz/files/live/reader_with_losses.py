@@ -18,8 +18,8 @@ from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import parse_head
 from mcz.container.events import ChunkEvent, Fault, FootEvent, PacketEvent
 from mcz.container.limits import BASE, check
-from mcz.container.parser_drivers import Stream
-from mcz.container.segments import FRESH, SegmentHeader, chunks_in, parse_header
+from mcz.container.parser_drivers import Stream, chunks_in
+from mcz.container.segments import FRESH, SegmentHeader, parse_header
 from mcz.container.tolerant_parser import TolerantParser
 from mcz.errors import (
     ChecksumError,
