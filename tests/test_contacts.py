@@ -168,7 +168,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert contacts(motion) == whole
 
 
-# The rule, as docs/contacts.md, says it
+# The rule, as docs/guides/contacts.md, says it
 
 
 def by_definition(p: np.ndarray, rate: float, up: int) -> list[tuple[int, int]]:

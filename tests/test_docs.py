@@ -32,7 +32,7 @@ from mcz.codecs.parameters import TARGETS
 from mcz.sources import FORMATS
 
 ROOT = Path(mcz.__file__).parents[1]
-MANUAL = sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))
+MANUAL = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md"))
 PAGES = ("README.md", "CONTRIBUTING.md", *MANUAL)
 PROGRAMS = {"mcz": cli, "mcz-info": info_command}
 # What is not run here, and what runs it.
@@ -256,12 +256,12 @@ def _commands(group: click.Command, words: str) -> Iterator[tuple[str, click.Com
 
 
 def test_exit_codes_are_in_the_manual() -> None:
-    told = re.findall(r"^\| (\d+) \| ", text_of("docs/scripts.md"), re.M)
+    told = re.findall(r"^\| (\d+) \| ", text_of("docs/reference/scripts.md"), re.M)
     assert [int(code) for code in told] == list(Exit)
 
 
 def test_codecs_and_their_parameters_are_in_the_manual() -> None:
-    codecs, parameters = text_of("docs/codecs.md"), text_of("docs/parameters.md")
+    codecs, parameters = text_of("docs/guides/codecs.md"), text_of("docs/reference/parameters.md")
     told = {n for row in re.findall(r"^\| (`.+?) \|", codecs, re.M) for n in row.split("`")[1::2]}
     assert {codec.name for codec in CODECS.values()} | {t.name for t in TARGETS} <= told
     sections = dict(re.findall(r"^## (.+)\n((?:(?!## ).*\n?)*)", parameters, re.M))
@@ -286,4 +286,4 @@ def test_the_picture_shows_what_is_measured(tmp_path: Path) -> None:
     shown = re.findall(r">([\d,]+) bytes<", text_of("docs/walk.svg"))
     for text, (_, size, _) in zip(shown, picture.sizes(tmp_path), strict=True):
         assert int(text.replace(",", "")) == pytest.approx(size, rel=0.01)
-        assert text in text_of("docs/figures.md")
+        assert text in text_of("docs/evidence/figures.md")

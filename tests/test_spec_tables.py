@@ -335,7 +335,7 @@ def test_signals_of_c3d() -> None:
 def test_sizes_and_ratios() -> None:
     """Each figure of the table is one that the package states under that name."""
     code = "\n".join(path.read_text() for path in (ROOT / "mcz/files/reading").glob("*.py"))
-    text = (ROOT / "docs/measures.md").read_text("utf-8")
+    text = (ROOT / "docs/reference/measures.md").read_text("utf-8")
     for name, _ in rows_under("Sizes and ratios", text):
         assert f'"{name}"' in code, name
 
@@ -346,7 +346,7 @@ def test_sizes_and_ratios() -> None:
 )
 def test_keys_of_edits(heading: str, folder: str) -> None:
     code = "\n".join(path.read_text() for path in Path(ROOT / folder).glob("*.py"))
-    for key, _ in rows_under(heading, (ROOT / "docs/parts.md").read_text("utf-8")):
+    for key, _ in rows_under(heading, (ROOT / "docs/guides/parts.md").read_text("utf-8")):
         name = key.strip("`").removesuffix("ID")
         assert f'"{name}' in code, key
 

@@ -17,8 +17,8 @@ from typing import Any
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "SPEC.md"
-MEASURES = (ROOT / "docs/measures.md", ROOT / "docs/contacts.md")
-PARTS = ROOT / "docs/parts.md"
+MEASURES = (ROOT / "docs/reference/measures.md", ROOT / "docs/guides/contacts.md")
+PARTS = ROOT / "docs/guides/parts.md"
 REGISTRY = ROOT / "conformance" / "annex" / "registry.json"
 Rows = list[list[str]]
 

@@ -1,6 +1,6 @@
 """Bjontegaard deltas: two rate-distortion curves as two numbers.
 
-docs/measures.md, "Bjontegaard deltas", is normative.
+docs/reference/measures.md, "Bjontegaard deltas", is normative.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def write_file(motion: Motion, codec: str, params: Params) -> bytes:
 
 
 def coded_bytes(case: Case, variant: Variant, params: Params) -> int:
-    """Payload and overhead, docs/measures.md, and the models that the file has."""
+    """Payload and overhead, docs/reference/measures.md, and the models that the file has."""
     motion = what_is_coded(load(case).motion, variant.codec)
     data = write_file(motion, variant.codec, variant.options(params))
     with mcz.open(data, max_decoded=2**53) as file:

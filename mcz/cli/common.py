@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 class Exit(IntEnum):
-    """Exit codes of ``mcz`` and ``mcz-info``; docs/scripts.md and ``mcz --help`` list them."""
+    """Exit codes of ``mcz`` and ``mcz-info``, as docs/reference/scripts.md lists them."""
 
     FINE = 0
     BAD_INPUT = 1  # a file is missing, unreadable, refused or not what it should be
@@ -190,7 +190,7 @@ def _text_of(error: MczError) -> str:
 
 
 def _facts(error: MczError) -> JsonObject:
-    """The ``--json`` document of an error; docs/scripts.md lists the keys."""
+    """The ``--json`` document of an error; docs/reference/scripts.md lists the keys."""
     facts = {
         "exit_code": int(code_of(error)),
         "class": error.kind if isinstance(error, Failure) else type(error).__name__,

@@ -107,8 +107,8 @@ def command(
 ) -> Exit:
     """Compare B with A, the original: any two of .mcz and of source formats.
 
-    Errors of channels, and of positions in length units and cm, docs/measures.md; how far feet
-    slide that stand in A; compression ratios of an .mcz. The exit code is 0 whenever the two could
+    Print errors of channels, and of positions in length units and cm (docs/reference/measures.md),
+    how far feet slide that stand in A, and compression ratios of an .mcz. The exit code is 0 whenever the two could
     be compared, however much they differ. --where is asked of the clips of A, or of B where A is no
     .mcz.
     """

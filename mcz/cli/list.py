@@ -41,7 +41,7 @@ HEADS = {"name": "clip", "n_frames": "frames", "n_channels": "channels", "frame_
     metavar="a,b",
     help=(
         "Print these fields and metadata keys, such as "
-        "name,subject,duration,description; see docs/queries.md. Default: those of "
+        "name,subject,duration,description; see docs/reference/queries.md. Default: those of "
         "the index."
     ),
 )

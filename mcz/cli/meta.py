@@ -59,7 +59,7 @@ def _to_pairs(
 )
 @click.option(
     "--set", "pairs", metavar="KEY=VALUE", multiple=True, callback=_to_pairs,
-    help="Set a key (repeatable). Keys: docs/metadata.md, or x-... of your own.",
+    help="Set a key (repeatable). Keys: docs/guides/metadata.md, or x-... of your own.",
 )  # fmt: skip
 @click.option(
     "--remove", "removed", metavar="KEY", multiple=True, help="Remove a key (repeatable)."

@@ -164,7 +164,7 @@ where_option = click.option(
     metavar="QUERY",
     callback=_to_query,
     help="Select the clips that match a query, such as \"subject == '05' and n_frames > 500\"; "
-    "see docs/queries.md.",
+    "see docs/reference/queries.md.",
 )
 
 token_option = click.option(

@@ -31,7 +31,7 @@ def command(
 ) -> Exit:
     """Put the clips NAME first, then the others: as they were, or sorted --by KEY.
 
-    What is sorted by is a field or a metadata key, as in docs/queries.md.
+    What is sorted by is a field or a metadata key, as in docs/reference/queries.md.
     """
     import mcz
 

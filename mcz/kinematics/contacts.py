@@ -1,4 +1,4 @@
-"""Contacts: in which frames a foot stands. docs/contacts.md, is normative.
+"""Contacts: in which frames a foot stands. docs/guides/contacts.md, is normative.
 
 A foot stands where its point is slow and near the lowest that it gets. Two thresholds each keep
 the answer from flickering: what is below the wider ones belongs to a contact if somewhere in it
@@ -104,7 +104,7 @@ class Contacts:
 def contacts(
     motion: Motion, joints: Sequence[int | str] | None = None, rule: ContactRule = RULE
 ) -> Contacts:
-    """In which frames of ``motion`` a foot stands; docs/contacts.md, has the rule.
+    """In which frames of ``motion`` a foot stands; docs/guides/contacts.md, has the rule.
 
     ``joints`` are the feet, by index or name; None takes those whose names say so, ``LeftFoot``,
     ``ltoes`` and the like. What stands is the first point of the joint. An axis that points up and

@@ -25,7 +25,7 @@ _BETWEEN = re.compile(r"[\s_.\-]+")
 
 
 def is_foot(name: str) -> bool:
-    """Return whether a joint of this name is a part of a foot; docs/contacts.md lists the names.
+    """Tell whether a joint of this name is a part of a foot, by docs/guides/contacts.md.
 
     >>> [is_foot(name) for name in ("lfoot", "LeftToeBase", "Bip01 R Toe0", "foot_L", "lfemur")]
     [True, True, True, True, False]

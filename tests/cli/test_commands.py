@@ -213,7 +213,7 @@ def test_info(walk: Path, call: Call) -> None:
     assert document["format_version"] == VERSION
     assert set(document["clips"][0]) >= CLIP_KEYS
     clip = document["clips"][0]
-    manual = Path(mcz.__file__).parents[1].joinpath("docs/scripts.md").read_text("utf-8")
+    manual = Path(mcz.__file__).parents[1].joinpath("docs/reference/scripts.md").read_text("utf-8")
     for keys in (document, clip, document["skeletons"][0]):
         assert all(re.search(rf"\b{key}\b", manual) for key in keys), "the manual lists them all"
     assert (clip["n_frames"], clip["n_channels"], clip["n_joints"]) == (240, 96, 31)

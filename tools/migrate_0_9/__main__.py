@@ -1,4 +1,4 @@
-"""``python -m tools.migrate_0_9 --python-0-9 PYTHON OLD.mcz NEW.mcz``; docs/migration.md."""
+"""``python -m tools.migrate_0_9 --python-0-9 PYTHON OLD.mcz NEW.mcz``; docs/guides/migration.md."""
 
 from __future__ import annotations
 

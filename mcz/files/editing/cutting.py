@@ -355,7 +355,7 @@ def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
     """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
 
     All are as they are stored: a cut leaves each joint its index. Where these say of a former cut
-    what cannot be, it is taken for none. docs/parts.md, "Keys of cuts", has their meaning.
+    what cannot be, it is taken for none. docs/guides/parts.md, "Keys of cuts", has their meaning.
     """
     now = _keys(cut, old)
     for key, value in old.items():

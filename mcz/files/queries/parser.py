@@ -1,4 +1,4 @@
-"""The parser: text to tree, by recursive descent, a method a rule of docs/queries.md."""
+"""The parser: text to tree, by recursive descent, a method a rule of docs/reference/queries.md."""
 
 from __future__ import annotations
 

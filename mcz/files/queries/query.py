@@ -14,7 +14,7 @@ from mcz.model.text_format import among, nearest, shown
 
 
 class Query:
-    """A query such as ``subject == '05' and n_frames > 500``; see docs/queries.md.
+    """A query such as ``subject == '05' and n_frames > 500``; see docs/reference/queries.md.
 
     Raises OptionError, which shows the column, for a text that is none.
     """

@@ -1,4 +1,4 @@
-"""Fields and metadata of clips by name, as queries use them. See docs/queries.md.
+"""Fields and metadata of clips by name, as queries use them. See docs/reference/queries.md.
 
 A field costs no more than it must: the first of the table are in the index of the file, the others
 read the CLIP or the skeleton of the clip.

@@ -1,6 +1,6 @@
 """The bytes of a file: parts of clips, ratios, shares of groups, and every range of bytes.
 
-docs/measures.md, "Sizes and ratios", is normative.
+docs/reference/measures.md, "Sizes and ratios", is normative.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ def report(
     quick: bool = False,
     chosen: str | None = None,
 ) -> JsonObject:
-    """The report as a document, ready for JSON; docs/scripts.md lists its keys.
+    """The report as a document, ready for JSON; docs/reference/scripts.md lists its keys.
 
     ``facts``: those of ``bytes_facts``, and of ``contents`` where the file could be opened.
     ``parts``: what the verification says of each part. ``chosen``: the query of the clips that a

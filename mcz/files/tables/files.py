@@ -1,4 +1,4 @@
-"""Tables of numbers as files, CSV and NPZ; docs/tables.md describes them."""
+"""Tables of numbers as files, CSV and NPZ; docs/guides/tables.md describes them."""
 
 from __future__ import annotations
 

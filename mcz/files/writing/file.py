@@ -199,7 +199,7 @@ def encode(
 def to_npz(motion: Motion, target: Target, *, force: bool = False) -> None:
     """Write channels, skeleton, rotations and positions of ``motion`` as an NPZ without pickles.
 
-    docs/tables.md lists the arrays; "about" in the file says in words how they hang together.
+    docs/guides/tables.md lists the arrays; "about" in the file describes how they hang together.
     ``target`` is a path, an fsspec target or a binary stream. Raises ExistsError where it exists
     and not ``force``, and AccessError.
     """

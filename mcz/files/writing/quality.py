@@ -1,6 +1,6 @@
 """The quality record: what a lossy codec changed, and how it was asked to.
 
-SPEC.md, "QUAL", is normative; docs/measures.md defines the figures.
+SPEC.md, "QUAL", is normative; docs/reference/measures.md defines the figures.
 """
 
 from __future__ import annotations

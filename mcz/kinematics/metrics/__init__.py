@@ -1,6 +1,6 @@
 """Error metrics of decoded motions: channels, points, markers, shell, contacts.
 
-docs/measures.md, "Metrics", defines every id. Figures are sums of binary64 in no fixed order: they
+docs/reference/measures.md defines every id. Figures are sums of binary64 in no fixed order: they
 agree between machines to about 1e-9, not to the last bit.
 """
 

@@ -33,7 +33,7 @@ def compare(
     shell_cm: float | None = SHELL_CM,
     contacts: Contacts | Sequence[int | str] | bool = False,
 ) -> Comparison:
-    """The figures of ``decoded`` against ``original``; docs/measures.md, "Metrics", defines them.
+    """The figures of ``decoded`` against ``original``, defined in docs/reference/measures.md.
 
     Without ``virtual_markers`` theirs are None, and with ``shell_cm``, its radius, None those of
     the shell: either takes a quarter of the time or so. ``contacts`` asks how far feet slide that

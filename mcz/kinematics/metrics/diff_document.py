@@ -25,7 +25,7 @@ def diff_document(
     by_joint: bool = False,
     contact_list: bool = False,
 ) -> JsonObject:
-    """The figures of ``b`` against ``a``, the original; docs/scripts.md has the keys.
+    """The figures of ``b`` against ``a``, the original; docs/reference/scripts.md has the keys.
 
     ``start`` is the first frame of both in their clips, from which frames are counted. ``contacts``
     as ``compare`` takes them; None: of feet where names say so. ``by_joint`` and ``contact_list``

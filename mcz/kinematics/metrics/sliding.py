@@ -1,4 +1,4 @@
-"""Foot sliding during the original's contacts. docs/contacts.md has the definitions."""
+"""Foot sliding during the original's contacts. docs/guides/contacts.md has the definitions."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 The letters and signs of a text are gaps of its row's pattern. Its digits are columns of integers,
 one for each digit, or for each number where none is printed with leading zeros: so
-a time code costs no more than numbers that count. docs/readers.md, "Tables".
+a time code costs no more than numbers that count. docs/reference/readers.md, "Tables".
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mcz.kernels import lacks_compiled_kernels
 
-# CPU time a value, on one core, of 2,783 frames of 62 channels: docs/blender.md
+# CPU time a value, on one core, of 2,783 frames of 62 channels: docs/guides/blender.md
 COMPILED = {"fast": 0.7e-6, "best": 11e-6, "lossy": 72e-6}
 INTERPRETED = {"fast": 22e-6, "best": 1.25e-3, "lossy": 4.1e-3}
 SHORT = 60.0  # seconds for which nobody is warned

@@ -1,4 +1,4 @@
-// In which frames a foot stands: the rule of docs/contacts.md, as mcz/kinematics/contacts.py has it.
+// In which frames a foot stands: the rule of docs/guides/contacts.md, as mcz/kinematics/contacts.py has it.
 
 import { runsBetweenGaps } from "../ui/times.js";
 import { nextTurn } from "./turns.js";

@@ -1,5 +1,5 @@
 // The points of a C3D, for pages that nobody serves. Integers or floats of the three byte orders;
-// what the file says of itself is believed as docs/readers-binary.md, "C3D",
+// what the file says of itself is believed as docs/reference/readers-binary.md, "C3D",
 // believes it, but for files that contradict themselves.
 
 import { Order, findParameters } from "../../../js/c3d-parameters.js";
