@@ -108,9 +108,9 @@ def command(
     """Compare B with A, the original: any two of .mcz and of source formats.
 
     Print errors of channels, and of positions in length units and cm (docs/reference/measures.md),
-    how far feet slide that stand in A, and compression ratios of an .mcz. The exit code is 0 whenever the two could
-    be compared, however much they differ. --where is asked of the clips of A, or of B where A is no
-    .mcz.
+    how far feet slide that stand in A, and compression ratios of an .mcz. The exit code is 0
+    whenever the two could be compared, however much they differ. --where is asked of the clips of
+    A, or of B where A is no .mcz.
     """
     wanted = _Wanted(frames=frames, **options)
     if (a, b) == ("-", "-"):

@@ -249,8 +249,8 @@ class File:
         """The clips that ``where`` takes, in file order, which may be none.
 
         ``where`` is a function of a Clip or a query, "subject == '05' and n_frames > 500", of
-        docs/reference/queries.md. Raises OptionError for a text that is no query, and for a name in it that is
-        neither a field nor a metadata key of any clip.
+        docs/reference/queries.md. Raises OptionError for a text that is no query, and for a name in
+        it that is neither a field nor a metadata key of any clip.
         """
         return filter_clips(self, where, self.clips.values())
 
