@@ -35,7 +35,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a process made of one request."""
+    """A process's answer to one request."""
 
     code: int  # the exit code; below 0: minus the signal that ended the process
     output: bytes = b""
@@ -46,7 +46,7 @@ class Answer:
 
 
 class Worker(Protocol):
-    """What holds a process, or several."""
+    """Owner of one or several processes."""
 
     def kill(self) -> None: ...
 
@@ -54,7 +54,7 @@ class Worker(Protocol):
 
 
 class Asker(Worker, Protocol):
-    """What answers requests, one at a time."""
+    """A worker that answers requests, one at a time."""
 
     def ask(self, arguments: Sequence[str], data: Path | bytes, max_output: int) -> Answer: ...
 

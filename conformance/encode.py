@@ -43,7 +43,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What an encoder made of one source file."""
+    """An encoder's result for one source file."""
 
     task: Task
     fault: Fault | None = None
@@ -172,7 +172,7 @@ def _encoder_fault(answer: Answer) -> Fault | None:
 
 
 def _restored(decoder: Asker, task: Task, data: bytes) -> Fault | None:
-    """What is wrong with the .mcz ``data``, None where it gives the source file back."""
+    """Fault of the .mcz ``data``, None if it restores the source file."""
     limit = len(task.content) + len(task.skeleton or b"") + SPARE_OUTPUT
     decoded = decoder.ask([], data, 2**30)
     restored = decoder.ask(["--source"], data, limit)

@@ -1,4 +1,4 @@
-"""What became of all vectors, for machines: JSON, JUnit XML, and a badge as a file."""
+"""Machine-readable results of all vectors: JSON, JUnit XML, and a badge as a file."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def badge_file(report: Report, suffix: str) -> str:
 
 
 def document(report: Report) -> dict[str, Any]:
-    """What ``--json`` prints."""
+    """Document that ``--json`` prints."""
     passed, failed, not_asked = map(report.count, STATUSES)
     label, message, _ = badge(report)
     found: dict[str, Any] = {

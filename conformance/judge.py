@@ -1,4 +1,4 @@
-"""What is wrong with an answer, by name: the rules of README.md, "The contract"."""
+"""Faults of an answer, by name: the rules of README.md, "The contract"."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ UNCAUGHT = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What is wrong, by one of the names in README.md, and where."""
+    """A fault of an answer: ``kind`` is one of the names in README.md."""
 
     kind: str
     detail: str = ""
@@ -51,12 +51,12 @@ class Wrong(Exception):
 
 
 def judge_answer(request: Request, answer: Answer) -> Fault | None:
-    """What is wrong with ``answer``, None where nothing is."""
+    """Return the fault of ``answer``, or None."""
     return end_of(answer) or judge(request, answer.code, answer.output)
 
 
 def end_of(answer: Answer) -> Fault | None:
-    """What is wrong with the way in which a process ended, None where it gave an exit code."""
+    """Return the fault in a process's end, or None if it gave an exit code."""
     if answer.fault in ENDED:
         return Fault(answer.fault, answer.detail)
     if answer.code != OK and NO_MEMORY.search(answer.errors):
@@ -69,7 +69,7 @@ def end_of(answer: Answer) -> Fault | None:
 
 
 def judge(request: Request, code: int, output: bytes) -> Fault | None:
-    """What is wrong with this exit code and this output, None where nothing is."""
+    """Return the fault of this exit code and this output, or None."""
     wanted = request.vector["exit"]
     if code not in wanted:
         return _wrong_code(request, code, wanted)

@@ -1,5 +1,4 @@
-"""What is asked: the vectors of manifest.json, the calls that each asks for, and what a decoder
-declares that it can do."""
+"""Vectors of manifest.json, the requests for each, and the capabilities that a decoder declares."""
 
 from __future__ import annotations
 
@@ -93,7 +92,7 @@ def requests(vector: Vector, options: Collection[str]) -> Iterator[Request]:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a decoder declares; None where it says nothing, which means everything."""
+    """Capabilities that a decoder declares; None means all."""
 
     options: frozenset[str] = frozenset()
     codecs: frozenset[str] | None = None
@@ -102,7 +101,7 @@ class Capabilities:
 
     @classmethod
     def parse(cls, text: bytes) -> Capabilities:
-        """What the line of ``--capabilities`` says; ValueError where it is not as it should be."""
+        """Parse the line of ``--capabilities``; ValueError if it is malformed."""
         document = json.loads(text)
         if not isinstance(document, dict):
             raise ValueError("the capabilities are no object")
@@ -131,7 +130,7 @@ class Capabilities:
         return replace(self, codecs=codecs, sources=sources)
 
     def lacks(self, request: Request) -> list[str]:
-        """What ``request`` needs and this decoder does not have, in words."""
+        """List in words the capabilities that ``request`` needs and this decoder lacks."""
         vector = request.vector
         found = [
             word
@@ -152,7 +151,7 @@ class Capabilities:
         return found
 
     def is_full(self, vectors: Sequence[Vector]) -> bool:
-        """Whether only optional arguments keep the decoder from answering all of ``vectors``."""
+        """True if only optional arguments keep the decoder from answering all of ``vectors``."""
         requests = (request for vector in vectors for request in all_requests(vector))
         lacks = (lack for request in requests for lack in self.lacks(request))
         return all(lack.startswith("--") for lack in lacks)

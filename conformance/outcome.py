@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 @dataclass(slots=True)
 class Outcome:
-    """What became of one vector: ``asked`` counts its requests that were made."""
+    """Result of one vector: ``asked`` counts the requests made."""
 
     vector: Vector
     asked: int = 0
@@ -43,7 +43,7 @@ class Outcome:
 
 
 def capabilities(command: Sequence[str], limits: Limits) -> Capabilities:
-    """What the command declares; ValueError where what it writes is no such declaration.
+    """Ask the command for its capabilities; ValueError if its output is malformed.
 
     A command that fails, or writes nothing, declares nothing.
     """
@@ -88,7 +88,7 @@ def ask(
 
 
 def starter(command: Sequence[str], limits: Limits, *, serve: bool) -> Callable[[], Asker]:
-    """What makes an asker of ``command``."""
+    """Return a function that starts an asker of ``command``."""
     return lambda: Server(command, limits) if serve else Once(command, limits)
 
 

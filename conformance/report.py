@@ -71,7 +71,7 @@ def _requirements(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def _lacks(report: Report) -> str:
-    """What the decoder does not have, and how many vectors were not asked for it, or in part."""
+    """Capabilities that the decoder lacks, and the number of vectors skipped for them."""
     missing = Counter(lack for outcome in report.outcomes for lack in outcome.lacks)
     partly = sum(bool(o.asked and o.lacks) for o in report.outcomes)
     lines = [f"  {lack:<22}{n:>8}" for lack, n in sorted(missing.items())]

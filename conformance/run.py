@@ -126,7 +126,7 @@ def _command(words: str) -> list[str]:
 
 
 def _remarks(can: Capabilities, vectors: Sequence[Vector]) -> list[str]:
-    """What looks wrong in a declaration: a codec with a slip in its name is asked for nothing."""
+    """Suspicious entries of a declaration: a misspelled codec is never asked for."""
     known = {name for vector in vectors for name in vector.get("codecs", [])}
     return [
         f"note: no vector uses codec {name!r}" for name in sorted((can.codecs or set()) - known)

@@ -91,7 +91,7 @@ class Server:
             self._child.kill()
 
     def close(self) -> None:
-        """Let the process end."""
+        """Allow the process to end."""
         self._stop()
         self._errors.close()
 

@@ -32,13 +32,13 @@ class Report:
 
     @property
     def failed(self) -> bool:
-        """Whether anything failed, of the decoder or the encoder."""
+        """True if anything failed, of the decoder or the encoder."""
         results = self.results or ()
         return self.count("failed") > 0 or any(result.fault for result in results)
 
 
 def scope(report: Report) -> str:
-    """What a partial decoder has, in a few words."""
+    """Scope of a partial decoder, in a few words."""
     can = report.can
     if can.codecs is None:
         words = ["all codecs"]

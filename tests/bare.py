@@ -63,7 +63,7 @@ def decode_vectors(most: int) -> int:
 
 
 def use(path: Path) -> None:
-    """What a reader does with a file of one clip made of a source, and a rewriter."""
+    """Round-trip a source file and edit the result, with NumPy alone."""
     import numpy as np
 
     import mcz

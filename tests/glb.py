@@ -33,11 +33,11 @@ class Glb:
         return found.reshape(-1, width)
 
     def places(self, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Of every node, by name, where it is in the world, (n_times, 3)."""
+        """World positions of every node by name, (n_times, 3)."""
         return {name: matrix[:, :3, 3] for name, matrix in self.matrices(times).items()}
 
     def matrices(self, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Of every node, by name, its matrix in the world, (n_times, 4, 4)."""
+        """World matrices of every node by name, (n_times, 4, 4)."""
         nodes = self.document["nodes"]
         parents = {child: k for k, node in enumerate(nodes) for child in node.get("children", ())}
         tracks = self.tracks(times)
@@ -72,7 +72,7 @@ class Glb:
         return matrix
 
     def tracks(self, times: np.ndarray) -> dict[int, dict[str, np.ndarray]]:
-        """Of every node what the animation makes of its translation, rotation and scale."""
+        """Animated translation, rotation and scale of every node."""
         found: dict[int, dict[str, np.ndarray]] = {}
         for animation in self.document.get("animations", ()):
             for channel in animation["channels"]:

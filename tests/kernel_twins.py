@@ -84,7 +84,7 @@ def copied(value: Any) -> Any:
 
 
 def bits(value: Any) -> Any:
-    """What is compared of answers and arrays: every bit, but that every NaN is one."""
+    """Comparable form of answers and arrays: exact bits, with all NaNs equal."""
     if isinstance(value, np.ndarray):
         if value.dtype.kind == "f":
             value = np.where(np.isnan(value), np.nan, value)

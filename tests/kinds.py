@@ -128,7 +128,7 @@ def origin(name: str, whole: Values) -> tuple[str, int]:
 
 
 def kept(repaired: bytes, whole: Values) -> int:
-    """How many values a repaired file has; every one is as it was."""
+    """Count the values of a repaired file, each of which must be as it was."""
     count = 0
     for name, signals in values_of(repaired).items():
         of, start = origin(name, whole)

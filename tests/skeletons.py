@@ -65,7 +65,7 @@ def values_for(skeleton: Skeleton, n_frames: int = 7, seed: int = 0) -> np.ndarr
 
 
 def reference_points(skeleton: Skeleton, values: np.ndarray) -> np.ndarray:
-    """Where the points are, written after SPEC.md with SciPy's rotations, joint by joint."""
+    """Point positions after SPEC.md, with SciPy's rotations, joint by joint."""
     degrees = skeleton.angle_unit == "deg"
     none = Rotation.identity(len(values))
     placed: list[tuple[np.ndarray, Rotation]] = []  # origin and W of every joint

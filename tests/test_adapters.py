@@ -1,4 +1,4 @@
-"""What other libraries hold in memory: there and back with the real packages, bit for bit."""
+"""In-memory objects of other libraries: round trips with the real packages, bit for bit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POSITION = tuple(map(Channel, POSITION_KINDS))
 
 
 def same(one: Motion, other: Motion) -> bool:
-    """Whether two motions have the same signals, bit for bit, and the same names and rate."""
+    """True if two motions have the same signals, bit for bit, and the same names and rate."""
     return (
         one.skeleton.joint_names == other.skeleton.joint_names
         and one.frame_rate == other.frame_rate

@@ -17,6 +17,7 @@ import mcz
 
 PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
+ROOT = Path(__file__).parent.parent
 
 # Rooms, and what each may import beside itself.
 BASE = {"errors", "hints"}
@@ -109,12 +110,12 @@ def _imports(path: Path) -> Iterator[str]:
 
 
 def faults(of: Callable[[Path], object]) -> dict[str, object]:
-    """What is wrong with each module of which ``of`` says something."""
+    """Results of ``of`` for each module where they are not empty."""
     return {name_of(path): wrong for path in MODULES if (wrong := of(path))}
 
 
 def test_the_package_stands_alone() -> None:
-    """What is around it builds upon it, and never the other way round."""
+    """The tools, tests and runner import the package, never the other way round."""
     around = re.compile(r"(?m)^\s*(?:from|import) (?:tools|tests|conformance)\b.*")
     assert not faults(lambda path: around.findall(path.read_text("utf-8")))
 
@@ -249,7 +250,7 @@ def test_no_banned_construct() -> None:
 
 
 def is_explicit(dtype: ast.expr) -> bool:
-    """Whether a dtype names its byte order, or has none, or is a variable that may."""
+    """True if a dtype names its byte order, has none, or is a variable."""
     if isinstance(dtype, ast.JoinedStr):
         dtype = dtype.values[0]
     if isinstance(dtype, ast.Constant):
@@ -294,14 +295,22 @@ def test_modules_stay_short() -> None:
 CLAUSES = {"How", "Of", "That", "Those", "What", "When", "Where", "Whether", "Which", "Who", "Why"}
 
 
-def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
-    def clauses(path: Path) -> list[str]:
-        documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
-        nodes = (node for node in ast.walk(tree_of(path)) if isinstance(node, documented))
-        texts = (ast.get_docstring(node) or "." for node in nodes)
-        return [text for text in texts if text.split()[0] in CLAUSES]
+def clauses(path: Path) -> list[str]:
+    documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+    nodes = (node for node in ast.walk(tree_of(path)) if isinstance(node, documented))
+    texts = (ast.get_docstring(node) or "." for node in nodes)
+    return [text for text in texts if text.split()[0] in CLAUSES]
 
+
+def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
     assert not faults(clauses)
+
+
+@pytest.mark.parametrize("folder", ["tests", "tools", "conformance"])
+def test_docstrings_around_the_package_begin_with_a_noun_or_a_verb(folder: str) -> None:
+    paths = [p for p in (ROOT / folder).rglob("*.py") if "node_modules" not in p.parts]
+    assert paths
+    assert not {str(path): texts for path in paths if (texts := clauses(path))}
 
 
 MOST_PARAMETERS = 8

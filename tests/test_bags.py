@@ -33,7 +33,7 @@ def made(archive: Path, tmp_path: Path) -> Path:
 
 
 def is_valid(folder: Path) -> bool:
-    """What the library of the Library of Congress says."""
+    """Validate a bag with the library of the Library of Congress."""
     logging.disable(logging.CRITICAL)
     try:
         return bool(bagit.Bag(str(folder)).is_valid())

@@ -29,7 +29,7 @@ TYPES = {"object": dict, "array": list, "string": str, "integer": int}
 
 
 def faults(value: Any, schema: dict[str, Any], where: str) -> list[str]:
-    """What is wrong with ``value``, by the part of JSON Schema that our schema uses."""
+    """Faults of ``value`` by the part of JSON Schema that our schema uses."""
     if "$ref" in schema:
         return faults(value, SCHEMA["$defs"][schema["$ref"].rpartition("/")[2]], where)
     if "enum" in schema:

@@ -255,7 +255,7 @@ def test_a_fault_has_a_name(tmp_path: Path, fault: str, serve: list[str]) -> Non
 
 @pytest.mark.parametrize("serve", [[], ["--serve"]], ids=["processes", "served"])
 def test_a_large_runner_accuses_nobody(tmp_path: Path, serve: list[str]) -> None:
-    """What the runner itself holds is not its decoder's."""
+    """The runner's own memory is not counted as its decoder's."""
     limits = ["--memory", "100", "--jobs", "2"]
     code, document = result("--decoder", decoder(tmp_path), *limits, *serve, ballast=2**28)
     assert (code, kinds(document)) == (0, {})

@@ -131,7 +131,7 @@ def test_the_walk_to_bvh() -> None:
 
 
 def test_a_bvh_says_what_positions_mean() -> None:
-    """Whether they add to an offset is the reader's guess; without an offset it needs none."""
+    """Readers guess whether positions add to an offset; without an offset they need not."""
     root = Joint("hips", -1, (0.0, 1.0, 0.0), ((0.0, 1, 0),), channels=POSITION)
     motion = Motion(Skeleton((root,)), (Signal(np.array([[0.0, 0.9, 0]])),), Fraction(120))
     again = read(converted_files(motion, "bvh"), "bvh")
@@ -263,7 +263,7 @@ def test_refusals() -> None:
 
 @pytest.mark.parametrize("to", ["bvh", "amc", "c3d", "trc", "sto", "mot"])
 def test_signals_without_a_place_are_left_out_and_named(to: str) -> None:
-    """As the soft tissue of AMASS is: what else there is converts as it would alone."""
+    """Signals such as AMASS's soft tissue drop out; the others convert as they would alone."""
     tissue = Signal(np.zeros((240, 8)), name="dmpls", channels=(Channel("", "1"),) * 8)
     for motion in (WALKS["amc"], WALKS["bvh"]):
         more = replace(motion, signals=(*motion.signals, tissue))

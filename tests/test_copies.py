@@ -153,7 +153,7 @@ def test_what_is_sound_is_kept(packed: bytes) -> None:
 
 
 def test_an_archive_within_an_archive(packed: bytes) -> None:
-    """What the COPY of an attached file says is of that file, wherever it lies."""
+    """COPY of an attached file refers to that file, wherever it lies."""
     out = io.BytesIO()
     writer = Writer(out, copies=True)
     mcz.open(packed).close()

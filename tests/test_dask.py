@@ -41,7 +41,7 @@ def folder(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def packed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
-    """What one process makes of the folder, and what it says."""
+    """One process's archive of the folder, and its report."""
     target = tmp_path_factory.mktemp("packed") / "all.mcz"
     return target, said(mcz.pack(folder, target))
 
@@ -54,7 +54,7 @@ def said(report: mcz.Report) -> list[Any]:
 
 
 class Client:
-    """As much of ``distributed.Client`` as is used; each task is done twice, as if lost once."""
+    """A small stand-in for ``distributed.Client``; each task runs twice, as if lost once."""
 
     scheduler = SimpleNamespace(address="here")
 
@@ -170,7 +170,7 @@ def test_a_cluster_packs_and_verifies(
 
 
 def slow(state: Any, ask: Any) -> Any:
-    """What codes a file, and takes its time, so that a worker is ended in the middle."""
+    """Encode slowly, so that a worker can be killed in the middle."""
     from mcz.files.dask.sources import coded_there
 
     time.sleep(0.3)

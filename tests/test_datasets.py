@@ -45,7 +45,7 @@ ALL = ",".join(FIELDS)
 
 
 def wanted(motion: mcz.Motion, name: str, unit: str | None = None) -> np.ndarray:
-    """What a field is, by the functions for whole motions."""
+    """Expected values of a field, from the functions for whole motions."""
     if name == "channels":
         return motion.values
     if name == "root":
@@ -121,7 +121,7 @@ INDICES = st.one_of(
 
 @given(INDICES)
 def test_windows_are_chosen_as_numpy_does(archive: Path, index: object) -> None:
-    """What NumPy takes for an axis is what it is; all else is an error that is an IndexError."""
+    """Indices work as along a NumPy axis; all others raise an IndexError."""
     data = mcz.dataset(archive, "root", window=64, stride=48)
     assert len(data) == 16
     numbers = np.arange(16)

@@ -69,7 +69,7 @@ class Ran(NamedTuple):
 
 
 def in_process(program: click.Command, words: list[str], data: bytes) -> Ran:
-    """What ``program`` makes of ``words`` and of ``data`` on its standard input."""
+    """Run ``program`` with ``words`` as its arguments and ``data`` on its standard input."""
     streams = [io.TextIOWrapper(io.BytesIO(data)), *(_output() for _ in range(2))]
     before = sys.stdin, sys.stdout, sys.stderr
     sys.stdin, sys.stdout, sys.stderr = streams

@@ -212,7 +212,7 @@ def test_metadata_that_are_registered_or_private_are_kept(tmp_path: Path) -> Non
 
 
 def test_clips_that_nobody_has_are_let_go() -> None:
-    """What a clip has read goes with it, so that work on all of an archive is bounded."""
+    """Dropping a clip drops its cache, so that work on a whole archive stays bounded."""
     from weakref import ref
 
     from mcz.codecs import codec_by_name

@@ -71,7 +71,7 @@ def test_parts_and_ratio_of_the_samples(
 def test_a_small_file_has_no_ratio_without_its_skeleton(
     samples: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of two frames most bytes are the skeleton's, whatever the codec makes of the rest."""
+    """Most bytes of a clip of two frames are its skeleton's, whatever the codec."""
     lines = (samples / "walk.bvh").read_text().splitlines(keepends=True)
     at = next(n for n, line in enumerate(lines) if line.startswith("Frames:"))
     lines[at] = "Frames: 2\n"

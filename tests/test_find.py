@@ -195,7 +195,7 @@ def test_names_and_queries_together(archive: Path) -> None:
 
 
 def test_twenty_thousand_clips(archive: Path) -> None:
-    """Where the index says all, no clip is read."""
+    """No clip is read where the index answers the query."""
     with mcz.open(archive) as file:
         rows = file.container.directory.clips
         row = rows.pop("05_01")
@@ -255,7 +255,7 @@ def test_parts_of_a_file(archive: Path, packed: Path, tmp_path: Path) -> None:
 
 @pytest.mark.real
 def test_real_clips(data: Path, tmp_path: Path) -> None:
-    """What is found in an archive is what is there."""
+    """A search of an archive finds the clips that it holds."""
     folder = data / "cmu/c3d"
     files = sorted(folder.rglob("*.c3d"))
     mcz.pack(folder, tmp_path / "a.mcz")

@@ -77,7 +77,7 @@ def test_hashes_are_those_of_what_is_decoded() -> None:
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.__name__)
 def test_steps_change_files_behind_their_checksums(step: object) -> None:
-    """What is refused is refused for what was changed; headers and checksums are right."""
+    """Mutated files fail for the mutation; headers and checksums are right."""
     changed = 0
     for seed, path in enumerate(vectors()[::11]):
         rng = random.Random(seed)

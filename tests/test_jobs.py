@@ -30,7 +30,7 @@ from tests.worker_functions import dies, dies_once, fails, joined
 
 @pytest.fixture(autouse=True)
 def worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the smallest work be worth a process."""
+    """Make the smallest work worth a process."""
     monkeypatch.setattr(jobs, "LEAST_BYTES", 0)
     monkeypatch.setattr(jobs, "LEAST_STORED", 0)
 
@@ -39,7 +39,7 @@ def worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
 def here(
     function: Callable[[Any, Any], Any], items: Iterable[Any], jobs: int, state: Any = None
 ) -> Iterator[Iterator[Any]]:
-    """As ``mcz.files.jobs.pool.answers``, without its processes: all goes through pickle."""
+    """Stand-in for ``mcz.files.jobs.pool.answers``: no processes, but pickled arguments."""
 
     def answer(item: Any) -> Callable[[], Any] | None:
         if item is None:

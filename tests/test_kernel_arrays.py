@@ -267,7 +267,7 @@ def test_input_and_output_overlap(mode: str) -> None:
 
 @pytest.mark.parametrize("at", [5, -1, -6, 2**40, -(2**40), 2**63 - 1, -(2**63)])
 def test_an_index_out_of_range(at: int) -> None:
-    """Of kernels that return a number, a tuple, and nothing."""
+    """Kernels that return a number, a tuple or nothing all raise."""
     row = np.arange(5)
     for name, array in (
         ("item", row),
@@ -325,7 +325,7 @@ def motion_of(values: Array) -> Motion:
 
 
 def test_decoded_arrays_stay(tmp_path: Path) -> None:
-    """What was decoded keeps its numbers while more is decoded and what was used for it goes."""
+    """Decoded arrays keep their numbers while more is decoded and buffers are freed."""
     path = tmp_path / "clip.mcz"
     mcz.write(motion_of(np.arange(300.0).reshape(100, 3)), path, codec="fast")
     first = mcz.read(path).values

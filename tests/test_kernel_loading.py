@@ -1,4 +1,4 @@
-"""Which compiled kernels run: those of the package that its sources are as, and no others."""
+"""The choice of compiled kernels: only those built from the package's present sources."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def wrapped(answer: Any) -> Any:
 
 
 def bits(answer: Any) -> Any:
-    """What is compared: numbers by their bits, but every NaN is one."""
+    """Comparable form of an answer: numbers by their bits, with all NaNs equal."""
     if isinstance(answer, tuple):
         return tuple(map(bits, answer))
     if isinstance(answer, np.ndarray):

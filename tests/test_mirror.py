@@ -33,7 +33,7 @@ def without_scalars(skeleton: Skeleton) -> Skeleton:
 
 
 def missed(motion: Motion, mirrored: Motion, axis: str = "x", pairs: dict | None = None) -> float:
-    """How far points are from the mirrored points of the counterparts of their joints."""
+    """Distance of points from the mirrored points of their counterparts."""
     others = counterparts(motion.skeleton.joint_names, pairs)
     numbers = iter(range(10**6))
     ours = [[next(numbers) for _ in tails] for tails in points_of(motion.skeleton)]

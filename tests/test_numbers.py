@@ -78,7 +78,7 @@ def test_printed_as_python_prints(
 
 @given(st.lists(st.floats(0, 1e20), min_size=1, max_size=8), st.integers(0, 40))
 def test_printed_with_17_digits(numbers: list[float], places: int) -> None:
-    """As C libraries of Windows did: digits behind the 17th are 0."""
+    """C libraries of Windows print zeros after the 17th digit."""
     grid = Grid(GridKind.PRINTED, 64, style=64 + places)
     for text, x in zip(grid.texts(grid.ordinals(np.array(numbers))[0]), numbers, strict=True):
         exact = Decimal(f"{x:.16e}")
@@ -297,7 +297,7 @@ def by_steps(value: float, digits: int) -> int:
 @given(st.integers(-6, 36), st.integers(-60, 60), st.integers(1, 15))
 @example(5, -7, 15)
 def test_around_powers_of_ten(power: int, steps: int, digits: int) -> None:
-    """Where the logarithm of a value is rounded to one that it has not reached."""
+    """The logarithm of a value may round to an integer that the value has not reached."""
     value = 10.0**power
     for _ in range(abs(steps)):
         value = math.nextafter(value, math.copysign(math.inf, steps))

@@ -1,4 +1,4 @@
-"""What a part of a clip is worth: as much as the whole, unless it was asked for unverified."""
+"""Parts of a clip are verified like the whole, unless the caller asks for unverified ones."""
 
 from __future__ import annotations
 

@@ -187,7 +187,7 @@ def test_channels_and_their_units(walk: Motion, samples: Path, tmp_path: Path) -
 
 @pytest.mark.parametrize("n", [8, 9, 600, 1023, 1024])
 def test_the_spectrum_has_all_the_power(n: int) -> None:
-    """Of one piece: that under its window, without its straight line, whose spectrum is none."""
+    """One window's spectrum has the power of the detrended signal under that window."""
     time = np.arange(n)
     column = np.random.default_rng(n).normal(size=n) * 3
     at, power = density(column + 5 - 0.25 * time, 120.0)

@@ -56,7 +56,7 @@ def tables(draw: st.DrawFn) -> np.ndarray:
 
 
 def same(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether the bits are the same, but for those of a NaN."""
+    """True if the bits are the same, with all NaNs equal."""
     one, other = np.asarray(one), np.asarray(other)
     bits = np.where(np.isnan(one), 0, one.view(np.int64))
     return bool(

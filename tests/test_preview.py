@@ -1,4 +1,4 @@
-"""What a clip shows of itself without being decoded."""
+"""Previews: frames of a clip without decoding it."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ class Watched(io.BytesIO):
 
 
 def detail_ranges(file: mcz.File, info: SignalInfo) -> list[slice]:
-    """Where the streams of all but the coarsest resolution lie."""
+    """Byte ranges of the streams of all but the coarsest resolution."""
     out = []
     for row in info.rows:
         table = file.container.table(row, info.counts)

@@ -45,7 +45,7 @@ CLIP: dict[str, Value] = {
 
 
 def ask(text: str) -> bool | None:
-    """What a query says of CLIP: None where it is unknown."""
+    """Answer of a query about CLIP, None for unknown."""
     taken, denied = (Query(each).matches(CLIP.__getitem__) for each in (text, f"not ({text})"))
     assert not (taken and denied)
     return taken if taken or denied else None

@@ -1,4 +1,4 @@
-"""Which frame rate a file has: its own, where it states one; the caller's, where it does not."""
+"""The frame rate of a file: its own if it states one, otherwise the caller's."""
 
 from __future__ import annotations
 

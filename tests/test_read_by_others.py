@@ -1,4 +1,4 @@
-"""What ``decode --to`` writes, read by parties of their own; what it leaves out, said.
+"""Output of ``decode --to``, read by independent libraries, and the notes about losses.
 
 GLB is read by others in ``test_scenes``, USD in ``test_usda``, C3D in ``test_adapters``.
 """

@@ -136,7 +136,7 @@ def test_a_file_that_is_as_it_was_comes_back(archive: bytes, tmp_path: Path) -> 
 def test_bad_bytes_wherever_they_lie(
     archive: bytes, shapes: list[Shape], tmp_path: Path, data: st.DataObject
 ) -> None:
-    """As many single bytes as there are recovery blocks, in any place, packets among them."""
+    """Repair corrects one bad byte per recovery block, anywhere, packets included."""
     bad = bytearray(archive)
     for shape in shapes:
         most = shape.n_recovery
@@ -322,7 +322,7 @@ def test_all_of_a_file_is_protected_anew(archive: bytes, tmp_path: Path) -> None
 def test_a_full_disk_costs_no_recovery_data(
     archive: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is rewritten has its new recovery data before it has the name."""
+    """A rewritten file gets its recovery data before it gets its name."""
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -401,7 +401,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
 
 
 def held(data: bytes) -> set[tuple[str, bytes]]:
-    """What a file gives, by name."""
+    """Contents of a file, by name."""
     with mcz.open(data) as file:
         found = {(clip.name, clip.read().tobytes()) for clip in file}
         return found | {(name, one.read()) for name, one in file.attachments.items()}
@@ -440,7 +440,7 @@ def test_protection_makes_no_tail_worse(
 def test_other_files_have_recovery_data_too(
     small: tuple[bytes, bytes], archive: bytes, tmp_path: Path
 ) -> None:
-    """Of a protected file that is attached, or put behind it, repair makes no file of its own."""
+    """Repair does not extract a protected file that is attached or appended."""
     takes = tmp_path / "takes"
     takes.mkdir()
     (takes / "walk.bvh").write_text(TINY.replace("1.5", "2.5"))

@@ -44,7 +44,7 @@ def pixels(path: Path) -> np.ndarray:
 
 
 def near(picture: np.ndarray, color: str, reach: int = 40) -> np.ndarray:
-    """Where a picture has about this color."""
+    """Mask of the pixels with about this color."""
     return (np.abs(picture - np.array(rgb(color)) * 255).max(axis=2) < reach).nonzero()
 
 

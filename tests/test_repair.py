@@ -208,7 +208,7 @@ def test_a_signal_that_is_lost_takes_no_other_along(samples: Path, tmp_path: Pat
 
 
 def test_what_cannot_be_decoded_here_needs_its_end(tmp_path: Path) -> None:
-    """Of an unknown codec: kept as it is, with CEND; without that nobody can make its hashes."""
+    """Clips of an unknown codec are kept with their CEND; without it their hashes are lost."""
     data = with_unknown_codec(tmp_path)
     found, repaired_data = repaired(data + b"junk", tmp_path)
     assert (found.clips, found.lost) == (["walk"], [])
@@ -276,7 +276,7 @@ def test_a_lost_head_and_alias_are_in_the_index(archive: bytes, tmp_path: Path) 
 
 
 def test_a_lost_skeleton_costs_names_alone(tmp_path: Path) -> None:
-    """Where its source cannot give it back: values whose hash is right, and no source file."""
+    """Values with a valid hash survive without names and source if no source restores the names."""
     (tmp_path / "t.csv").write_text("a,b\n" + "".join(f"{n},{n / 8}\n" for n in range(90)))
     mcz.encode(tmp_path / "t.csv", tmp_path / "t.mcz", rate=10)
     data = (tmp_path / "t.mcz").read_bytes()

@@ -182,7 +182,7 @@ def test_joints_that_are_left_out_rest_and_others_turn_for_them() -> None:
 
 
 def test_other_positions_keep_what_they_add_to_rest() -> None:
-    """Where both joints have them: added to the offset by one, in its place by the other."""
+    """One joint adds positions to its offset, the other replaces it."""
 
     def skeleton(offset: tuple[float, float, float], adds: bool) -> Skeleton:
         joint = Joint("b", 0, offset, channels=POSITIONS + ROTATIONS, adds_to_offset=adds)
@@ -402,7 +402,7 @@ def test_flavors_of_real_clips_are_recognized(data: Path) -> None:
 
 @pytest.mark.real
 def test_a_real_clip_on_the_skeleton_of_its_own_conversion(data: Path) -> None:
-    """What others made of the AMC is what retargeting makes of it: all turns, to four decimals."""
+    """Retargeting an AMC equals a third party's conversion: all turns, to four decimals."""
     motion = mcz.read(data / "cmu/amc/01_01.amc")
     other = mcz.read(data / "cmu/bvh/01_01.bvh")
     made = mcz.retarget(motion, other.skeleton, mcz.joint_map(motion.skeleton, other.skeleton))

@@ -1,4 +1,4 @@
-"""What lies in the folder that is unpacked into, and names that not every system can hold."""
+"""Unpacking into folders that hold files, and names that some systems reject."""
 
 from __future__ import annotations
 

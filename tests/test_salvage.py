@@ -1,4 +1,4 @@
-"""What a salvaging reader calls valid is what the whole file has, whichever segment is lost."""
+"""Salvaged values marked valid equal the whole file's, whichever segment is lost."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Arrays = dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]
 
 
 def segments_of(data: bytes) -> list[int]:
-    """Where the payloads of closed DATA begin, those that have bytes."""
+    """Offsets of the non-empty payloads of closed DATA."""
     starts = [match.end() for match in re.finditer(rb"DATA.\x00..(?=.{8})", data, re.DOTALL)]
     lengths = {at: int.from_bytes(data[at : at + 8], "little") for at in starts}
     return [at + 8 for at, n in lengths.items() if n != OPEN_LENGTH and 0 < n < len(data) - at]

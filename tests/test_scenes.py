@@ -43,7 +43,7 @@ TO_Y_UP = {
 
 
 def worst(motion: Motion, data: bytes) -> float:
-    """How far a joint or a point is from where the motion has it, in meters or units."""
+    """Greatest distance of a joint or point from the motion's, in meters or units."""
     rate, skeleton = motion.frame_rate, motion.skeleton
     assert rate is not None
     times = (np.arange(motion.n_frames) / float(rate)).astype(np.float32).astype(np.float64)

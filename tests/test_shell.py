@@ -156,7 +156,7 @@ def test_beside_plain_sums(motion: Motion, radius: float) -> None:
 def same_figures(
     mean: float | None, most: float | None, distances: np.ndarray, known: np.ndarray
 ) -> bool:
-    """Whether there are such figures, which then are those of ``distances`` where known."""
+    """Compare both figures with the known ``distances``; False if these give no figures."""
     counted = distances[known]
     with np.errstate(all="ignore"):
         if not counted.size or not np.isfinite(counted.sum()):

@@ -80,7 +80,7 @@ def read(path: Path, **options: object) -> tuple[mcz.Motion, list[str]]:
     ],
 )
 def test_without_a_word(tmp_path: Path, amc: str, asfs: dict[str, str], note: str) -> None:
-    """Where the name fits the take, and bones and dofs fit the file."""
+    """Skeletons are chosen by the take's name if bones and DOFs fit the file."""
     motion, said = read(put(tmp_path, amc, **asfs))
     assert said == []
     assert note in motion.metadata["skeleton-note"]

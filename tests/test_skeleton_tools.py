@@ -30,7 +30,7 @@ def numbers_of(motion: Motion, joint: str) -> np.ndarray:
 
 
 def apart(before: Motion, after: Motion) -> float:
-    """How far joints of ``after`` lie from those of their names, or are turned from them."""
+    """Greatest position or rotation difference of joints with the same name."""
     unit = {"unit_cm": 1.0}
     kept = [before.skeleton.find(name) for name in after.skeleton.joint_names]
     there = replace(before.skeleton, **unit), before.values

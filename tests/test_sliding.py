@@ -1,4 +1,4 @@
-"""How far feet slide: by hand, in contacts that are given, with gaps, on real clips."""
+"""Foot sliding: known values, given contacts, gaps, real clips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What info says: of source files, of groups of joints, and of one fault once."""
+"""Output of info about source files and groups of joints; one fault is reported once."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ def test_sizes_of_start_tables(name: str) -> None:
 
 
 def test_places_of_residuals_in_codecs() -> None:
-    """Of first contexts and mixers the text names some; all follow from the sizes."""
+    """The text names some first contexts and mixers; all follow from the sizes."""
     first = residuals.N_CONTEXTS, residuals.N_MIXERS
     second = 2 * first[0], 2 * first[1]
     assert ((0, 0), first, second) == (

@@ -73,7 +73,7 @@ def rows(n: int = 60, seed: int = 1) -> np.ndarray:
 
 
 def pieces(codec: str = "stairs", n: int = 60, **more: object) -> list[bytes]:
-    """What precedes the frames, then the bytes of each, then what follows them."""
+    """Split a stream: its beginning, the bytes of each frame, its end."""
     codecs.CODECS[live_codec.CODEC.name] = live_codec.CODEC
     rate = Fraction(120)
     given = {"params": CODECS[codec], "frame_rate": rate, "unit": "cm"} | more
@@ -103,7 +103,7 @@ def check_decoded(found: list[LiveFrame], whole: list[LiveFrame]) -> None:
 
 
 def packet_spans(data: bytes) -> list[tuple[int, int]]:
-    """Where each packet with a frame begins and ends."""
+    """Begin and end of each packet with a frame."""
     spans, number = [], 0
     with mcz.open(data) as file:
         for row in file.clips["live"].signals[0].rows:
@@ -427,7 +427,7 @@ def test_joining_anywhere(codec: str, lost: str) -> None:
 
 
 def test_joining_behind_the_beginning() -> None:
-    """As over TCP: who is late gets what precedes the frames, then those from a fresh one on."""
+    """Late receivers over TCP get the beginning, then the frames from a fresh one on."""
     parts = pieces()
     end = len(build_packet(Packet(END, 10, b"")))
     late = b"".join([parts[0], parts[21][end:], *parts[22:]])
@@ -535,7 +535,7 @@ def test_any_damage(edits: list[tuple[float, str, int]], lost: str, join: bool) 
 
 
 def heads_and_bodies(data: bytes) -> list[tuple[int, int, int]]:
-    """Where each packet with a frame begins, its body begins, and it ends."""
+    """Begin, begin of the body, and end of each packet with a frame."""
     return [(start, stop - CHECK_SIZE - size, stop) for start, stop, size in _spans(data)]
 
 
@@ -632,8 +632,7 @@ def test_a_packet_that_tells_its_frame_puts_those_behind_it_right() -> None:
 
 @pytest.mark.parametrize("cut", [0, 1, 4, 9, 12, 30])
 def test_an_unchecked_packet_hides_nothing(cut: int) -> None:
-    """Of a DATA whose first packet is lost no frame is checked: one that lacks some bytes reaches
-    into what follows it, which is found all the same."""
+    """Packets after an unchecked one are found even if it is cut."""
     data = b"".join(pieces())
     whole, _ = read(data)
     places = heads_and_bodies(data)

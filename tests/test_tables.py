@@ -35,7 +35,7 @@ def world_of(quaternions: np.ndarray) -> np.ndarray:
 
 
 def places(arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """What "about" says, in NumPy: the places and rotations of joints in the world."""
+    """World positions and rotations of joints, computed in NumPy as the text "about" states."""
     local, steps = world_of(arrays["quaternions"]), arrays["translations"]
     world, origins = np.empty_like(local), np.empty_like(steps)
     for joint, parent in enumerate(arrays["parents"]):

@@ -48,7 +48,7 @@ def saved(motion: Motion, **params: object) -> bytes:
 
 
 class Found:
-    """What the public reader finds in a file, measured anew."""
+    """The public reader's account of a file, measured again."""
 
     def __init__(self, motion: Motion, data: bytes) -> None:
         with mcz.open(data) as file:
@@ -335,7 +335,7 @@ COUNTED = Dial("n", 1, 1000, whole=True)
     st.booleans(),
 )
 def test_integers_that_meet_the_target_are_the_nearest(dial, whole, more, falls) -> None:
-    """Of a figure without jumps no integer comes nearer, or it is near enough."""
+    """No integer comes nearer for a figure without jumps, unless it is near enough."""
     rises = falls == dial.rises  # the figure, with the dial
     figure: Callable[[float], float] = float if rises else (lambda n: 1.0 / n)
     limit = whole + more if rises else 1 / (whole - more * 0.5)

@@ -1,4 +1,4 @@
-"""What makes the conformance vectors: files made at random, and the tables behind the manifest."""
+"""The tools behind the conformance vectors: random files, and the manifest's tables."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def _with(directory: object, name: str, table: dict) -> object:
 
 
 def test_blocks_end_anywhere(packed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is read at a time does not change what is found; memory is bounded by it."""
+    """The block size bounds memory and does not change the findings."""
     from mcz.container import parser
 
     open_ones = live()

@@ -44,7 +44,7 @@ def test_the_exponential_map_is_scipys(seed: int, size: float) -> None:
 
 @given(SEEDS, SIZES, st.integers(0, 2))
 def test_spins_are_slopes(seed: int, size: float, component: int) -> None:
-    """Of exp(v + h e) exp(v)^-1: (w x) to the first order."""
+    """Rate of exp(v + h e) exp(v)^-1, (w x) to the first order."""
     v, step = vectors(seed, size), np.zeros((3, 1))
     step[component] = 1e-6
     ends = [Rotation.from_rotvec((v + sign * step).T) for sign in (1, -1)]

@@ -68,7 +68,7 @@ def ranged(
 
 @contextmanager
 def served(found: Server, context: ssl.SSLContext | None = None) -> Iterator[None]:
-    """Let ``found`` answer at an address of this computer, with connections that are kept."""
+    """Serve ``found`` at a local address, with persistent connections."""
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"

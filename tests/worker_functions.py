@@ -1,4 +1,4 @@
-"""What processes of a pool are given to do in tests: little to import."""
+"""Functions for processes of a pool in tests, with few imports."""
 
 from __future__ import annotations
 

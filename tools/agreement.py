@@ -1,4 +1,4 @@
-"""How far MCZ's poses are from what other libraries make of the same files.
+"""Compare MCZ's poses with those of other libraries for the same files.
 
     python tools/agreement.py FOLDER
 

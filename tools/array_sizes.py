@@ -1,4 +1,4 @@
-"""How large NPZ files get: ``python -m tools.array_sizes FILES OR FOLDERS``.
+"""Compare sizes of NPZ files: ``python -m tools.array_sizes FILES OR FOLDERS``.
 
 Sums over all files: the NPZ as it is, ``numpy.savez_compressed``, xz -9e of the file, the arrays
 by blosc2 (shuffle and zstd, by rows or columns, whichever is less) and by pcodec (column after

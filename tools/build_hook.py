@@ -1,4 +1,4 @@
-"""What hatchling does beside copying files: the page of ``mcz view``, and kernels compiled.
+"""Build hook of hatchling: checks for the page of ``mcz view`` and compiles kernels.
 
 The page has to be built before; a build without it fails, but for ``MCZ_BUILD_WITHOUT_VIEWER=1``.
 
@@ -88,7 +88,7 @@ class Hook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def can_fetch(name: str) -> bool:
-    """Whether pip finds a package, or is not what installs; nothing is installed."""
+    """True if pip finds a package or is not the installer; installs nothing."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}  # pip's own is outside
     pip = [sys.executable, "-m", "pip"]
     asked = ["index", "versions", name, "--retries", "1", "--timeout", "15"]

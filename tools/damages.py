@@ -29,7 +29,7 @@ Spoil = Callable[[bytearray, mcz.Protection, random.Random], bytes]
 
 
 def length(limit: int, chance: random.Random) -> int:
-    """How much is damaged: the limit as often as less."""
+    """Length of the damage: the limit as often as less."""
     return limit if chance.random() < 0.5 else chance.randint(1, limit)
 
 

@@ -1,4 +1,4 @@
-"""How many windows a second a data set gives, beside array files of the same numbers.
+"""Windows a second of a data set, beside array files of the same numbers.
 
     python tools/dataset_speed.py FOLDER [--copies N] [--windows N]
 

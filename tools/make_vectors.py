@@ -123,7 +123,7 @@ def files() -> dict[str, bytes]:
 
 
 def files_of(names: Collection[str]) -> dict[str, bytes]:
-    """Those of the tables ``names``; the manifest's other rows stay as they are."""
+    """Files of the tables ``names``; the manifest's other rows stay as they are."""
     unknown = sorted(set(names) - set(tables()))
     if unknown:
         raise SystemExit(f"make_vectors: there is no table {', '.join(unknown)}")

@@ -34,7 +34,7 @@ def rows_after(text: str, mark: str) -> Rows:
 
 
 def registry(text: str) -> dict[str, Any]:
-    """What the file holds, made of SPEC.md's ``text``."""
+    """Content of the registry file, from SPEC.md's ``text``."""
     text = re.sub(r" \[[A-Z0-9]+-\d\d\]", "", text)  # ids of requirements
     version = re.search(r"^Version (\d+\.\d+)", text, re.M)
     assert version is not None

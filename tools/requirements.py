@@ -1,4 +1,4 @@
-"""Which vectors show which rule of SPEC.md: rules have ids, rows of the manifest name them.
+"""Vectors of each rule of SPEC.md: rules have ids, rows of the manifest name them.
 
     python tools/requirements.py [--json] [--section WORD] [--uncovered]
 
@@ -85,7 +85,7 @@ def rules(text: str) -> list[Rule]:
 
 
 def _words(sentence: str, begin: int, mark: re.Match[str]) -> str:
-    """What belongs to an id: up to it from the one before, or up to the end behind the last."""
+    """Sentence of an id: up to it from the previous id, or up to the end after the last."""
     last = not ID.search(sentence, mark.end())
     words = " ".join(ID.sub("", sentence[begin : None if last else mark.start()]).split())
     words = re.sub(r" ([.,:;])", r"\1", words).strip(" |-#,;")
@@ -93,7 +93,7 @@ def _words(sentence: str, begin: int, mark: re.Match[str]) -> str:
 
 
 def faults(text: str) -> list[str]:
-    """What is wrong with the ids of SPEC.md, in words."""
+    """Faults of the ids in SPEC.md, in words."""
     found = []
     ids = [rule.id for rule in rules(text)]
     found += [f"{name} stands twice" for name, count in Counter(ids).items() if count > 1]

@@ -1,4 +1,4 @@
-"""How large source files get, beside xz: ``python -m tools.source_sizes FILES OR FOLDERS``.
+"""Compare sizes of source files with xz: ``python -m tools.source_sizes FILES OR FOLDERS``.
 
 A line a file: its bytes, xz -9e, mcz with --effort fast and best, and whether it came back
 byte for byte.

@@ -113,7 +113,7 @@ def rows(structure: Any) -> Iterator[tuple[str, str, str]]:
 
 
 def type_name(field: Any) -> str:
-    """How SPEC.md calls a type."""
+    """Name of a type in SPEC.md."""
     if id(field) in NAMED:
         return NAMED[id(field)]
     if is_record(field):
@@ -169,7 +169,7 @@ def _wrapped(links: list[str]) -> str:
 
 
 def anchor(heading: str) -> str:
-    """What links to a heading: as GitHub and most others name it."""
+    """Anchor of a heading, as GitHub and most others form it."""
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 

@@ -213,7 +213,7 @@ class Channel:
         self.step, self.level = [0.0, *self.step[:4]], [0.0, self.level[0]]
 
     def features(self) -> tuple[list[float], list[float], list[float]]:
-        """Those of the three regressions."""
+        """Features of the three regressions."""
         o, m = self.references, self.references[:6]
         linear = [*self.step[1:5], *(one.step[0] for one in m), *(one.step[1] for one in m)]
         quadratic = [*self.step[1:4], *(one.step[0] for one in o)]

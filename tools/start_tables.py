@@ -1,4 +1,4 @@
-"""What the training tools share: coders that go on where the last stream ended, and their tables.
+"""Shared parts of the training tools: coders that continue across streams, and their tables.
 
 A start table is the mean of what a coder knows after each file, counts cut to ``max_count`` so that
 a stream soon outweighs it. Changing a table changes the format: tables are annexes of SPEC.md.

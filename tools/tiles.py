@@ -72,7 +72,7 @@ READERS = {".bvh": bvh, ".c3d": c3d}
 
 
 def recordings(folder: Path) -> Iterator[tuple[Path, int, Tile]]:
-    """What of the files below a folder can be tiled, in the order of their names."""
+    """Files below a folder that can be tiled, sorted by name."""
     for path in sorted(folder.rglob("*")):
         reader = READERS.get(path.suffix.lower())
         found = reader(path.read_bytes()) if reader is not None else None

@@ -114,7 +114,7 @@ def fit(which: Ints, zeros: Floats, ones: Floats, groups: Ints) -> tuple[Ints, I
 
 
 def log_gamma(x: Floats) -> Floats:
-    """Of numbers above 0: Stirling's series, 5 further on."""
+    """Logarithm of gamma for numbers above 0: Stirling's series, shifted by 5."""
     z = x + 5
     series = (z - 0.5) * np.log(z) - z + 0.9189385332046727 + 1 / (12 * z) - 1 / (360 * z**3)
     found: Floats = series - np.log(x * (x + 1) * (x + 2) * (x + 3) * (x + 4))
@@ -122,7 +122,7 @@ def log_gamma(x: Floats) -> Floats:
 
 
 def groups_of_slots() -> Ints:
-    """Of the slots of shared contexts, then of own ones by class: which are alike."""
+    """Group of each slot: slots of shared contexts, then of own ones by class."""
     shared = np.searchsorted([C_LEVEL, C_ROWS], np.arange(N_SHARED), side="right")
     own = 3 + np.repeat(np.arange(N_CLASSES), N_OWN)
     kinds = np.concatenate([shared, own])
@@ -131,7 +131,7 @@ def groups_of_slots() -> Ints:
 
 
 class Round:
-    """What the pieces of a round are coded with, and what comes of it."""
+    """Inputs and results of one round of coding."""
 
     def __init__(self, start: Start) -> None:
         self.start = start
@@ -226,7 +226,7 @@ def digits(values: Any, n_digits: int) -> list[str]:
 
 
 def levels_of(piece: Piece, steps: Sequence[float]) -> int:
-    """How many levels the encoder takes at the middle one of ``steps``."""
+    """Number of levels that the encoder chooses at the middle one of ``steps``."""
     middle = sorted(steps)[len(steps) // 2]
     if middle not in piece.levels:
         params = {"step": step_of(piece.skeleton, middle), "levels": None}

@@ -179,7 +179,7 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
 
 
 def given(codec: Codec, params: Mapping[str, Any], motion: Motion) -> Motion:
-    """What the codec is given of a clip."""
+    """A clip as input of the codec."""
     return prepare(motion, codec, params).motion
 
 

@@ -23,7 +23,7 @@ USUAL_CM = 90.0  # of a skeleton whose unit is unknown, as the codec takes it
 
 @dataclass(frozen=True)
 class Piece:
-    """Some frames of a clip; what the encoder takes for a source. ``levels``: chosen, by step."""
+    """Frames of a clip, as an encoder's source. ``levels``: the chosen levels by step."""
 
     layout: Layout
     frames: Floats

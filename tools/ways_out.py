@@ -111,7 +111,7 @@ def ways_of(source: Path, folder: Path) -> Iterator[tuple[str, bool]]:
 
 
 def packed(root: Path, paths: list[Path], folder: Path) -> tuple[int, int]:
-    """How many files of one archive ``unpack`` restores, and how many it holds."""
+    """Number of files that ``unpack`` restores of one archive, and number that it holds."""
     assert ran("pack", root, folder / "all.mcz", "--verbatim", "--jobs", "1")[0] == 0
     assert ran("unpack", folder / "all.mcz", folder / "all")[0] == 0
     held = [(folder / "all" / path.relative_to(root), path) for path in paths]

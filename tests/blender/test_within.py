@@ -46,7 +46,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def ran(python: str, package: Path, script: Path, *words: Any, **more: str) -> str:
-    """What a script printed, with the bundled package alone on its path."""
+    """Return what ``script`` prints with only the bundled package on its path."""
     environment = {**os.environ, "PYTHONPATH": str(package / "wheels"), **more}
     for name in ("VIRTUAL_ENV", "MCZ_LOOPS"):
         environment.pop(name, None)
@@ -232,7 +232,7 @@ print("all well")
 
 
 def test_installed(python: str, package: Path, samples: Path, tmp_path: Path) -> None:
-    """As a user has it: the zip installed, archives searched, files refused, clips added."""
+    """The installed zip searches archives, refuses bad files and adds clips."""
     archive, cut, script = tmp_path / "all.mcz", tmp_path / "cut.mcz", tmp_path / "session.py"
     mcz.pack(samples, archive, rate=120)
     cut.write_bytes(archive.read_bytes()[:-200])

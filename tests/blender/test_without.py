@@ -1,4 +1,4 @@
-"""What of the add-on needs no Blender: bones, keys, names, the way back, clips, the zip."""
+"""The parts of the add-on that need no Blender: bones, keys, names, export, clips, the zip."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def posed(bones: list[placing.Bone], rests: list[np.ndarray], n_frames: int) -> 
 def place_of(
     bone: placing.Bone, rest: np.ndarray, matrices: np.ndarray, at: np.ndarray
 ) -> np.ndarray:
-    """Where a place of the bone at rest is in every frame."""
+    """Positions of a point fixed to the bone, in every frame."""
     return (matrices @ np.linalg.inv(rest) @ np.append(at, 1.0))[:, :3]
 
 

@@ -1,4 +1,4 @@
-"""What the decoder of this process makes of vectors, and what is wrong with it."""
+"""Answers of this process's decoder to vectors, judged by the runner's rules."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CRASH = ": crash: "
 
 
 def fault(vector: dict[str, Any]) -> str | None:
-    """What is first wrong with the answers about ``vector``, as the runner would say it."""
+    """First fault of the answers about ``vector``, in the runner's words."""
     from mcz.cli import conformance
 
     for request in run.requests(vector, conformance.OPTIONS):

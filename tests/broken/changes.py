@@ -53,7 +53,7 @@ def off(node: ast.AST) -> Changed:
 
 
 def unchecked(node: ast.AST) -> Changed:
-    """What a schema checks, without the check."""
+    """Remove the check from a schema."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
         if node.func.id in ("ExprValidator", "OneOf", "NoneOf", "Const"):
             yield node.args[0]
@@ -100,7 +100,7 @@ def out(node: ast.AST) -> Changed:
 
 
 def refuse(node: ast.AST) -> Changed:
-    """What is unsupported is called wrong."""
+    """Raise FormatError for UnsupportedError."""
     if isinstance(node, ast.Name) and node.id == "UnsupportedError":
         yield _attribute(node, "__base__")
 
@@ -125,7 +125,7 @@ def edge(node: ast.AST) -> Changed:
 
 
 def bare(node: ast.AST) -> Changed:
-    """What a function is given in place of what it makes of it; an operand without its operator."""
+    """Replace a call by its argument, an operation by its operand."""
     if isinstance(node, ast.Call):
         yield from (arg for arg in node.args if not isinstance(arg, ast.Starred))
         if isinstance(node.func, ast.Attribute):
@@ -326,7 +326,7 @@ _SIMPLE = (ast.Expr, ast.Raise, ast.Assign, ast.AugAssign, ast.Return, ast.Conti
 
 
 def _is_step(block: ast.If | ast.For | ast.While | ast.With, node: ast.AST) -> bool:
-    """Whether ``node`` is one of the few simple statements of a block."""
+    """True if ``node`` is one of the few simple statements of a block."""
     return len(block.body) <= 3 and isinstance(node, _SIMPLE)
 
 

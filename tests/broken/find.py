@@ -77,7 +77,7 @@ class Nursery:
 
 
 def bites(rule: str, answer: Any) -> bool:
-    """Whether it is a wrong answer; a crash is one where nothing else can be seen."""
+    """True for a wrong answer; a crash counts only where nothing else can show."""
     return bool(answer) and "fault" in answer and (not answer["crashes"] or rule in by_hand.CRASH)
 
 
@@ -119,7 +119,7 @@ def search(nursery: Nursery, rule: str, known: Sequence[Catch] = ()) -> list[Cat
 
 
 def found() -> dict[str, list[Catch]]:
-    """What found.txt says of each rule."""
+    """Parse found.txt: the catches of each rule."""
     rows: dict[str, list[Catch]] = {}
     if FOUND.exists():
         for line in FOUND.read_text("utf-8").splitlines():

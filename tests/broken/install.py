@@ -125,7 +125,7 @@ def _inner(code: CodeType) -> list[CodeType]:
 
 
 def _own(code: CodeType) -> tuple[object, ...]:
-    """What a module or class does itself, without its functions."""
+    """Key of a module's or class's own code, without its functions."""
     consts = [
         (c.co_qualname, c.co_firstlineno) if isinstance(c, CodeType) else (type(c), repr(c))
         for c in code.co_consts

@@ -1,4 +1,4 @@
-"""Where SPEC.md's rules stand in the code: comments such as ``# CHUNK-06`` beside the check.
+"""Marks of SPEC.md's rules in the code: comments such as ``# CHUNK-06`` beside the check.
 
 A mark ends the line of the statement or expression that enforces the rule, or stands on the line
 before. It is ids alone, or the ids in brackets behind the words of a comment.
@@ -31,7 +31,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Slot:
-    """Where a node hangs in its tree: a field of another node, or an item of such a field."""
+    """Place of a node in its tree: a field of another node, or an item of such a field."""
 
     holder: ast.AST
     field: str
@@ -118,9 +118,9 @@ def slots(node: ast.AST) -> Iterator[Slot]:
 
 
 def targets(tree: ast.Module, line: int) -> list[Slot]:
-    """What a mark at ``line`` means: the statement that begins there, else the expressions that do.
+    """Slots that a mark at ``line`` refers to: the statement that begins there, else expressions.
 
-    Where none begins, it is the smallest that the line is part of.
+    If none begins there, it is the smallest expression that contains the line.
     """
     found = list(_beginning(tree, line))
     statements = [slot for slot in found if isinstance(slot.node, ast.stmt)]

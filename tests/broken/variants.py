@@ -92,7 +92,7 @@ def compiled(module: str, tree: ast.Module) -> CodeType:
 
 @cache
 def whole(module: str) -> CodeType:
-    """What a module is compiled to as it is."""
+    """Compile a module unchanged."""
     return compiled(module, parsed(module))
 
 

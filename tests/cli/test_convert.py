@@ -103,7 +103,7 @@ def test_nothing_is_overwritten(folder: Path, call: Call) -> None:
 
 
 def test_the_skeleton_is_an_input(folder: Path, call: Call) -> None:
-    """What was read for a source, the ASF beside it too, is no output, whoever forces it."""
+    """Forcing never overwrites a file that was read for a source, its ASF included."""
     data = (folder / "walk.asf").read_bytes()
     words = ["--to", "amc", "--with-skeleton", "--rate", "120", "--force"]
     for given in ([], ["--skeleton", folder / "walk.asf"]):
@@ -150,7 +150,7 @@ def test_decode_of_a_source_wants_an_output(folder: Path, call: Call) -> None:
 
 
 def test_an_mcz_file_of_another_name(folder: Path, call: Call) -> None:
-    """What a file is called does not make it a source file."""
+    """An .mcz file is recognized under any name."""
     mcz.encode(folder / "walk.c3d", folder / "w.mcz")
     (folder / "w.mcz").rename(folder / "w.bvh")
     assert mcz.read(folder / "w.bvh").n_frames == 240

@@ -1,4 +1,4 @@
-"""What people type in their first minutes: folders, empty files, units, sizes of figures."""
+"""Commands that people try first: folders, empty files, units, sizes of figures."""
 
 from __future__ import annotations
 

@@ -498,7 +498,7 @@ def test_heartbeats_keep_listeners_while_the_source_is_silent() -> None:
 
 
 def test_a_heartbeat_is_no_place_to_join() -> None:
-    """Who comes late gets heartbeats, and frames from the next place to join on."""
+    """Late receivers get heartbeats, and frames from the next join point."""
     sending = ("stream", "encode", *CODER, "--listen", ":0", "--clients", "1", "--heartbeat", "0.1")
     with Started(*sending) as sender:
         address = tcp.address_of(sender.address())

@@ -150,7 +150,7 @@ def test_a_way_around_is_found(text: str) -> None:
 
 
 def on_a_terminal(*arguments: object) -> bytes:
-    """What a command prints on a terminal."""
+    """Output of a command on a terminal."""
     shown = bytearray()
 
     def read(handle: int) -> bytes:
@@ -203,7 +203,7 @@ def test_progress_shows_names_as_they_are_meant(
 def test_csv_names_are_found_again_in_csv(
     hostile: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What decode --to csv prints of names, replace reads."""
+    """``replace`` reads the names that decode --to csv prints."""
     table, out = hostile.parent / "a.csv", hostile.parent / "b.mcz"
     assert run(cli, "mcz", ["decode", str(hostile), "--to", "csv", "-o", str(table)]) == 0
     arguments = ["replace", str(hostile), str(out), "--joint", "0", "--values", str(table)]

@@ -1,4 +1,4 @@
-"""Who may read a stream over TCP, and what is said of it."""
+"""Access to a stream over TCP: tokens, and the messages about them."""
 
 from __future__ import annotations
 

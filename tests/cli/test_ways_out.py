@@ -23,7 +23,7 @@ CLIPS = [name for name, known in FORMATS.items() if not known.is_skeleton]
 
 @cache
 def source_files() -> dict[str, tuple[str, bytes]]:
-    """Of every format of clips a source file that a vector restores: its name and its bytes."""
+    """One source file of every clip format, restored from a vector: its name and its bytes."""
     found: dict[str, tuple[str, bytes]] = {}
     for path in sorted(SOURCES.glob("*.mcz")):
         with mcz.open(path) as file:
@@ -105,7 +105,7 @@ def test_packed(source: Path, tmp_path: Path, call: Call) -> None:
 
 
 def test_cut(name: str, source: Path, tmp_path: Path, call: Call) -> None:
-    """Some frames are a file of the same format, whoever cuts them."""
+    """A cut of a source file has the same format."""
     target = tmp_path / f"back{source.suffix}"
     path, result = result_of(call, tmp_path / "a.mcz", "--frames", "1:3", "-o", target)
     assert (path, result, same_format(path, name)) == (target, "cut", 2)

@@ -35,7 +35,7 @@ def chosen(motion: Motion, average: float, **changes: Any) -> tuple[choice.Choic
 
 
 def least_distortion(bands: list, kept: int) -> float:
-    """That of the global largest coefficients, relative as ``Choice`` has it."""
+    """Distortion of the global largest coefficients, relative as in ``Choice``."""
     sizes = np.abs(np.concatenate(bands))
     energies = np.sort((sizes / (sizes.max() or 1.0)).ravel() ** 2)
     return float(energies[: max(0, sizes.size - kept)].sum())

@@ -1,4 +1,4 @@
-"""What every codec keeps to: values near the source, parts of the whole, edits, odd clips."""
+"""The contract of every codec: error bounds, partial decoding, edits, odd clips."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_the_same_clip_gives_the_same_bytes(name: str) -> None:
 
 @FINITE
 def test_segments_keep_to_the_memory_that_is_allowed(name: str) -> None:
-    """Of 40 frames, which a codec may round up to whole blocks of 16."""
+    """Limit for 40 frames; codecs may round up to whole blocks of 16."""
     case = CASES[name]
     motion = markers(200, 1) if case.of_points else wandering(200, ["tx", "rx", "rz"])
     limits = {**case.length(150), "segment_bytes": 40 * 8 * 3}
@@ -148,7 +148,7 @@ def test_a_part_is_what_it_is_in_the_whole(name: str, data: st.DataObject) -> No
 
 @EVERY
 def test_a_part_needs_its_own_streams_alone(name: str) -> None:
-    """Of other segments, groups and finer resolutions nothing is fetched."""
+    """No bytes of other segments, groups or finer resolutions are fetched."""
     coded, n = small(name), small(name).layout.n_resolutions
     for segment, start, stop in ((0, 1, 3), (len(coded.spans) - 1, 18, 20)):
         for group, resolution in itertools.product(range(len(coded.layout.groups)), range(n)):

@@ -1,4 +1,4 @@
-"""What every codec makes of bytes that no encoder wrote: values, or an error of ours."""
+"""Every codec decodes bytes that no encoder wrote, or raises an error of ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every codec keeps to that works frame by frame: the values of a file, and losses."""
+"""The contract of codecs that work frame by frame: a file's values, and losses."""
 
 from __future__ import annotations
 

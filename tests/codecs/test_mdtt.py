@@ -64,7 +64,7 @@ def test_without_cuts_a_coefficient_loses_at_most_the_threshold(
 
 @given(st.sampled_from(NAMES), st.integers(1, 200), st.integers(1, 6), st.floats(-3, 6))
 def test_what_is_cut_costs_no_more_than_it_saves(codec, n_frames, n_markers, power) -> None:
-    """What does not pay is left out: errors grow by no more than bytes shrink."""
+    """Cutting coefficients increases the error less than it decreases the size."""
     motion = markers(n_frames, n_markers)
     step = 2.0**power
     cut, whole = (Direct(codec, motion, step=step, window=24, **p) for p in ({}, ALL))

@@ -79,7 +79,7 @@ def bound(name: str, levels: int, approximation: float, detail: float) -> float:
 
 
 def thresholds(motion: Motion, T_g: float) -> Array:
-    """Those of the rule "flat" by SPEC.md, for rotations in degrees."""
+    """Thresholds of SPEC.md's rule "flat", for rotations in degrees."""
     reach = max(np.linalg.norm([0, 2 * i, i / 2]) for i in range(motion.skeleton.n_joints))
     lever = reach * math.pi / 180 or 1.0
     kinds = [channel.kind for channel in motion.skeleton.channels]

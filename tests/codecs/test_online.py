@@ -91,7 +91,7 @@ def test_a_rate_needs_a_frame_rate() -> None:
 
 
 def test_decoding_begins_at_an_intra_coded_unit() -> None:
-    """What lies before it in its segment may be damaged."""
+    """Earlier units of the segment may be damaged."""
     motion = markers(100, 2)
     coded = Direct("online", motion, step=0.5, gof=10, intra_period=2)
     meant = coded.read()

@@ -87,7 +87,7 @@ def test_channels_that_stand_still_cost_nothing() -> None:
 
 @pytest.mark.parametrize("angle_unit", ["deg", "rad", ""])
 def test_angle_units(angle_unit: str) -> None:
-    """Where it is unknown, channels are coded one by one."""
+    """Channels of an unknown angle unit are coded one by one."""
     motion = clip_of(
         wandering(120, ["rx", "ry", "rz"], 1).values / 60, ["rx", "ry", "rz"], angle_unit
     )

@@ -60,7 +60,7 @@ def walking(n_frames: int = 150, seed: int = 0, angle_unit: str = "deg") -> Moti
 
 
 def errors_cm(motion: Motion, found: np.ndarray, runs: Runs) -> np.ndarray:
-    """How far displacements from the first frame of each run are off, at most, (n_runs,)."""
+    """Greatest error of displacements from the first frame of each run, (n_runs,)."""
     skeleton = motion.skeleton
     names, firsts = skeleton.addresses(), first_points(skeleton)
     off = positions_of(skeleton, found) - positions_of(skeleton, np.asarray(motion.values))
@@ -169,7 +169,7 @@ def test_no_contacts_cost_a_byte() -> None:
 
 
 def contacts_of(skeleton: Skeleton, *points: tuple[int, int], rounds: int = 4) -> Contacts:
-    """Of points by joint and tail, steps of 0.01."""
+    """Contacts of points by joint and tail, steps of 0.01."""
     fields = [Named(joint=j, tail=t, step=0.01, follows=0) for j, t in points]
     found = parse_contacts([Named(rounds=rounds, ramp=5, points=fields)], skeleton, "test")
     assert found is not None
@@ -177,7 +177,7 @@ def contacts_of(skeleton: Skeleton, *points: tuple[int, int], rounds: int = 4) -
 
 
 class Named:
-    """What a parser gives."""
+    """A parser's result."""
 
     def __init__(self, **fields: object) -> None:
         self.__dict__.update(fields)

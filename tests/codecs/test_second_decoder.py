@@ -1,4 +1,4 @@
-"""What this package writes, and files made at random, read by the decoder in JavaScript, too.
+"""The decoder in JavaScript reads files of this package's encoders, and random files.
 
 That decoder was written from SPEC.md alone. Both have to give the same bits, of whole clips, of
 parts and of every resolution. The stored vectors are conformance/run.py's, files that are changed
@@ -84,7 +84,7 @@ Arrays = list[tuple[str, str, np.ndarray, np.ndarray]]  # clip, signal, values, 
 
 
 def salvaged(data: bytes) -> tuple[Arrays, set[str]]:
-    """What this package salvages, and the clips of which the skeleton is lost for good.
+    """Arrays that this package salvages, and the names of clips without their skeleton.
 
     These a reader may give as channels without names (SPEC.md, "Salvage"); only this package does.
     """
@@ -103,7 +103,7 @@ def salvaged(data: bytes) -> tuple[Arrays, set[str]]:
 
 
 def salvaged_there(data: bytes, other: Server) -> Arrays:
-    """What the decoder in JavaScript salvages, which must not crash or hang."""
+    """Arrays that the decoder in JavaScript salvages; it must not crash or hang."""
     told = other.ask(["--salvage"], data, MOST_OUTPUT)
     assert (told.code in (0, 1), told.fault) == (True, ""), told.errors
     if told.code:

@@ -21,7 +21,7 @@ POSITION = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
 
 
 def words_of(file: Made, words: np.ndarray) -> np.ndarray:
-    """What words mean, by another way than the package's."""
+    """Decode words independently of the package."""
     if file.size == 2:
         return words.astype(np.uint16).view(np.int16).astype(np.int64)
     kind = ">u4" if file.processor == SGI else "<u4"

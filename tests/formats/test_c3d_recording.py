@@ -1,4 +1,4 @@
-"""What a C3D says beside its numbers, and what its analog words mean."""
+"""C3D metadata, and the meaning of analog words."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def test_content_counts(name: str, suffix: str, tmp_path: Path) -> None:
 
 
 def test_every_way_in(tmp_path: Path, samples: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What reads sources tells the format by content: info, diff, pack, read and skeletons."""
+    """Info, diff, pack, read and skeletons detect a source's format by content."""
     path = tmp_path / "walk.c3d"
     path.write_bytes((samples / "walk.bvh").read_bytes())
     motion = mcz.read(path)

@@ -1,4 +1,4 @@
-"""What holds of every source format: bytes come back, damage is refused, numbers can change."""
+"""The contract of every source format: exact bytes, damage is refused, numbers can change."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ def tokens(data: bytes) -> list[bytes]:
 @pytest.mark.parametrize("name", ["bvh", "amc", "amc alone"])
 @given(data=st.data())
 def test_a_changed_value_changes_only_its_token(name: str, data: st.DataObject) -> None:
-    """As a lossy codec changes them; the value is read from the file that is written."""
+    """A lossy codec changes tokens the same way; the value is read from the written file."""
     case = CASES[name]
     file = data.draw(case.any)
     motion = case.back(file)

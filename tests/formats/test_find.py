@@ -1,4 +1,4 @@
-"""Which ASF files lie around an AMC, and whose names they have."""
+"""The search for the ASF of an AMC, by folder and by name."""
 
 from __future__ import annotations
 

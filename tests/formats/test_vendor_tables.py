@@ -32,7 +32,7 @@ def back(data: bytes) -> Motion:
 
 
 def meaning(motion: Motion) -> list[object]:
-    """What a table says beside its bytes, without what it says in words."""
+    """A table's content beside its bytes and its metadata texts."""
     numbers = motion.frame_numbers
     return [
         motion.skeleton.joints,
@@ -375,7 +375,7 @@ def test_grids_of_several_rows_a_frame_change_between_frames() -> None:
 
 
 def test_names_may_have_line_breaks() -> None:
-    """As spreadsheets print the names of columns that are wrapped."""
+    """Spreadsheets print wrapped column names with line breaks."""
     motion = back(b'"time","x\r\n(mm)",y\r\n0,1.5,2\r\n1,2.5,3\r\n')
     assert [joint.name for joint in motion.skeleton.joints] == ["x  (mm)", "y"]
     assert motion.frame_rate == 1

@@ -77,7 +77,7 @@ def convert(server: Server, body: bytes) -> Answer:
 
 
 def raw(server: Server, data: bytes) -> bytes:
-    """What the server says to bytes that may be no request, until it closes the connection."""
+    """Send bytes that may be no request; return the server's reply until it closes."""
     with socket.create_connection(("127.0.0.1", server.site.port), timeout=30) as connection:
         connection.sendall(data)
         connection.shutdown(socket.SHUT_WR)

@@ -1,4 +1,4 @@
-"""Where the page comes from: a wheel that was built with it, or a source checkout."""
+"""The source of the page: a wheel built with it, or a source checkout."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def checkout(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def programs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What would have been run; building makes a page, as the build does."""
+    """Record the programs that would run; building creates a page, as the real build does."""
     ran: list[str] = []
 
     def run(words: list[str], cwd: Path, **options: object) -> subprocess.CompletedProcess[bytes]:
@@ -54,7 +54,7 @@ def programs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def changed(path: Path, seconds: int) -> None:
-    """Let a file be last changed so many seconds after 1970."""
+    """Set a file's modification time, in seconds after 1970."""
     os.utime(path, (seconds, seconds))
 
 
@@ -152,7 +152,7 @@ def test_a_wheel_has_the_page_unless_told(
 
 
 def test_an_installed_page_is_found(tmp_path: Path) -> None:
-    """As of a wheel that is unpacked, with nothing of the repository around."""
+    """An unpacked wheel has its page, without the repository around it."""
     shutil.copytree(ROOT / "mcz", tmp_path / "mcz", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(PAGE, tmp_path / "mcz" / "viewing" / "viewer.html")
     code = "from mcz.show.viewing.page import page; print(page().policy)"

@@ -63,7 +63,7 @@ class Parsed(HTMLParser):
 
 
 def embedded(path: Path) -> dict:
-    """What a page holds; it is otherwise as it was."""
+    """Data embedded in a page, the rest of which must be unchanged."""
     text = path.read_text("utf-8")
     found = Parsed(text)
     assert found.policy == page().policy

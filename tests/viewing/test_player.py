@@ -28,7 +28,7 @@ MARKER = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
 
 
 def document_of(text: str) -> dict[str, Any]:
-    """What a player draws; it is one frame that can reach nothing."""
+    """Document of a player: one frame without network access."""
     frame = re.fullmatch(
         r'<iframe srcdoc="([^"<>]*)" sandbox="allow-scripts" [^<>]*></iframe>', text
     )

@@ -377,7 +377,7 @@ def test_what_is_no_request_does_no_harm(server: Server, data: bytes) -> None:
 
 
 def test_a_request_cannot_hide_another(server: Server) -> None:
-    """What a refused request has posted is not read as the next one."""
+    """The server does not read the body of a refused request as the next request."""
     token, host = server.site.token, f"Host: 127.0.0.1:{server.site.port}\r\n"
     start = f"POST /{token}/diff HTTP/1.1\r\n{host}"
     hidden = f"GET /{token}/api.json HTTP/1.1\r\n{host}\r\n"

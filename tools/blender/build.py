@@ -103,7 +103,7 @@ def _check_source(wheel: str, name: str, data: bytes) -> None:
 
 
 def version() -> str:
-    """That of the package, which is that of the add-on."""
+    """Version of the package and of the add-on."""
     text = (ROOT / "mcz/version.py").read_text("utf-8")
     found = re.search(r'VERSION = "(.+)"', text)
     assert found is not None

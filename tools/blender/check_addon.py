@@ -1,4 +1,4 @@
-"""Where the add-on puts bones and markers, against where they should be. Runs where ``bpy`` is.
+"""Compare the add-on's bones and markers with their expected positions. Needs ``bpy``.
 
     python tools/blender/check_addon.py import CLIP.bvh [--clip NAME] [--option rate=30 ...]
     python tools/blender/check_addon.py export CLIP.bvh OUT.mcz [--option codec=best ...]
@@ -70,7 +70,7 @@ def register(folder: str) -> None:
 
 
 def unregister() -> None:
-    """As Blender disables it; bpy 4.2 crashes at its end where an operator is left."""
+    """Disable the add-on as Blender does; bpy 4.2 crashes at exit with a registered operator."""
     import mcz_blender
 
     mcz_blender.unregister()
@@ -137,7 +137,7 @@ def turned(places: np.ndarray, up: str) -> np.ndarray:
 
 
 def points(made: Any, skeleton: mcz.Skeleton) -> np.ndarray:
-    """Where the points of the skeleton are, by heads and tails of the evaluated bones."""
+    """Positions of the skeleton's points, by heads and tails of the evaluated bones."""
     evaluated = made.evaluated_get(bpy.context.evaluated_depsgraph_get())
     matrix, bones = evaluated.matrix_world, evaluated.pose.bones
     by_joint = [bone for bone in bones if "mcz_joint" in bone.bone]
@@ -162,7 +162,7 @@ def end_of(bone: Any, tail: int) -> Any:
 
 
 def markers(made: Any, skeleton: mcz.Skeleton) -> np.ndarray:
-    """Where the markers are, NaN where they are hidden."""
+    """Positions of the markers, NaN for hidden ones."""
     graph = bpy.context.evaluated_depsgraph_get()
     by_name = {child["mcz_marker"]: child for child in made.children}
     found = np.full((skeleton.n_joints, 3), np.nan)

@@ -1,4 +1,4 @@
-"""Where Blender puts the bones of a GLB or BVH, against where they should be. Runs inside Blender.
+"""Compare Blender's bones of a GLB or BVH with their expected positions. Runs inside Blender.
 
     blender --background --python tools/blender/check_import.py -- CLIP.glb EXPECTED.npz
 

@@ -26,7 +26,7 @@ ABSENT = 0  # the exit code without atheris: what cannot be done here is no faul
 
 @dataclass(slots=True)
 class Outcome:
-    """What one target did; ``deaths`` are processes that ended by themselves."""
+    """Result of one target; ``deaths`` counts processes that ended by themselves."""
 
     target: str
     executions: int = 0

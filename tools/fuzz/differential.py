@@ -105,7 +105,7 @@ def _hashed(data: bytes) -> bytes:
 
 
 def requests(data: bytes, rng: random.Random) -> list[list[str]]:
-    """What else is asked of a file that was decoded: its sources, and a part of it."""
+    """Further requests about a decoded file: its sources, and a part of it."""
     with mcz.open(data) as file:
         clips = list(file.clips.values())
         part = [_part(rng.choice(clips), rng)] if clips else []
@@ -170,7 +170,7 @@ class Other:
 
 @dataclass(slots=True)
 class Comparison:
-    """What came of all requests: how often both agreed, and the kinds of differences."""
+    """Results of all requests: the number of agreements, and the kinds of differences."""
 
     folder: Path
     agreed: collections.Counter[int] = field(default_factory=collections.Counter)
@@ -216,14 +216,14 @@ class Comparison:
 
 
 def is_choice(data: bytes, one: int, other: int) -> bool:
-    """Whether SPEC.md leaves it to a reader which of two exit codes it has for ``data``."""
+    """True if SPEC.md lets a reader choose between two exit codes for ``data``."""
     if {one, other} == {REFUSED, UNSUPPORTED}:
         return True
     return {one, other} == {DECODED_OK, REFUSED} and hides_frames(data)
 
 
 def equal(one: bytes, other: bytes) -> bool:
-    """Whether two outputs list the same and hold the same."""
+    """True if two outputs list and hold the same."""
     if one == other:
         return True
     ends = one.find(b"\n"), other.find(b"\n")

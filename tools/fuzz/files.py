@@ -104,7 +104,7 @@ def _clip(clip: Clip, rng: random.Random) -> dict[tuple[str, int], Arrays]:
 
 
 def _whole(clip: Clip, signal: int, resolution: int) -> Arrays:
-    """What ``clip.read_masked`` gives, but for the comparison of hashes."""
+    """Values as from ``clip.read_masked``, without the comparison of hashes."""
     info = clip.signals[signal]
     groups = tuple(range(len(info.layout.groups)))
     reader = SignalReader(clip.container, info, groups, resolution, clip.name)
@@ -147,7 +147,7 @@ def _bits(
 
 
 def _others(clip: Clip, rng: random.Random) -> None:
-    """What a clip may say no to."""
+    """Ask for things that a clip may refuse."""
     with suppress(OptionError, LimitError):
         clip.preview()
     with suppress(MczError):
@@ -222,7 +222,7 @@ def _live(data: bytes, strict: dict[tuple[str, int], Arrays]) -> None:
 
 
 def hides_frames(data: bytes) -> bool:
-    """Whether a clip has stored frames that it does not show, whose streams nobody need decode."""
+    """True if a clip has stored frames outside its window, whose streams need no decoding."""
     try:
         with mcz.open(data) as file:
             return any(s.skip or s.spare for clip in file.clips.values() for s in clip.signals)

@@ -1,4 +1,4 @@
-"""What one input may cost, and what is written down where that or a property does not hold."""
+"""Limits of one input, and records of inputs that exceed them or break a property."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def hold(truth: object, message: str) -> None:
 
 
 def limit_memory(extra: int = MEMORY) -> None:
-    """Let this process take ``extra`` bytes of data more than it has; MemoryError from then on.
+    """Limit this process to ``extra`` bytes of data more than it has; then it raises MemoryError.
 
     Where the system does not say what it has, there is no limit.
     """
@@ -52,7 +52,7 @@ def limit_memory(extra: int = MEMORY) -> None:
 
 
 def limit_time() -> None:
-    """Let ``timed`` raise HangError."""
+    """Make ``timed`` raise HangError."""
     signal.signal(signal.SIGVTALRM, _too_long)
 
 
@@ -78,7 +78,7 @@ def _timed(call: Callable[[bytes], Result], data: bytes) -> Result:
 
 @dataclass(slots=True)
 class Record:
-    """What came of the inputs of a target so far, and where its findings and figures are kept."""
+    """Results of a target's inputs so far, and the folder of its findings and figures."""
 
     target: str
     folder: Path

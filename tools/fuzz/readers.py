@@ -143,7 +143,7 @@ def check_csv(data: bytes) -> bool:
 
 
 def check_amc(data: bytes) -> bool:
-    """As it is, and with the first skeleton that fits."""
+    """Check an AMC alone, and with the first skeleton that fits."""
     for bones in _bones():
         with suppress(mcz.SourceError):
             return _check("amc", data, bones)
@@ -207,7 +207,7 @@ def check_asf(data: bytes) -> bool:
 
 
 def same(one: Motion, other: Motion) -> bool:
-    """Whether all that is said of a motion agrees, each value to the bit."""
+    """True if two motions agree in all facts, each value to the bit."""
     facts = [
         (m.frame_rate, m.frame_rate_exact, m.metadata, m.skeleton.joints) for m in (one, other)
     ]

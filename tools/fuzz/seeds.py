@@ -1,4 +1,4 @@
-"""Where mutation begins: the vectors, and the source files that they restore."""
+"""Seeds of mutation: the vectors, and the source files that they restore."""
 
 from __future__ import annotations
 

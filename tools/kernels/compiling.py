@@ -48,7 +48,7 @@ def compiler() -> list[str] | None:
 
 
 def _works(command: list[str]) -> bool:
-    """Whether a compiler has headers and a linker: some systems have the one without the other."""
+    """True if a compiler has headers and a linker; some systems lack one of them."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "try.c").write_text("#include <math.h>\ndouble f(double a){return sin(a);}\n")
         words = [*command, "-shared", "-fPIC", "try.c", "-o", "try.so", "-lm"]
@@ -57,7 +57,7 @@ def _works(command: list[str]) -> bool:
 
 
 def has_headers() -> bool:
-    """Whether Python can be extended: on Debian its headers are a package of their own."""
+    """True if Python's headers are installed; Debian packages them separately."""
     return Path(sysconfig.get_path("include"), "Python.h").is_file()
 
 

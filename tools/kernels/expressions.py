@@ -66,7 +66,7 @@ RANKED = (BOOL, INT, FLOAT)
 
 @dataclass
 class Effects:
-    """What a function does to arrays: found while it is translated."""
+    """Effects of a function on arrays, collected during its translation."""
 
     aliases: dict[str, set[Root]] = field(default_factory=dict)  # of variables
     written: set[Root] = field(default_factory=set)
@@ -145,7 +145,7 @@ class Expressions:
         raise self.error(node, f"{value!r} is no number")
 
     def root(self, node: ast.expr) -> Root | None:
-        """What an array is a part of."""
+        """The array that an expression is a part of."""
         if isinstance(node, ast.Subscript):
             return self.root(node.value)
         if isinstance(node, ast.Name):
@@ -413,7 +413,7 @@ class Expressions:
 
 
 def _widens(given: Scalar, wanted: Scalar) -> bool:
-    """Whether each number of one type is one of the other, too."""
+    """True if each number of one type is also one of the other."""
     known = given in RANKED and wanted in RANKED
     return given == wanted or (known and RANKED.index(given) < RANKED.index(wanted))
 

@@ -210,7 +210,7 @@ class Function(Expressions):
         self.line(f"{name} = {self.converted(node, text, type_, self.types[name])}")
 
     def _is_parameter(self, text: str) -> bool:
-        """Whether a text is a field of a record that was given, not a part of that field."""
+        """True if a text is a field of a given record, not a part of that field."""
         name, *fields = text.split(".")
         given = name in dict(self.parameters) and name not in self.stores
         return given and all(field.isidentifier() for field in fields)

@@ -52,7 +52,7 @@ class Source:
         self.imported[name] = (f"{module}.{original}", "") if is_module else (module, original)
 
     def is_entry(self, name: str) -> bool:
-        """Whether Python calls a function of this module."""
+        """True if Python calls a function of this module."""
         decorators = self.functions[name].decorator_list
         return any(isinstance(n, ast.Name) and n.id == DECORATOR for n in decorators)
 

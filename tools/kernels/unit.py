@@ -129,7 +129,7 @@ class Unit:
                     raise function.error(node, "C leaves open which call comes first")
 
     def _writes(self, name: str) -> bool:
-        """Whether a function writes to arrays that it is given."""
+        """True if a function writes to its array arguments."""
         parameters = {parameter for parameter, _ in self.functions[name].parameters}
         return any(isinstance(r, tuple) or r in parameters for r in self.written[name])
 

@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def read(python: str, path: str | None, old: str, folder: str) -> None:
-    """Let package 0.9 verify and decode the file; exits with its words where it cannot."""
+    """Verify and decode the file with package 0.9; exit with its message on failure."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     if path is not None:
         environment["PYTHONPATH"] = path

@@ -90,7 +90,7 @@ class Old:
         )
 
     def frame_numbers(self, clip: Content) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Those of the clip; where it cannot have them, they count from the first, or from 1."""
+        """Frame numbers of the clip; without any they count from the first, or from 1."""
         numbers = np.frombuffer(self.data(clip["frame_numbers"]), "<i8")
         rows = np.arange(len(numbers))
         possible = (known for known in (numbers, numbers[:1] + rows) if not _numbers_fault(known))

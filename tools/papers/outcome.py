@@ -1,4 +1,4 @@
-"""What every paper's run does: find its clips, say what is not here, gather what was found."""
+"""Common steps of a paper's run: find its clips, report missing ones, gather results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether what a paper claims holds, in a word."""
+"""Verdict on a claim of a paper, in a word."""
 
 from __future__ import annotations
 

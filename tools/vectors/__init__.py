@@ -1,3 +1,3 @@
-"""What tools/make_vectors.py writes: valid/, uncommon/ and invalid/ have a module a folder of
-conformance/vectors, build/ what they share; the rest says what the manifest says of each file.
+"""Content of the conformance vectors: valid/, uncommon/ and invalid/ hold a module per folder;
+build/ holds shared generators, the rest the manifest's text about each file.
 """

@@ -63,7 +63,7 @@ VECTORS = Path(__file__).resolve().parents[2] / "conformance/vectors"
 
 
 def base(make: Callable[..., Any]) -> Callable[..., Any]:
-    """Let rows name ``make``, which returns a Base, a Motion or the bytes of a file."""
+    """Register ``make`` for rows to name; it returns a Base, a Motion or the bytes of a file."""
 
     def called(*given: Any, **named: Any) -> Base:
         made = make(*given, **named)

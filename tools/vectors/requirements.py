@@ -1,4 +1,4 @@
-"""Which vectors show which requirement of SPEC.md, by their ids, such as CHUNK-07.
+"""Requirements of SPEC.md that each vector shows, by ids such as CHUNK-07.
 
 The manifest's ``requirements`` are made of requirements.txt, the vectors that a decoder without the
 rule fails (``tests.broken`` has such decoders), and of ``VECTORS``, what else shows it; ``ARGUED``

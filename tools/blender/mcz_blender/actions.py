@@ -12,7 +12,7 @@ CONSTANT, LINEAR = 0, 1  # interpolations, as numbers of Blender's enumeration
 
 
 class Curves:
-    """Where the curves of objects go: of each its own action, or its own slot of one."""
+    """F-curves of objects: an action each, or a slot each of one action."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -21,7 +21,7 @@ class Curves:
         self.action: Any = None
 
     def of(self, thing: Any) -> None:
-        """What is added from now on moves the object ``thing``."""
+        """Direct the curves added from now on to the object ``thing``."""
         data = thing.animation_data_create()
         if bpy.app.version < (4, 4, 0):
             self.action = self.bag = bpy.data.actions.new(self.name)

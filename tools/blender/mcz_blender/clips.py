@@ -21,7 +21,7 @@ MOST_FOUND = 500  # clips that a search lists
 
 @dataclass(frozen=True)
 class Wanted:
-    """What of a file is wanted.
+    """Selection of clips and frames of a file.
 
     ``clip`` names one; ``where`` is a query that takes several; ``every``: all of them. ``first``
     <= frame < ``stop`` (0: to the end), every ``step``-th; ``resolution`` leaves out that many of

@@ -93,7 +93,7 @@ class ImportMCZ(bpy.types.Operator, ImportHelper):
         return [self.filepath]
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Of dropped files ask for settings; otherwise for files."""
+        """Ask for settings of dropped files, otherwise for files."""
         return self.invoke_popup(context)
 
     def draw(self, context: Any) -> None:

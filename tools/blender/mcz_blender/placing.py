@@ -179,7 +179,7 @@ class _Placed:
     def _arm(
         self, index: int, children: tuple[int, ...], sides: list[str]
     ) -> tuple[int, Floats | None]:
-        """Where a bone ends, from its head, and which tail that is; None: it has no length."""
+        """Number of a bone's tail, and the vector to it from the head; None without length."""
         tails = self.skeleton.joints[index].tails
         if tails:
             arm = self.matrix @ np.array(tails[0])
@@ -195,7 +195,7 @@ class _Placed:
         return -1, mean if self._is_long(mean) else next(iter(arms.values()))
 
     def _scales(self, index: int, arm: Floats) -> Floats | None:
-        """How long the bone is, at rest 1, of a joint that stretches what hangs on it."""
+        """Relative lengths of the bone, 1 at rest, for a joint that stretches its children."""
         if not self._stretches(index):
             return None
         children = [(k, -1) for k, link in enumerate(self.links) if link.parent == index]
@@ -252,6 +252,6 @@ def keys_of_bone(
 
 
 def markers_of(motion: mcz.Motion, up: str, scale: float) -> Floats:
-    """Where the markers of ``motion`` are, (n_frames, n_markers, 3), NaN where they are missing."""
+    """Marker positions of ``motion``, (n_frames, n_markers, 3), NaN for missing ones."""
     found: Floats = mcz.positions(motion) @ (TO_Z_UP[up] * scale).T
     return found

@@ -28,7 +28,7 @@ SAME_RATE = 1e-6  # of a rate: Blender keeps it as float32
 
 @dataclass(frozen=True)
 class Terms:
-    """What is exported: the frames ``first`` to ``last``, and what the file says of them."""
+    """Terms of an export: the frames ``first`` to ``last``, and the file's metadata."""
 
     first: int
     last: int
@@ -44,7 +44,7 @@ class Terms:
 
 
 def things_of(context: Any) -> list[tuple[Any, list[Any]]]:
-    """What is selected: armatures, each with no markers, and empties with those below them.
+    """Selected armatures, each with no markers, and empties with those below them.
 
     Empties that are selected without one above them belong together.
     """
@@ -123,7 +123,7 @@ def _facts(scene: Any, thing: Any, terms: Terms) -> Facts:
 
 
 def _places(markers: list[Any], frames: Iterator[Any], n_frames: int) -> np.ndarray:
-    """Where the markers are, (n_frames, n, 3), NaN where they are hidden."""
+    """Marker positions, (n_frames, n, 3), NaN for hidden ones."""
     found = np.full((n_frames, len(markers), 3), np.nan)
     for row, graph in enumerate(frames):
         for number, marker in enumerate(markers):

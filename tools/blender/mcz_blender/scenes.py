@@ -24,7 +24,7 @@ NAME, METADATA = "mcz_clip", "mcz_metadata"
 
 @dataclass(frozen=True)
 class Settings:
-    """What is taken where the file does not say it, and how the scene takes it up.
+    """Defaults for facts that the file lacks, and changes to the scene.
 
     ``sets_rate``: the scene gets the clip's frame rate, and each frame of it one of its own;
     otherwise keys lie where they are in time. ``sets_range``: the scene's range becomes the clip's.
@@ -70,14 +70,14 @@ def put(
 
 
 def _remember(made: Any, loaded: Loaded, unit_cm: float, up: str, rate: Fraction) -> None:
-    """What an export of the object says again."""
+    """Store on the object the facts that an export needs."""
     made[NAME], made[UNIT], made[UP] = holdable(loaded.motion.name), unit_cm, up
     made[RATE] = str(rate)
     made[METADATA] = json.dumps(dict(loaded.motion.metadata))  # keys may be longer than Blender's
 
 
 def frames_of(scene: Any, numbers: np.ndarray, rate: float, settings: Settings) -> np.ndarray:
-    """Where keys lie; sets the rate and the range of the scene as ``settings`` say."""
+    """Scene times of keys; sets the scene's rate and range as ``settings`` say."""
     if settings.sets_rate:
         render = scene.render
         render.fps = max(1, round(rate))

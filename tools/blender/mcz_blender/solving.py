@@ -25,7 +25,7 @@ NEAR = 1e-5  # of the figure: a child that begins so near to the tail begins the
 
 @dataclass(frozen=True)
 class Facts:
-    """What a file says of a motion. ``scale``: its length units a unit of Blender.
+    """Facts about a motion from its file. ``scale``: its length units per unit of Blender.
 
     ``angle_decimals`` of degrees and ``length_decimals`` of units are the grid.
     """
@@ -78,7 +78,7 @@ class _Solved:
         self.size = float(np.sqrt(((self.rests - self.rests[0]) ** 2).sum(axis=1)).max()) or 1.0
 
     def _turned(self, part: Part) -> Floats:
-        """How a bone is turned in the world, the identity at rest, (n_frames, 3, 3)."""
+        """World rotations of a bone, the identity at rest, (n_frames, 3, 3)."""
         axes = part.matrices[:, :3, :3]
         axes = axes / np.sqrt((axes * axes).sum(axis=1, keepdims=True))
         rest = part.rest[:3, :3] / np.sqrt((part.rest[:3, :3] ** 2).sum(axis=0))
@@ -117,7 +117,7 @@ class _Solved:
         return _made(joints, columns, self.facts)
 
     def _reach(self, index: int) -> float:
-        """How far numbers reach at a bone, in which float32 rounds."""
+        """Magnitude of the numbers at a bone, which sets float32's rounding."""
         return max(self.size, float(np.abs(self.places[index]).max(initial=0.0)))
 
     def _tails(self, index: int, still: list[bool]) -> tuple[tuple[float, float, float], ...]:

@@ -86,7 +86,7 @@ def blender_names(names: Iterable[str], fallback: str = "joint") -> list[str]:
 
 
 def cut(name: str, n_bytes: int) -> str:
-    """As much of a name as fits, whole characters."""
+    """Cut a name to ``n_bytes``, at a whole character."""
     return holdable(name).encode()[:n_bytes].decode("utf-8", "ignore")
 
 

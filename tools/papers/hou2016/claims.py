@@ -1,4 +1,4 @@
-"""What Hou 2016 claims, one by one, with what was found here."""
+"""Claims of Hou 2016, each with our findings."""
 
 from __future__ import annotations
 

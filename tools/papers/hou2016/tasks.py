@@ -1,4 +1,4 @@
-"""What the tables of Hou 2016 are made from: which clips are coded how, and what came of it."""
+"""Work behind the tables of Hou 2016: clips, settings and results."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def channel_variants() -> list[Variant]:
 
 
 def others(names: Sequence[str]) -> list[str]:
-    """Of the clips at hand those to learn from: for ours, and those of the test clips' subjects."""
+    """Training clips: for ours, and for the test clips those of their subjects."""
     beside = [name for name in names if any(same_subject(name, test) for test in NAMES)]
     return [*(name for name in TRAINING_CLIPS if name in names), *sorted(beside)]
 
@@ -168,7 +168,7 @@ class Found:
         return Task("way_back", self.one, arguments=(step, virtual_markers))
 
     def first(self) -> Iterator[Task | None]:
-        """What depends on nothing else."""
+        """Tasks without dependencies."""
         yield self.convergence()
         yield from (self.bases_of(P) for P in SPARSITIES)
         yield from (self.own_bases(clip) for clip in self.cases)
@@ -180,7 +180,7 @@ class Found:
                 yield from (self.way_back(step, virtual_markers=v) for v in (False, True))
 
     def second(self) -> Iterator[Task | None]:
-        """What depends on bases and settings that were found."""
+        """Tasks that depend on trained bases and settings."""
         yield self.spatial()
         yield self.speeds()
         for variant in OWN.values():

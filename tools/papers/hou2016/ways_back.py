@@ -78,7 +78,7 @@ def _turn_error(motion: Motion, solved: Motion) -> float:
 
 
 def _angles(a: Floats, b: Floats) -> Floats:
-    """Of the rotation from ``a`` to ``b``, (3, 3, F): by its chord, which small ones need."""
+    """Angles of the rotations from ``a`` to ``b``, (3, 3, F), by chords, exact for small ones."""
     chord = np.sqrt(((a - b) ** 2).sum(axis=(0, 1)))
     angles: Floats = 2 * np.arcsin(np.minimum(1.0, chord / np.sqrt(8.0)))
     return angles

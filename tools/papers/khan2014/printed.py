@@ -1,4 +1,4 @@
-"""What Khan 2014 and Khan 2017 print, as far as the tables set our figures beside it."""
+"""Figures printed in Khan 2014 and Khan 2017, as far as the tables compare them with ours."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def tables(cases: Mapping[str, Case], results: Results) -> Iterator[Table]:
 
 
 def _remark(cases: Mapping[str, Case]) -> str:
-    """Which sizes the ratios are of."""
+    """Remark on the sizes behind the ratios."""
     remarks = []
     for clip, case in cases.items():
         held, paper = Path(case.path).stat().st_size, BYTES_2014[clip]

@@ -1,4 +1,4 @@
-"""What the published entropy coding would take: the same integers, run lengths, plain deflate."""
+"""Size by the published entropy coding: the same integers, run lengths, plain deflate."""
 
 from __future__ import annotations
 

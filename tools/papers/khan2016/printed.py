@@ -1,4 +1,4 @@
-"""What Khan 2016 prints, as far as the tables set our figures beside it."""
+"""Figures printed in Khan 2016, as far as the tables compare them with ours."""
 
 from __future__ import annotations
 

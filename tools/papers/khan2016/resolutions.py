@@ -1,4 +1,4 @@
-"""What is left of a clip, and what is read of its file, with the finest details left out."""
+"""Distortion and bytes read of a clip without its finest details."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Kwak and Bajic claim, one by one, with what was found here."""
+"""Claims of Kwak and Bajic, each with our findings."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def _virtual(found: Found) -> Iterator[Row]:
 
 
 def _fast(found: Found) -> Iterator[Row]:
-    """What is asked of ours: the paper's own 71 and 91 frames a second are no measure."""
+    """Requirements on our speed; the paper's own 71 and 91 frames a second are no measure."""
     rows = found.get(speeds_task(found.fastest)) if found.fastest else None
     for live, least in ((False, FAST), (True, FAST_LIVE)):
         own = [r for r in rows or [] if r["live"] == live and r["label"].startswith(NAME)]

@@ -158,7 +158,7 @@ def source_of(clip: Clip) -> Motion:
 
 @lru_cache(maxsize=4)
 def motion_in_positions(clip: Clip) -> Motion:
-    """What the codec is given: markers. Raises MotionError, OptionError too."""
+    """Markers of a clip as input of the codec. Raises MotionError, OptionError too."""
     motion = source_of(clip)
     if clip.form == MARKED:
         return _seen(motion)

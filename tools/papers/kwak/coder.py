@@ -1,4 +1,4 @@
-"""What parts of the online codec cost: entropy coders, bases, intra coded LTRs, resets, packets."""
+"""Cost of parts of the online codec: entropy coders, bases, intra coded LTRs, resets, packets."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def rice_bits(found: Coded, motion: Motion) -> int:
 
 
 def _frame_bits(sizes: Ints, before: Ints, starts: Ints) -> int:
-    """Of absolute values (n_rows,), with their signs; ``before`` are those of the frame before."""
+    """Bits of absolute values (n_rows,), with their signs; ``before``: the frame before."""
     activity = 2 * before
     for a, b in zip(starts, starts[1:], strict=False):
         activity[a : b - 1] += before[a + 1 : b]
@@ -110,7 +110,7 @@ def _frame_bits(sizes: Ints, before: Ints, starts: Ints) -> int:
 
 
 def indices_of(found: Coded) -> tuple[Ints, Ints, list[int]]:
-    """What was coded with one step throughout: indices (n_frames, n_rows), starts, kinds."""
+    """Indices of a clip with one step throughout, (n_frames, n_rows), starts, kinds."""
     space = Coder(found.encoded.header, found.layout).space
     kinds = [kind for u in found.units for kind in (u.kind, *[STR] * (u.n_frames - 1))]
     values = found.values / space.weights / space.step

@@ -1,4 +1,4 @@
-"""How many bits an LTR coefficient should have: a and b of Kwak and Bajic's eq. 14, fitted anew.
+"""Bits of an LTR coefficient: a and b of Kwak and Bajic's eq. 14, fitted anew.
 
 For each clip, length of groups and rate the fixed ratio of bits that errs least is looked for. With
 it come the variances of decoded coefficients, as an encoder of ``rca`` sees them, and from them g
@@ -75,7 +75,7 @@ def points_of(
 
 
 def mean_square(motion: Motion, values: Floats) -> float:
-    """Of the places that are valid, in squared length units."""
+    """Mean square of the valid places, in squared length units."""
     mask = motion.signals[0].mask
     apart = np.asarray(motion.values, np.float64) - values
     return float(np.mean(apart[mask] ** 2 if mask is not None else apart**2))

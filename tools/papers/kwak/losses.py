@@ -40,7 +40,7 @@ Received = tuple[Floats, Mask]
 
 @dataclass(frozen=True, slots=True)
 class Scheme:
-    """How frames lean on each other. ``regardless``: a decoder goes on where a frame is lost."""
+    """Dependencies between frames. ``regardless``: decoders go on after a lost frame."""
 
     label: str
     codec: str
@@ -92,7 +92,7 @@ def _payload(codec: Codec, stream: bytes) -> int:
 
 
 def received(codec: Codec, pushed: Pushed, lost: Mask) -> Received:
-    """What a reader shows, the last frame held, and which frames were decoded."""
+    """Motion that a reader shows, holding the last frame, and the mask of decoded frames."""
     assert codec.follow is not None
     decoder = codec.follow(pushed.header, pushed.layout)
     out = np.zeros((len(lost), pushed.layout.n_channels))
@@ -152,7 +152,7 @@ def losses(clip: Clip, target: float) -> Record:
 
 
 def lost_frames(n_frames: int, share: float, seed: int) -> Mask:
-    """Which frames are lost; the first comes, as all that stands before it."""
+    """Mask of lost frames; the first always arrives, as does all that precedes it."""
     lost = np.random.default_rng(seed).random(n_frames) < share
     lost[:1] = False
     return lost

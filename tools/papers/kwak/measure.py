@@ -44,7 +44,7 @@ OCTAVES = 2.0  # of a step where one side of a rate is not known yet
 
 @dataclass(frozen=True, slots=True)
 class Coded:
-    """What came of a motion of markers: values, units, bytes of streams."""
+    """Result of coding a motion of markers: values, units, bytes of streams."""
 
     values: Floats
     units: list[Unit]
@@ -86,7 +86,7 @@ def errors(motion: Motion, values: Floats) -> tuple[float, float]:
 
 
 def filtered(motion: Motion, values: Floats) -> Floats:
-    """What a reader has behind the post filter."""
+    """Values after the reader's post filter."""
     signal = motion.signals[0]
     decoded = replace(motion, signals=(replace(signal, values=values),))
     return np.asarray(mcz.post_filter(decoded).values, np.float64)
@@ -173,7 +173,7 @@ def _off(point: Record, target: float) -> float:
 
 
 def _between(seen: Mapping[float, Record], target: float, *, halve: bool) -> float:
-    """Where to look next, as log2 of the setting."""
+    """Next setting to try, as log2."""
     above = [x for x, point in seen.items() if point["kbps"] >= target]
     below = [x for x, point in seen.items() if point["kbps"] < target]
     if not below:

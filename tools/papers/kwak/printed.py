@@ -1,4 +1,4 @@
-"""What Kwak and Bajic print, sections III and V.
+"""Figures printed by Kwak and Bajic, sections III and V.
 
 C.-H. Kwak, I. V. Bajic, Online MoCap data coding with bit allocation, rate control, and
 motion-adaptive post-processing.

@@ -1,4 +1,4 @@
-"""What the tables of Kwak and Bajic are made from: what is coded how, and what came of it."""
+"""Work behind the tables of Kwak and Bajic: clips, settings and results."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Found:
 
     @property
     def studied(self) -> list[Clip]:
-        """Of CMU, for what is no table of the paper's."""
+        """Clips of CMU for studies that the paper has no table of."""
         return [clip for clip in self.clips if CMU.match(clip.stem)] or list(self.clips)[:1]
 
     @property
@@ -106,7 +106,7 @@ class Found:
         return [p | {end: p[f"{end}_filtered"] for end in ends} for p in points or []]
 
     def targets(self, clip: Clip) -> tuple[float, ...] | None:
-        """What rates are asked for: of markers those that MOD had, as in the paper."""
+        """Target rates; for markers those of MOD, as in the paper."""
         if not clip.is_markers:
             return TARGETS
         points = self.get(rates_task(clip, MOD, TARGETS))
@@ -117,7 +117,7 @@ class Found:
         return rates_task(clip, method, targets) if targets else None
 
     def first(self) -> Iterator[Task]:
-        """What depends on nothing else."""
+        """Tasks without dependencies."""
         for clip in self.clips:
             yield rates_task(clip, MOD, TARGETS)
         for clip in self.skeletons:
@@ -132,7 +132,7 @@ class Found:
             yield speeds_task(self.fastest)
 
     def second(self) -> Iterator[Task | None]:
-        """What is held to the rates that MOD had."""
+        """Tasks at the rates of MOD."""
         for clip in self.clips:
             yield from (self.rates_task(clip, method) for method in CODED)
 

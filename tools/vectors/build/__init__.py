@@ -1,1 +1,1 @@
-"""What generators share: files, motions, source files and streams to order."""
+"""Shared parts of generators: files, motions, source files and streams to order."""

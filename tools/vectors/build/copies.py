@@ -13,7 +13,7 @@ from tools.vectors.build.files import Crafter
 
 
 def copies_of(crafter: Crafter, start: int = len(SIGNATURE)) -> list[Copy]:
-    """Of the chunks that ``crafter`` has written from ``start`` on those that can be copied."""
+    """Copies of those chunks that ``crafter`` wrote after ``start`` and that may be copied."""
     data, at, found = crafter.data, start, []
     while at < len(data):
         chunk = parse_header(data[at : at + HEADER.size], at)

@@ -146,5 +146,5 @@ def raw_stream(ordinals: Sequence[Sequence[int]], widths: Sequence[int]) -> byte
 
 
 def indexed(**changes: Any) -> Callable[[Any], Any]:
-    """What INDX says of the clip, so that it agrees with what was edited."""
+    """Edit INDX so that it agrees with the edited clip."""
     return lambda row: replace(row, **changes)

@@ -23,7 +23,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """How ordinals of a channel are split: base 0 plain, else classes of mantissas."""
+    """Split of a channel's ordinals: base 0 plain, else classes of mantissas."""
 
     base: int
     digits: int

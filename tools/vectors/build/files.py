@@ -232,7 +232,7 @@ class Crafter(Writer):
         self.directory.clips[row.name] = self.edited("row", row)
 
     def _opening(self) -> bytes:
-        """What a REPT repeats, of a file of one clip."""
+        """Content of a REPT in a file of one clip."""
         data, at, found = self.data, len(SIGNATURE), b""
         while at < len(data):
             chunk = parse_header(data[at : at + HEADER.size], at)

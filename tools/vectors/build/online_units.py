@@ -66,7 +66,7 @@ class Plan:
 
     @property
     def parts(self) -> list[list[tuple[int, int]]]:
-        """Of each segment the units, (kind, frames)."""
+        """Units of each segment, (kind, frames)."""
         texts = [segment.split() for segment in self.units]
         return [[("SLI".index(text[0]), int(text[1:])) for text in own] for own in texts]
 
@@ -77,7 +77,7 @@ class Plan:
 
     @property
     def kinds(self) -> list[int]:
-        """Of each frame."""
+        """Kind of each frame."""
         units = [unit for own in self.parts for unit in own]
         return [kind if i == 0 else STR for kind, n in units for i in range(n)]
 
@@ -119,7 +119,7 @@ def _residual(
 
 
 class Coding:
-    """What a coder remembers of a signal. Nothing is checked, so that all can be written.
+    """State of a coder for a signal. Nothing is checked, so that faults can be written too.
 
     What may not be ends with the fault, if it is the last that a frame has.
     """
@@ -185,7 +185,7 @@ class Coding:
         code(kind, list(row))
 
     def length_of(self, row: Sequence[int]) -> int:
-        """How many coefficients of a row of a matrix are coded: up to the last that is not 0."""
+        """Number of coded coefficients of a matrix row: up to the last that is not 0."""
         return max((i + 1 for i, c in enumerate(row) if c), default=0)
 
     def _mixed(self, kind: int, row: list[int]) -> None:
@@ -254,7 +254,7 @@ class Coding:
         self.number(size, rice)
 
     def escape(self, rest: int) -> None:
-        """What a prefix has beyond 15, at least 1."""
+        """Write the part of a prefix beyond 15, at least 1."""
         self.number(rest.bit_length(), 6)
         self.number(rest, rest.bit_length() - 1)
 

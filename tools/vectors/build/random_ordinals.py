@@ -118,7 +118,7 @@ def _text_grid(chance: Chance) -> Grid:
 def _changes(
     channel: int, grid: Grid, own: Sequence[Grid], rows: Sequence[int]
 ) -> Iterable[tuple[int, int, Grid]]:
-    """Where the grid of a channel becomes another."""
+    """Frames at which the grid of a channel changes."""
     at, before = 0, grid
     for now, n in zip(own, rows, strict=True):
         if now != before:
@@ -330,7 +330,7 @@ def _lane(own: Chance, made: Drawn, column: Ints, form: int) -> fast_clips.Coded
 def _with_parents(
     own: Chance, layout: Any, place: dict[int, tuple[int, int]], heads: list[fast_clips.Head]
 ) -> list[fast_clips.Head]:
-    """Some heads with parents, each a channel without one: of their groups or of two others."""
+    """Give some heads parents, each a channel without one: of their groups or of two others."""
     found = list(heads)
     coded = [c for c, head in enumerate(heads) if isinstance(head, fast_clips.Coded)]
     roots = [c for c in coded if own.random() < 0.4]
@@ -348,7 +348,7 @@ def _with_parents(
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """What is drawn of the head of a coded channel; ``form`` None: that of the grid."""
+    """Random choices for the head of a coded channel; ``form`` None: that of the grid."""
 
     form: int | None
     scale: int

@@ -1,4 +1,4 @@
-"""What clips made at random have in common: numbers, texts, skeletons, grids, signals, notes."""
+"""Shared parts of random clips: numbers, texts, skeletons, grids, signals, notes."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def split(chance: Chance, n: int, unit: int = 1) -> list[int]:
 
 
 def ends(parts: Sequence[int]) -> tuple[int, ...]:
-    """Where parts end, but the last."""
+    """Ends of all parts but the last."""
     return tuple(np.cumsum(parts).tolist()[:-1])
 
 

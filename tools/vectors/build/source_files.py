@@ -150,7 +150,7 @@ def hierarchy(n_joints: int) -> str:
 
 
 def restored(motion: Motion) -> bytes:
-    """What the source of ``motion`` makes of it."""
+    """Bytes that the source of ``motion`` restores from it."""
     assert motion.source is not None
     return FORMATS[motion.source.format].write(motion)
 

@@ -130,7 +130,7 @@ class Plan:
         return Layout(self.n_frames, groups, find_model=model_finder(models))
 
     def windows(self) -> Iterator[tuple[int, list[int]]]:
-        """Of each segment the number of its first window, and the frames of its windows."""
+        """First window's number and the frames of the windows, for each segment."""
         number = 0
         for n_frames in self.segments:
             sizes = [min(self.window, n_frames - at) for at in range(0, n_frames, self.window)]

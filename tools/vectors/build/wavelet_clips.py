@@ -35,7 +35,7 @@ Band = Sequence[int]
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What the stream of an approximation says of itself; ``halves`` 63: all are equal."""
+    """Head of the stream of an approximation; ``halves`` 63: all are equal."""
 
     step: int = 128
     predictor: int = 1

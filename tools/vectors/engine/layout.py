@@ -224,7 +224,7 @@ class Layout:
         self._imply()
 
     def _imply(self) -> None:
-        """Let packets of kind 2 imply the frame and the mask that those before them tell."""
+        """Derive the frame and mask of packets of kind 2 from the packets before them."""
         due, told = 0, b""
         for part in self.parts:
             packet = part.packet
@@ -295,7 +295,7 @@ class Layout:
         )
 
     def _follow(self, clip: ClipRow, part: Part) -> None:
-        """Let a row say what the edited CLIP says, as far as it can be read."""
+        """Copy to a row the fields of the edited CLIP, as far as they can be read."""
         with suppress(MczError):
             fields = parse(payloads.Clip, part.payload, "CLIP")
             clip.name = fields.name

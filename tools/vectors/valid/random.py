@@ -111,7 +111,7 @@ class _Maker:
         return Made(self.crafter.data, self.motions, found, self.traits)
 
     def says(self, trait: str, probability: float) -> bool:
-        """Whether the file gets a trait."""
+        """True if the file gets a trait."""
         found = self.chance.random() < probability
         self.traits += [trait] * found
         return found
@@ -127,7 +127,7 @@ class _Maker:
         return lambda payload: versions + payload[4:] + more
 
     def items(self) -> list[Callable[[], None]]:
-        """What comes before a FOOT, in any order."""
+        """Chunks before a FOOT, in any order."""
         chance = self.chance
         found: list[Callable[[], None]] = []
         for item, probability in (
@@ -221,7 +221,7 @@ class _Maker:
             self.crafter.ancillary(b"QUAL", built(payloads.Qual, fields, "QUAL"))
 
     def described(self, motion: Motion) -> Motion:
-        """What a clip says beside its values."""
+        """Add random metadata to a clip."""
         chance = self.chance
         rate = chance.choice((None, Fraction(120), Fraction(30000, 1001), Fraction(1, 2**50)))
         metadata = {f"x-{k}": text(chance) for k in range(chance.choice((0, 0, 1, 3)))}
@@ -238,7 +238,7 @@ class _Maker:
         )
 
     def window(self, made: Clip, motion: Motion) -> tuple[Motion, dict[str, Any]]:
-        """What is shown of the stored frames, and the edits of CLIP, CEND and INDX."""
+        """Visible part of the stored frames, and the edits of CLIP, CEND and INDX."""
         chance, n = self.chance, motion.n_frames
         skip = spare = 0
         if n and motion.frame_numbers is None and self.says("frames that are not shown", 0.2):
