@@ -15,12 +15,13 @@ import pytest
 
 import mcz
 from mcz import MczError
+from mcz.files import dask
 from mcz.files.dask import cluster as clusters
-from mcz.files.dask import map_clips, packing, reading
-from mcz.files.dask.sources import skeletons_beside
+from mcz.files.dask import map_clips, packing
+from mcz.files.dask.packing import skeletons_beside
 from tests.commands import run
 
-pack, verify = packing.pack, reading.verify
+pack, verify = packing.pack, dask.verify
 
 
 @pytest.fixture(scope="module")
@@ -171,7 +172,7 @@ def test_a_cluster_packs_and_verifies(
 
 def slow(state: Any, ask: Any) -> Any:
     """Encode slowly, so that a worker can be killed in the middle."""
-    from mcz.files.dask.sources import coded_there
+    from mcz.files.dask.packing import coded_there
 
     time.sleep(0.3)
     return coded_there(state, ask)
@@ -209,7 +210,7 @@ def test_a_worker_that_is_killed_takes_no_clip_along(
 def fatal(state: Any, ask: Any) -> Any:
     if ask.name == "walk.c3d":
         os._exit(1)
-    from mcz.files.dask.sources import coded_there
+    from mcz.files.dask.packing import coded_there
 
     return coded_there(state, ask)
 

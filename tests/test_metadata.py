@@ -18,11 +18,20 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.container.chunks import Chunk
-from mcz.container.metadata import Record, applied, as_one, build_metas, parse_meta
-from mcz.container.metadata_keys import EXAMPLES, KEYS, TYPES, check_said
+from mcz.container.metadata import (
+    EXAMPLES,
+    KEYS,
+    TYPES,
+    Record,
+    applied,
+    as_one,
+    build_metas,
+    check_said,
+    parse_meta,
+)
 from mcz.container.writer import Writer
-from mcz.files.editing.file_times import nanoseconds, stamp
-from mcz.files.editing.metadata_table import from_table
+from mcz.files.editing.folders import nanoseconds, stamp
+from mcz.files.editing.metadata_edit import from_table
 from mcz.sources.sample import write_samples
 from tests.commands import Call
 

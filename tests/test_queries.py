@@ -13,9 +13,7 @@ from hypothesis import strategies as st
 
 from mcz import OptionError
 from mcz.files.queries import Query, Value
-from mcz.files.queries.parser import parse
-from mcz.files.queries.tokens import WORDS
-from mcz.files.queries.tree import (
+from mcz.files.queries.evaluation import (
     And,
     Compare,
     In,
@@ -28,6 +26,7 @@ from mcz.files.queries.tree import (
     Or,
     printed,
 )
+from mcz.files.queries.parser import WORDS, parse
 
 CLIP: dict[str, Value] = {
     "name": "05_01",

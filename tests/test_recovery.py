@@ -14,10 +14,16 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.container.recovery import encoder
-from mcz.container.recovery.code import encoded, log_weights, recovered, runs_of
-from mcz.container.recovery.galois_field import logarithms, over, times
-from mcz.container.recovery.layout import Shape, shape_for
-from mcz.container.recovery.packets import build_packet, read_packet
+from mcz.container.recovery.code import (
+    encoded,
+    log_weights,
+    logarithms,
+    over,
+    recovered,
+    runs_of,
+    times,
+)
+from mcz.container.recovery.layout import Shape, build_packet, read_packet, shape_for
 from mcz.container.source import ByteSource
 from mcz.files.editing.protecting import protections
 from mcz.sources.sample import write_samples

@@ -15,7 +15,7 @@ from mcz.codecs.online.options import PRESET_IDS
 from mcz.codecs.transforms.wavelets import IDS, WAVELETS
 from mcz.container import limits
 from mcz.container.chunks import FLAGS_OF, ChunkType
-from mcz.container.versions import FORMAT_NAME
+from mcz.container.limits import FORMAT_NAME
 from mcz.model.motion import CHANNEL_KINDS, ROLES
 from mcz.sources import FORMATS, sample
 from tools import registry

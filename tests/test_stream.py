@@ -35,7 +35,7 @@ from mcz.container.packets import (
     head_size,
     implied_by,
 )
-from mcz.container.parser_drivers import chunks_in
+from mcz.container.parser_drivers import repeated_chunks
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.container.source import open_source
@@ -138,7 +138,11 @@ def test_what_is_repeated(codec: str) -> None:
     for chunk in repeats:
         payload = data[chunk.payload_offset :][: chunk.length]
         assert payload == opening
-        assert [inner.chunk.type for inner in chunks_in(payload, 0)] == [b"HEAD", b"SKEL", b"CLIP"]
+        assert [inner.chunk.type for inner in repeated_chunks(payload, 0)] == [
+            b"HEAD",
+            b"SKEL",
+            b"CLIP",
+        ]
     with mcz.open(data) as file:
         clip = info(file)["clips"][0]
         assert clip["between_bytes"] == sum(chunk.size for chunk in repeats)
@@ -731,7 +735,7 @@ def short(sequence: int, number: int) -> Packet:
 
 def test_behind_a_gap_among_several_signals_numbers_are_not_known() -> None:
     opening = pieces(n=1)[0]
-    clip = chunks_in(opening.removeprefix(SIGNATURE), 0)[-1]
+    clip = repeated_chunks(opening.removeprefix(SIGNATURE), 0)[-1]
     fields = parse(payloads.Clip, clip.payload, "CLIP")
     fields.signals.append(replace(fields.signals[0], role=0))
     two = build_chunk(b"CLIP", built(payloads.Clip, fields, "CLIP"))
@@ -799,7 +803,7 @@ def test_a_damaged_length_holds_nothing_up() -> None:
 def test_what_a_stream_may_repeat() -> None:
     parts = pieces()
     opening = parts[0].removeprefix(SIGNATURE)
-    head = chunks_in(opening, 0)[0]
+    head = repeated_chunks(opening, 0)[0]
     for payload in (b"", head.data, opening[:-1], opening + opening, b"noise"):
         data = (
             parts[0]
@@ -823,7 +827,7 @@ def test_critical_chunks_that_are_not_known() -> None:
 def test_a_model_that_is_lost_comes_again() -> None:
     parts = pieces("lsdt-frame")
     opening = parts[0]
-    inner = chunks_in(opening.removeprefix(SIGNATURE), len(SIGNATURE))
+    inner = repeated_chunks(opening.removeprefix(SIGNATURE), len(SIGNATURE))
     for event in inner:
         bad = flipped(opening, event.offset + 18, 1)
         found, _ = read(b"".join([bad, *parts[1:]]), lost="hold")
@@ -832,7 +836,7 @@ def test_a_model_that_is_lost_comes_again() -> None:
 
 def test_a_stream_of_the_small_profile() -> None:
     parts = pieces(repeat=0)
-    head, *others = chunks_in(parts[0].removeprefix(SIGNATURE), 0)
+    head, *others = repeated_chunks(parts[0].removeprefix(SIGNATURE), 0)
     small = replace(parse(payloads.Head, head.payload, "HEAD"), profile=limits.SMALL.id)
     opening = [SIGNATURE, build_chunk(b"HEAD", build(small, "HEAD"))]
     data = b"".join([*opening, *(event.data for event in others), *parts[1:]])

@@ -21,7 +21,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
-from mcz.container.versions import FORMAT_NAME  # noqa: E402 - needs the path
+from mcz.container.limits import FORMAT_NAME  # noqa: E402 - needs the path
 from tools.vectors import uncommon, valid  # noqa: E402 - needs the path
 from tools.vectors.bases import MADE  # noqa: E402
 from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402

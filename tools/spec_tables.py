@@ -33,7 +33,7 @@ from tools import spec_trace
 MODULES = (
     "mcz.container.payloads",
     "mcz.container.index_records",
-    "mcz.container.note_records",
+    "mcz.container.segments",
     "mcz.container.copies",
     "mcz.container.metadata",
     "mcz.container.dictionary_deflate",
@@ -53,7 +53,7 @@ MODULES = (
     "mcz.sources.text.notes",
     "mcz.sources.tables.notes",
     "mcz.sources.c3d.layout",
-    "mcz.container.recovery.packets",
+    "mcz.container.recovery.layout",
     "mcz.model.numbers",
 )
 NAMED = {

@@ -16,8 +16,7 @@ from mcz.model.types import Values
 
 if TYPE_CHECKING:
     from mcz.files.reading.clip import Clip
-    from mcz.files.tables.events import Event
-    from mcz.files.tables.files import Table
+    from mcz.files.tables.files import Event, Table
     from mcz.model.clock import Timeline
     from mcz.model.motion import Motion
 
@@ -82,7 +81,7 @@ class ClipSelection:
         names: list[str],
         units: Sequence[str] = (),
     ) -> Table:
-        from mcz.files.reading.decimation import decimated_rows
+        from mcz.files.reading.views import decimated_rows
         from mcz.files.tables.files import Table
 
         clip, per_frame = self.clip, self.clip.signals[signal].samples_per_frame

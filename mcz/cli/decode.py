@@ -338,8 +338,7 @@ def _converted(
 
 
 def _export(clip: Clip, target: str, part: ClipSelection, wanted: DecodeOptions) -> Output:
-    from mcz.files.tables.events import EVENT_EXPORTS
-    from mcz.files.tables.files import EXPORTS, channel_names, channel_units
+    from mcz.files.tables.files import EVENT_EXPORTS, EXPORTS, channel_names, channel_units
 
     joints = wanted.joints
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]

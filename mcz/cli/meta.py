@@ -131,7 +131,7 @@ def command(
             return _show(held, _chosen(held, clips, where, of_file), as_json)
     rows = None
     if table is not None:
-        from mcz.files.editing.metadata_table import from_table
+        from mcz.files.editing.metadata_edit import from_table
 
         columns = None if take is None else [name.strip() for name in take.split(",")]
         rows = partial(from_table, table, match=match, take=columns, skip_unknown=skip_unknown)

@@ -15,8 +15,7 @@ from dataclasses import dataclass, field
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import ClipRow, Directory, parse_head
-from mcz.container.events import ChunkEvent, Event, Fault, PacketEvent
-from mcz.container.grammar import INDEX, START
+from mcz.container.grammar import INDEX, START, ChunkEvent, Event, Fault, PacketEvent
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import index_limit
 from mcz.container.packets import END
@@ -29,7 +28,7 @@ SHARED = (ChunkType.SKEL, ChunkType.MODL, ChunkType.SRCE)
 KEPT = (ChunkType.HEAD, *SHARED)  # chunks whose payloads the pass needs
 _PLACE = struct.Struct("<QQB")  # of a segment: offset, size, kind of its packet
 
-Told = Callable[[int, int], object]
+Report = Callable[[int, int], object]
 
 
 @dataclass(slots=True)
@@ -45,7 +44,7 @@ class Checked:
     faults: list[tuple[int, str]] = field(default_factory=list)
 
 
-def check_checksums(source: ByteSource, progress: Told | None = None) -> Checked:
+def check_checksums(source: ByteSource, progress: Report | None = None) -> Checked:
     """Check each checksum of ``source``, and INDX and FOOT against the chunks that are there.
 
     Nothing is decoded: only a full check finds what is wrong within sound checksums. ``progress``
@@ -77,18 +76,18 @@ class _Check:
     def take(self, event: Event) -> None:
         """Take an event in; raises UnsupportedError."""
         if isinstance(event, PacketEvent):
-            self._packet(event)
+            self._take_packet(event)
         elif isinstance(event, Fault):
-            self._fault(event)
+            self._take_fault(event)
         elif isinstance(event, ChunkEvent):
-            self._chunk(event)
+            self._take_chunk(event)
         else:
             self._index, self._end = event.index, event.end
 
     def _note(self, at: int, text: str) -> None:
         self.seen.faults.append((at, text))
 
-    def _fault(self, fault: Fault) -> None:
+    def _take_fault(self, fault: Fault) -> None:
         """Note a fault of a checksum, or of the grammar where all that lies before is known."""
         event, chunk = fault.event, fault.chunk
         if isinstance(fault.error, UnsupportedError):
@@ -109,8 +108,7 @@ class _Check:
             self.seen.n_chunks += 1
             self._places.add(chunk)
 
-    def _chunk(self, event: ChunkEvent) -> None:
-        """Learn what the pass has to know of a sound chunk."""
+    def _take_chunk(self, event: ChunkEvent) -> None:
         chunk = event.chunk
         self.seen.n_chunks += 1
         if chunk.type == ChunkType.HEAD:
@@ -127,7 +125,7 @@ class _Check:
                 self._places.shared.setdefault((chunk.type, id_), chunk)
         self._places.add(chunk)
 
-    def _packet(self, event: PacketEvent) -> None:
+    def _take_packet(self, event: PacketEvent) -> None:
         packet = event.packet
         if packet.kind != END:
             self.seen.n_packets += 1
@@ -207,10 +205,10 @@ class _Places:
             found.append("it lists other attachments than there are")
         if self.n_aliases != len(listed.aliases):
             found.append(f"it lists {len(listed.aliases)} aliases, there are {self.n_aliases}")
-        return found + _differing(self.clips, list(listed.clips.values()))
+        return found + _clip_differences(self.clips, list(listed.clips.values()))
 
 
-def _differing(places: Sequence[_ClipPlaces], rows: Sequence[ClipRow]) -> list[str]:
+def _clip_differences(places: Sequence[_ClipPlaces], rows: Sequence[ClipRow]) -> list[str]:
     if len(places) != len(rows):
         return [f"it lists {len(rows)} clips, there are {len(places)}"]
     return [

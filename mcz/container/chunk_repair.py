@@ -64,7 +64,7 @@ def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str
     notes: list[str] = []
     sound = _sound_spans(found)
     parts: dict[int, bytes] = {}
-    for copy, shift in _placed(source, found, list(_copies(source, found, notes))):
+    for copy, shift in _shift_copies(source, found, list(_read_copies(source, found, notes))):
         if shift is None:
             notes.append(f"a copy of {copy.label} is not used: where it belongs is not clear")
             continue
@@ -74,20 +74,20 @@ def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str
             continue
         if source.read(copy.offset, len(chunk)) == chunk:
             continue
-        fault = _fault(source, copy)
-        if not fault or _meet(sound, copy.offset, copy.stop):  # SALV-08
+        fault = _fault_of(source, copy)
+        if not fault or _overlaps(sound, copy.offset, copy.stop):  # SALV-08
             notes.append(f"a copy of {copy.label} is not used: what lies there is sound")
             continue
         notes.append(f"{copy.label}: {fault}; its copy is used")  # SALV-07
         parts[copy.offset] = chunk
-    for offset, header in _mended_headers(source, found):
+    for offset, header in _mend_headers(source, found):
         if not any(at <= offset < at + len(part) for at, part in parts.items()):
             notes.append(f"chunk at {offset}: one bit of its header is wrong, and put right")
             parts[offset] = header
     return (Overlay(source, parts) if parts else None), notes
 
 
-def _mended_headers(source: ByteSource, found: Found) -> Iterator[tuple[int, bytes]]:
+def _mend_headers(source: ByteSource, found: Found) -> Iterator[tuple[int, bytes]]:
     """The headers of which one bit is wrong: with that turned both of a chunk's checks hold."""
     left = MOST_READ * source.size
     for offset, chunk in found.broken:
@@ -102,12 +102,12 @@ def _mended_headers(source: ByteSource, found: Found) -> Iterator[tuple[int, byt
                     left -= HEADER.size if mended.length is None else mended.size
                     if left < 0:
                         return
-                    _check_all(Overlay(source, {offset: header}), mended)
+                    _check_whole(Overlay(source, {offset: header}), mended)
                     yield offset, header
                     break
 
 
-def _check_all(source: ByteSource, chunk: Chunk) -> None:
+def _check_whole(source: ByteSource, chunk: Chunk) -> None:
     """Check all of a chunk, of an open one its first packet; raises FormatError."""
     if chunk.length is None:
         if next(packets(source, chunk)).packet.kind == END:
@@ -116,7 +116,7 @@ def _check_all(source: ByteSource, chunk: Chunk) -> None:
         read_payload(source, chunk, chunk.size)
 
 
-def _placed(
+def _shift_copies(
     source: ByteSource, found: Found, copies: list[Copy]
 ) -> Iterator[tuple[Copy, int | None]]:
     """Each copy, and by how much what it is of lies elsewhere than it says.
@@ -135,13 +135,13 @@ def _placed(
         near = sorted(abs(at - copy.offset) for at in places.get(key, []))
         ats = [at for at in places.get(key, []) if abs(at - copy.offset) == near[0]]
         known.append(ats[0] - copy.offset if ats else None)
-    before, behind = _carried(known), _carried(known[::-1])[::-1]
+    before, behind = _fill_forward(known), _fill_forward(known[::-1])[::-1]
     for copy, own, last, following in zip(copies, known, before, behind, strict=True):
         around = {shift for shift in (last, following) if shift is not None} or {0}
         yield copy, own if own is not None else around.pop() if len(around) == 1 else None
 
 
-def _carried(known: list[int | None]) -> list[int | None]:
+def _fill_forward(known: list[int | None]) -> list[int | None]:
     """Each number that is known, or the last one before it."""
     found: list[int | None] = []
     for one in known:
@@ -149,7 +149,7 @@ def _carried(known: list[int | None]) -> list[int | None]:
     return found
 
 
-def _copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy]:
+def _read_copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy]:
     """The copies in every COPY that is whole; together they are no longer than the file."""
     left = source.size
     for chunk in found.chunks:
@@ -165,23 +165,20 @@ def _copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy
 
 
 def _sound_spans(found: Found) -> list[tuple[int, int]]:
-    """The spans of chunks and FOOTs that were found whole, in file order."""
     feet = [(at, at + FOOT.size) for at in found.feet]
-    return sorted(feet + [(chunk.offset, _end(chunk, found)) for chunk in found.chunks])
+    return sorted(feet + [(chunk.offset, _end_of(chunk, found)) for chunk in found.chunks])
 
 
-def _meet(spans: list[tuple[int, int]], start: int, stop: int) -> bool:
-    """True where one of them has bytes of ``start`` <= offset < ``stop``."""
+def _overlaps(spans: list[tuple[int, int]], start: int, stop: int) -> bool:
     index = bisect_right(spans, (start, stop))
     return any(a < stop and start < b for a, b in spans[max(0, index - 1) : index + 1])
 
 
-def _end(chunk: Chunk, found: Found) -> int:
+def _end_of(chunk: Chunk, found: Found) -> int:
     return found.ends[chunk.offset] if chunk.length is None else chunk.offset + chunk.size
 
 
-def _fault(source: ByteSource, copy: Copy) -> str:
-    """Name the fault of a chunk that has a copy; "" for a sound one."""
+def _fault_of(source: ByteSource, copy: Copy) -> str:
     try:
         chunk = read_chunk(source, copy.offset)
         read_payload(source, chunk, chunk.length or 0)
@@ -192,7 +189,7 @@ def _fault(source: ByteSource, copy: Copy) -> str:
 
 def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
     """Whose the segments and CENDs are, as the last index says that is whole; see ``scan``."""
-    listed = _last_index(source, found)
+    listed = _read_last_index(source, found)
     owners: dict[tuple[int, int], str] = {}
     with suppress(FormatError):
         for name, clip in listed.clips.items() if listed is not None else ():
@@ -202,7 +199,7 @@ def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
     return owners
 
 
-def _last_index(source: ByteSource, found: Found) -> Directory | None:
+def _read_last_index(source: ByteSource, found: Found) -> Directory | None:
     """The content of the last whole INDX, and of those that it continues up to a damaged one."""
     for chunk in reversed(found.chunks):
         if chunk.type == ChunkType.INDX:
@@ -222,7 +219,7 @@ def restore_from_index(source: ByteSource, found: Found) -> list[str]:
     Without one it gets the HEAD of this version. Returns what was lost.
     """
     directory, notes = found.directory, []
-    listed = _last_index(source, found)
+    listed = _read_last_index(source, found)
     if listed is not None and not directory.head:
         with suppress(FormatError):
             parse_head(listed.head)

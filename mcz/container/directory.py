@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import (
-    Callable,
-    Collection,
-    Iterable,
-    Iterator,
-    MutableMapping,
-    Sequence,
-)
+from collections.abc import Callable, Collection, Iterable, Iterator, MutableMapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
 
@@ -142,9 +135,7 @@ class PackedClipRow(ClipRow):
     __slots__ = ("_pack", "_segments", "_unpack")
 
     def keep_packed(
-        self,
-        pack: Callable[[], Packed],
-        unpack: Callable[[ClipRow, Packed], list[SegmentRow]],
+        self, pack: Callable[[], Packed], unpack: Callable[[ClipRow, Packed], list[SegmentRow]]
     ) -> None:
         """Let segments be what ``unpack`` makes of what ``pack`` returns."""
         self._pack: Callable[[], Packed] | None = pack

@@ -1,18 +1,22 @@
-"""The grammar of a file: what may follow what, as SPEC.md, "Grammar", prints it."""
+"""The grammar of a file: events of a parser and their order, as SPEC.md, "Grammar", prints it."""
 
 from __future__ import annotations
 
-from mcz.container.chunks import FLAGS_OF, Chunk, ChunkFlag, ChunkType
+from dataclasses import dataclass
+
+from mcz.container.chunks import FLAGS_OF, FOOT, HEADER, Chunk, ChunkFlag, ChunkType, Foot
+from mcz.container.packets import CHECK_SIZE, Packet, build_packet
+from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
 
 # States: what was read last, and so what may follow.
-SIGNATURE, START, BODY, CLIP, PACKETS, INDEX, FILE = (
+UNSIGNED, START, BODY, CLIP, PACKETS, INDEX, FILE = (
     *("signature", "start", "body", "clip"),
     *("packets", "index", "file"),
 )
 # Things that are not called as the type of their chunk.
 OPEN_DATA, PACKET, END_PACKET = "open DATA", "packet", "end packet"
-OTHER, FOOT, END = "ancillary", "FOOT", "end of file"
+OTHER, FOOT_THING, END = "ancillary", "FOOT", "end of file"
 
 GRAMMAR: dict[str, dict[str, str]] = {
     "HEAD": {START: BODY},
@@ -29,7 +33,7 @@ GRAMMAR: dict[str, dict[str, str]] = {
     "CEND": {CLIP: BODY},
     OTHER: {BODY: BODY, CLIP: CLIP, FILE: BODY},
     "INDX": {BODY: INDEX, FILE: INDEX},
-    FOOT: {BODY: FILE, INDEX: FILE, FILE: FILE},
+    FOOT_THING: {BODY: FILE, INDEX: FILE, FILE: FILE},
     END: {FILE: END},
 }
 NAMED: dict[bytes, str] = {kind: kind.name for kind in ChunkType if kind.name in GRAMMAR}
@@ -64,3 +68,111 @@ def after_misplaced(thing: str, state: str) -> str:
     """The state to go on with behind such a thing."""
     began = {"CLIP": CLIP, "INDX": INDEX, OPEN_DATA: PACKETS}.get(thing)
     return began or (BODY if state in (START, INDEX) else state)
+
+
+@dataclass(slots=True)
+class ChunkEvent:
+    """A chunk; ``data`` begins with its header, and has as much of it as was wanted."""
+
+    chunk: Chunk
+    data: bytes
+    thing: str  # its row in the grammar
+
+    @property
+    def offset(self) -> int:
+        return self.chunk.offset
+
+    @property
+    def end(self) -> int:
+        """The offset behind it; of an open DATA that of its first packet."""
+        chunk = self.chunk
+        return chunk.payload_offset if chunk.length is None else chunk.offset + chunk.size
+
+    @property
+    def payload(self) -> bytes:
+        """Its payload, or the beginning of it that was wanted."""
+        length = self.chunk.length or 0
+        return self.data[HEADER.size : HEADER.size + length]
+
+
+@dataclass(slots=True)
+class PacketEvent:
+    """A packet of the open DATA ``chunk``, whose body begins at ``body``.
+
+    ``number`` is that of the frame in a packet without a segment of its own, ``segment`` the header
+    of the one in another: None in an end packet, and where they are not known. ``is_masked``: it
+    implies the mask of that before.
+    """
+
+    chunk: Chunk
+    packet: Packet
+    offset: int
+    body: int
+    number: int | None = None
+    segment: SegmentHeader | None = None
+    is_masked: bool = False
+
+    @property
+    def header(self) -> SegmentHeader | None:
+        """The header of its segment, also of one that is not spelled out."""
+        if self.number is None:
+            return self.segment
+        flags = self.packet.fresh * FRESH | self.is_masked * MASKS  # PACK-20
+        return SegmentHeader(0, self.number, 1, flags=flags)  # PACK-12
+
+    @property
+    def end(self) -> int:
+        return self.body + len(self.packet.body) + CHECK_SIZE
+
+    @property
+    def payload(self) -> bytes:
+        """Its body."""
+        return self.packet.body
+
+    @property
+    def data(self) -> bytes:
+        """All of it, as ``ChunkEvent.data``."""
+        return build_packet(self.packet)
+
+
+@dataclass(slots=True)
+class FootEvent:
+    """A FOOT, and the INDX before it."""
+
+    foot: Foot
+    offset: int
+    index: Chunk | None
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Offset and size of that INDX, both 0 without one."""
+        return (self.index.offset, self.index.size) if self.index else (0, 0)
+
+    @property
+    def is_right(self) -> bool:
+        """Return whether it says where that INDX is, or that there is none."""
+        return (self.foot.index_offset, self.foot.index_length) == self.place
+
+    @property
+    def end(self) -> int:
+        return self.offset + FOOT.size
+
+
+@dataclass(slots=True)
+class Fault:
+    """A break of the rules in what begins at ``offset``.
+
+    ``chunk`` is the one that lies there, or whose packet does, where its header is sound. ``event``
+    is what lies there where its checksums are right, and it alone or its place is wrong: in the
+    ``state`` of the grammar. ``is_lost``: where it ends is not known.
+    """
+
+    offset: int
+    error: FormatError
+    chunk: Chunk | None = None
+    event: ChunkEvent | PacketEvent | FootEvent | None = None
+    state: str = ""
+    is_lost: bool = False
+
+
+Event = ChunkEvent | PacketEvent | FootEvent | Fault

@@ -32,7 +32,7 @@ class HttpFile(io.RawIOBase):
         self._server = Connections(address)
         self._conditions: dict[str, str] = {}  # that each request after the first makes
         self._said: tuple[str | None, ...] | None = None  # what tells this file from a later one
-        self._size, self._tail = self._first()
+        self._size, self._tail = self._read_end()
 
     def readable(self) -> bool:
         return True
@@ -61,7 +61,7 @@ class HttpFile(io.RawIOBase):
         if start >= 0:
             return self._tail[start : start + size]
         answer = self._answer(f"{at}-{at + size - 1}", size)
-        self._whole(answer, at, at + size - 1)
+        self._check_range(answer, at, at + size - 1)
         return self._body(answer, size)
 
     def close(self) -> None:
@@ -69,21 +69,21 @@ class HttpFile(io.RawIOBase):
             self._server.close()
         super().close()
 
-    def _first(self) -> tuple[int, bytes]:
-        """The size of the file, and the bytes at its end that came with it."""
+    def _read_end(self) -> tuple[int, bytes]:
+        """The size of the file, and the bytes at its end."""
         for asked, most in (f"-{TAIL}", TAIL), ("0-0", 1):
             answer = self._answer(asked, most)
-            if _is_empty(answer):
+            if _states_empty(answer):
                 return 0, b""
             if answer.status not in NO_SUFFIX:
                 break
         if asked == "0-0":
-            whole, tail = self._whole(answer, 0, 0), b""
+            whole, tail = self._check_range(answer, 0, 0), b""
         else:
-            whole = self._whole(answer, None, None)
+            whole = self._check_range(answer, None, None)
             tail = self._body(answer, min(TAIL, whole))
         tag, date = answer.headers.get("ETag"), answer.headers.get("Last-Modified")
-        self._said = _identity(answer.headers)
+        self._said = _identity_of(answer.headers)
         if tag and STRONG.fullmatch(tag):
             self._conditions = {"If-Match": tag}
         elif date and not tag:
@@ -99,7 +99,7 @@ class HttpFile(io.RawIOBase):
         }
         return self._server.get(headers, most)
 
-    def _whole(self, answer: Answer, first: int | None, last: int | None) -> int:
+    def _check_range(self, answer: Answer, first: int | None, last: int | None) -> int:
         """The size of the whole file, where this is an answer to what was asked.
 
         ``first``, ``last``: the bytes that were, None for those at the end.
@@ -117,7 +117,7 @@ class HttpFile(io.RawIOBase):
         if found is None or found[1] is None:
             raise self._server.error("the server does not say which range it gives")
         start, stop, whole = (int(number) for number in found.groups())
-        if self._said and (self._said, self._size) != (_identity(answer.headers), whole):
+        if self._said and (self._said, self._size) != (_identity_of(answer.headers), whole):
             raise self._server.error(REPLACED)
         first = max(0, whole - TAIL) if first is None else first
         last = whole - 1 if last is None else last
@@ -132,13 +132,12 @@ class HttpFile(io.RawIOBase):
         return answer.body
 
 
-def _is_empty(answer: Answer) -> bool:
-    """Return True if the answer states an empty file, which has no range."""
+def _states_empty(answer: Answer) -> bool:
     found = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
     return answer.status == 416 and found is not None and found[3] == "0"
 
 
-def _identity(headers: Message) -> tuple[str | None, ...]:
-    """By what a server tells one file from another: its ETag, else when it was modified."""
+def _identity_of(headers: Message) -> tuple[str | None, ...]:
+    """The ETag by which a server tells files apart, else when the file was modified."""
     tag = headers.get("ETag")
     return (tag, None) if tag else (None, headers.get("Last-Modified"))

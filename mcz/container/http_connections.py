@@ -44,8 +44,6 @@ class Answer(NamedTuple):
 
 
 class _Goal(NamedTuple):
-    """Address of a request."""
-
     scheme: str
     host: str
     port: int | None
@@ -70,7 +68,7 @@ class Connections:
 
     def __init__(self, address: str) -> None:
         self.address = address
-        self._first = self._goal = self._goal_of(address)
+        self._first = self._goal = self._parse_address(address)
         self._idle: dict[_Goal, list[_Line]] = {}
         self._lock, self._process = Lock(), os.getpid()
         self._context: ssl.SSLContext | None = None
@@ -84,10 +82,10 @@ class Connections:
         attempt, wait = 1, 0.0
         while True:
             try:
-                answer = self._followed(headers, most)
+                answer = self._follow(headers, most)
             except (OSError, http.client.HTTPException, ValueError) as error:
-                text = _words(error)
-                again = _may_pass(error)
+                text = _describe(error)
+                again = _is_worth_a_retry(error)
                 wait = 0.0
             else:
                 if answer.status not in BUSY:
@@ -112,7 +110,7 @@ class Connections:
             for line in lines:
                 line.connection.close()
 
-    def _goal_of(self, address: str) -> _Goal:
+    def _parse_address(self, address: str) -> _Goal:
         try:
             parts: SplitResult = urlsplit(address)
             port = parts.port
@@ -126,14 +124,14 @@ class Connections:
         path = quote((parts.path or "/") + query, safe=PLAIN)
         return _Goal(parts.scheme, parts.hostname, port, path)
 
-    def _followed(self, headers: dict[str, str], most: int) -> Answer:
+    def _follow(self, headers: dict[str, str], most: int) -> Answer:
         """The answer behind all redirects, where the next request goes at once."""
         goal = self._goal
         for _ in range(MOST_REDIRECTS + 1):
-            answer = self._sent(goal, headers, most)
+            answer = self._send(goal, headers, most)
             place = answer.headers.get("Location")
             if answer.status in REDIRECTS and place:
-                goal = self._led(goal, place)
+                goal = self._redirect(goal, place)
             elif answer.status in EXPIRED and goal == self._goal != self._first:
                 goal = self._goal = self._first
             else:
@@ -142,16 +140,16 @@ class Connections:
                 return answer
         raise self.error(f"more than {MOST_REDIRECTS} redirects")
 
-    def _led(self, goal: _Goal, place: str) -> _Goal:
-        led = self._goal_of(urljoin(goal.address, place))
+    def _redirect(self, goal: _Goal, place: str) -> _Goal:
+        led = self._parse_address(urljoin(goal.address, place))
         if goal.scheme == "https" and led.scheme == "http":
             raise self.error("the server leads from https to http, which is not followed")
         return led
 
-    def _sent(self, goal: _Goal, headers: dict[str, str], most: int) -> Answer:
+    def _send(self, goal: _Goal, headers: dict[str, str], most: int) -> Answer:
         """The answer of the server at ``goal``; a connection that it has closed is made anew."""
         while True:
-            line, is_new = self._line(goal)
+            line, is_new = self._find_line(goal)
             try:
                 answer, is_whole = _exchange(line, goal, headers, most)
             except ssl.SSLCertVerificationError as error:
@@ -171,21 +169,20 @@ class Connections:
                 line.connection.close()
             return answer
 
-    def _line(self, goal: _Goal) -> tuple[_Line, bool]:
-        """A connection that nobody uses, and whether it is a new one."""
+    def _find_line(self, goal: _Goal) -> tuple[_Line, bool]:
         if self._process != os.getpid():  # those of the parent are its own
             self._idle, self._lock, self._process = {}, Lock(), os.getpid()
         with self._lock:
             idle = self._idle.get(goal._replace(path=""))
             if idle:
                 return idle.pop(), False
-        return self._connected(goal), True
+        return self._connect(goal), True
 
     def _keep(self, goal: _Goal, line: _Line) -> None:
         with self._lock:
             self._idle.setdefault(goal._replace(path=""), []).append(line)
 
-    def _connected(self, goal: _Goal) -> _Line:
+    def _connect(self, goal: _Goal) -> _Line:
         proxy = None if proxy_bypass(goal.host) else getproxies().get(goal.scheme)
         via = urlsplit(proxy if "://" in proxy else f"http://{proxy}") if proxy else None
         host, port = (via.hostname or "", via.port) if via else (goal.host, goal.port)
@@ -215,8 +212,7 @@ def _exchange(line: _Line, goal: _Goal, headers: dict[str, str], most: int) -> t
     return Answer(came.status, came.reason, came.headers, body), is_whole
 
 
-def _words(error: Exception) -> str:
-    """Describe an error."""
+def _describe(error: Exception) -> str:
     if isinstance(error, http.client.IncompleteRead):
         came = len(error.partial)
         return f"{came + (error.expected or 0)} bytes are announced, {came} came"
@@ -225,8 +221,7 @@ def _words(error: Exception) -> str:
     return reason_of(error)
 
 
-def _may_pass(error: Exception) -> bool:
-    """Return True if a retry may succeed."""
+def _is_worth_a_retry(error: Exception) -> bool:
     if isinstance(error, ConnectionRefusedError | ssl.SSLError):
         return False
     return isinstance(error, ConnectionError | TimeoutError | http.client.IncompleteRead)

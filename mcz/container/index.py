@@ -12,13 +12,7 @@ from operator import attrgetter
 
 from mcz.container import index_records
 from mcz.container.chunks import FRAMING, Chunk, ChunkFlag, ChunkType, build_chunk
-from mcz.container.directory import (
-    ClipRow,
-    Directory,
-    IndexPlace,
-    Packed,
-    SignalRow,
-)
+from mcz.container.directory import ClipRow, Directory, IndexPlace, Packed, SignalRow
 from mcz.container.index_records import (
     Index,
     IndexedAlias,

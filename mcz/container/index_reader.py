@@ -14,15 +14,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from mcz.container.chunks import (
-    CRC,
-    FRAMING,
-    Chunk,
-    ChunkFlag,
-    ChunkType,
-    build_chunk,
-    check_chunk,
-)
+from mcz.container.chunks import CRC, FRAMING, Chunk, ChunkFlag, ChunkType, build_chunk, check_chunk
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -36,13 +28,7 @@ from mcz.container.directory import (
     SignalRow,
 )
 from mcz.container.index import PACKETS, index_record
-from mcz.container.index_records import (
-    Index,
-    IndexedChunk,
-    IndexedPlace,
-    Indx,
-    PreviousIndex,
-)
+from mcz.container.index_records import Index, IndexedChunk, IndexedPlace, Indx, PreviousIndex
 from mcz.container.limits import check
 from mcz.container.packets import FRAME
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
@@ -78,13 +64,12 @@ def parse_index(data: bytes, offset: int, limit: int) -> Listed:
     ``limit`` bounds its inflated size.
     """
     chunk = Chunk(ChunkType.INDX, ChunkFlag.ANCILLARY, offset, len(data) - FRAMING)
-    outer, content = _inflated(check_chunk(data, chunk), offset, limit, "INDX")
+    outer, content = _inflate(check_chunk(data, chunk), offset, limit, "INDX")
     index = parse(Index, content, "INDX")
     return Listed(named(data, offset), outer.previous, outer.size, index)
 
 
-def _inflated(payload: bytes, offset: int, limit: int, where: str) -> tuple[Indx, bytes]:
-    """The fields of the INDX at ``offset``, and its content."""
+def _inflate(payload: bytes, offset: int, limit: int, where: str) -> tuple[Indx, bytes]:
     outer = parse(Indx, payload, where)
     previous = outer.previous
     if previous and (previous.length < FRAMING or previous.stop > offset):  # INDX-06
@@ -150,7 +135,7 @@ def place_of(chunk: PreviousIndex, n_bytes: int, directory: Directory) -> IndexP
 def _add_shared(directory: Directory, listed: Listed) -> None:
     table = listed.index.shared
     for kind, id_, chunk in zip(
-        table.blobs("type"), table.blobs("id"), _chunks(table, listed.start), strict=True
+        table.blobs("type"), table.blobs("id"), _chunks_of(table, listed.start), strict=True
     ):
         if (kind, id_) in directory.shared:
             raise FormatError(f"INDX: two entries of {kind!r} have the id {id_.hex()}")
@@ -158,7 +143,7 @@ def _add_shared(directory: Directory, listed: Listed) -> None:
 
 
 def _add_attachments(directory: Directory, listed: Listed) -> None:
-    table, chunks = listed.index.attachments, _chunks(listed.index.parts, listed.start)
+    table, chunks = listed.index.attachments, _chunks_of(listed.index.parts, listed.start)
     bounds = _bounds(table.numbers("n_parts"), len(chunks), "parts").tolist()
     for row, first, stop in zip(table, bounds[:-1], bounds[1:], strict=True):
         _add(directory.attachments, row.name, AttachmentRow(row.name, row.size, chunks[first:stop]))
@@ -184,7 +169,7 @@ def _ends(sizes: Numbers, start: int) -> Numbers:
     return start + np.cumsum(sizes)
 
 
-def _chunks(table: Places, start: int, kind: bytes = ChunkType.ATTA) -> list[Chunk]:
+def _chunks_of(table: Places, start: int, kind: bytes = ChunkType.ATTA) -> list[Chunk]:
     """The chunks of a table with ``gap`` and ``length``, the first behind ``start``."""
     lengths = table.numbers("length")
     ends = _ends(table.numbers("gap") + lengths + FRAMING, start)
@@ -266,7 +251,7 @@ class ClipTables:
         table = self.index.ancillary[first:stop]
         return [
             Chunk(kind, ChunkFlag.ANCILLARY, chunk.offset, chunk.length)
-            for kind, chunk in zip(table.blobs("type"), _chunks(table, start), strict=True)
+            for kind, chunk in zip(table.blobs("type"), _chunks_of(table, start), strict=True)
         ]
 
     def places(self) -> Iterator[Place]:
@@ -355,7 +340,7 @@ class IndexCheck:
         ``limit`` bounds its inflated size.
         """
         where = f"chunk {chunk.label}"
-        outer, content = _inflated(payload, chunk.offset, limit, where)
+        outer, content = _inflate(payload, chunk.offset, limit, where)
         since, depth = None, 1
         if outer.previous is not None:
             before = [(place, n) for place, n in self._found if place.chunk == outer.previous]
@@ -368,13 +353,12 @@ class IndexCheck:
         due = index_record(directory, since)
         expected = build(due, where)
         if content[: len(expected)] != expected:  # INDX-04, INDX-05, INDX-08
-            raise FormatError(_difference(parse(Index, content, where), due), where=where)
+            raise FormatError(_first_difference(parse(Index, content, where), due), where=where)
         name = named(build_chunk(chunk.type, payload, chunk.flags), chunk.offset)
         self._found.append((place_of(name, outer.size, directory), depth))
 
 
-def _difference(listed: Index, due: Index) -> str:
-    """The first field of an index that is not as it has to be, in words."""
+def _first_difference(listed: Index, due: Index) -> str:
     for name, given in vars(listed).items():
         wanted = getattr(due, name)
         if name == "extension" or given == wanted:

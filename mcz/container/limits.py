@@ -1,14 +1,17 @@
-"""Profiles: the limits that a file promises to keep and a reader promises to handle.
+"""Versions and profiles: the format that a file needs and the limits that it promises to keep.
 
-SPEC.md, "Limits and profiles", is normative.
+SPEC.md, "Versions" and "Limits and profiles", are normative.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mcz.errors import LimitError, OptionError
+from construct import Container, Int8ul
+
+from mcz.errors import LimitError, OptionError, UnsupportedError
 from mcz.hints import Hint
+from mcz.model.schema import CheckedBeside
 
 MIB = 2**20
 LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, in all
@@ -29,7 +32,7 @@ class Profile:
     text_bytes: int
     signals: int
     rows: int
-    is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``small_profile.py``
+    is_plain: bool = False  # nothing is packed, codecs and grids are few: see ``strict.py``
     coded_bytes: int = 2**53  # decoded, of a segment that writers make, so that its DATA is short
 
     @property
@@ -121,3 +124,20 @@ class Search:
         self.tried += n_bytes
         if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * came):
             raise LimitError(f"too much looks like {what} and is none; {self.tried} bytes read")
+
+
+FORMAT = 0, 99  # the draft of 1.0, which reads itself alone
+FORMAT_NAME = f"{FORMAT[0]}.{FORMAT[1]}"
+
+
+def _check_version(needs_minor: int, record: Container) -> bool:
+    needed = record.needs_major, needs_minor  # HEAD-04
+    words = f"it needs format {needed[0]}.{needed[1]}, this reader knows {FORMAT_NAME}"
+    if needed > FORMAT:  # HEAD-01, CLIP-23
+        raise UnsupportedError(words)
+    if not needed[0] and needed != FORMAT:  # HEAD-03
+        raise UnsupportedError(words, hint=Hint.OLD_FORMAT)
+    return True
+
+
+NEEDS_MINOR = CheckedBeside(Int8ul, _check_version)

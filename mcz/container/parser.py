@@ -23,12 +23,12 @@ from mcz.container.chunks import (
     parse_foot,
     parse_header,
 )
-from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.grammar import (
     BODY,
     CLIP,
     END,
     END_PACKET,
+    FOOT_THING,
     GRAMMAR,
     INDEX,
     NAMED,
@@ -37,12 +37,16 @@ from mcz.container.grammar import (
     PACKET,
     PACKETS,
     START,
+    UNSIGNED,
+    ChunkEvent,
+    Event,
+    Fault,
+    FootEvent,
+    PacketEvent,
     after_misplaced,
     misplaced,
     thing_of,
 )
-from mcz.container.grammar import FOOT as FOOT_THING
-from mcz.container.grammar import SIGNATURE as UNSIGNED
 from mcz.container.limits import BASE, Search
 from mcz.container.packets import (
     CHECK_SIZE,
@@ -77,11 +81,6 @@ class Short(Exception):
         self.stop = stop
 
 
-def everything(chunk: Chunk) -> int:
-    """Want the whole payload of every chunk."""
-    return ALL
-
-
 class Parser:
     """The state of a parser, which is fed with bytes and asked for events.
 
@@ -104,7 +103,7 @@ class Parser:
         at: int = 0,
         state: str = UNSIGNED,
         chunk: Chunk | None = None,
-        want: Want = everything,
+        want: Want = lambda chunk: ALL,
         check: bool = True,
     ) -> None:
         self.size, self.at, self.state = size, at, state
@@ -143,10 +142,16 @@ class Parser:
     def next(self) -> Event | None:
         """The next event; None where more bytes are needed for it, or nothing follows."""
         if self.state == UNSIGNED:
-            return self._signature()
+            return self._read_signature()
         begin = self.at if self._parts is None else self._parts[0].offset
         try:
-            return None if self.is_done else self._found() if self._is_lost else self._thing()
+            return (
+                None
+                if self.is_done
+                else self._search_next()
+                if self._is_lost
+                else self._read_next()
+            )
         except Short as short:
             self._stop = short.stop
             return None
@@ -166,7 +171,7 @@ class Parser:
             self.search(begin if self.state == PACKETS else begin + 1)
         return Fault(begin, error, self._chunk, is_lost=is_lost)
 
-    def _found(self) -> Event | None:
+    def _search_next(self) -> Event | None:
         """The next thing that is whole, at ``at`` or behind it."""
         while True:
             begin = self.at
@@ -175,7 +180,7 @@ class Parser:
                 self._chunk, self._tried = None, 0
                 state = self.state
                 try:
-                    event = self._thing()
+                    event = self._read_next()
                 except FormatError as error:
                     if self.at != at:  # it is whole, but not right
                         self._is_lost = False
@@ -190,7 +195,7 @@ class Parser:
             end = self._start + len(self._data)
             if self.size is not None and end >= self.size:
                 self._is_lost, self.at = False, self.size
-                return self._thing()
+                return self._read_next()
             self.at = max(begin, end - FOOT.size + 1)  # one may begin there that is not all there
             raise Short(end + 1)
 
@@ -227,24 +232,26 @@ class Parser:
             raise Short(stop)
         return start - self._start
 
-    def _thing(self) -> Event | None:
+    def _bytes(self, start: int, stop: int, what: str = "a packet") -> bytes:
+        pos = self._position(start, stop, what)
+        return self._data[pos : pos + stop - start]
+
+    def _read_next(self) -> Event | None:
         """The thing that begins at ``at``; raises FormatError where it is not whole."""
         if self._parts is not None:
-            return self._continued(*self._parts)
+            return self._continue_large(*self._parts)
         if self.state == PACKETS:
-            return self._packet()
+            return self._read_packet()
         self._chunk, at = None, self.at
         if self.size is not None and at >= self.size:
             self.is_done = True
             if self.state in GRAMMAR[END]:  # STRICT-01
                 return None
-            return Fault(
-                at, TruncatedError(f"{self._name} ends at {at} without a FOOT"), is_lost=True
-            )
-        pos = self._position(at, at + 1)
-        return self._header(at) if self._data[pos : pos + 1].isalpha() else self._foot(at)
+            error = TruncatedError(f"{self._name} ends at {at} without a FOOT")
+            return Fault(at, error, is_lost=True)
+        return self._read_chunk(at) if self._bytes(at, at + 1).isalpha() else self._read_foot(at)
 
-    def _signature(self) -> Event | None:
+    def _read_signature(self) -> Event | None:
         size, data = len(SIGNATURE), self._data
         if (self.size is None and len(data) < size) or (not data and self.size):
             self._stop = size
@@ -256,13 +263,13 @@ class Parser:
             return Fault(0, error)
         return self.next()
 
-    def _header(self, at: int) -> Event:
-        pos = self._position(at, at + HEADER.size, "a chunk header")
-        chunk = self._chunk = parse_header(self._data[pos : pos + HEADER.size], at)
+    def _read_chunk(self, at: int) -> Event:
+        header = self._bytes(at, at + HEADER.size, "a chunk header")
+        chunk = self._chunk = parse_header(header, at)
         if chunk.length is None:
-            event = ChunkEvent(chunk, self._data[pos : pos + HEADER.size], OPEN_DATA)
+            event = ChunkEvent(chunk, header, OPEN_DATA)
             self.at = event.end
-            found = self._placed(event)
+            found = self._place(event)
             if chunk.flags:  # CHUNK-10, PACK-10
                 error = FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on an open DATA")
                 return Fault(at, error, chunk, event)
@@ -270,9 +277,9 @@ class Parser:
         end = self._tried = at + chunk.size
         if self.size is not None and end > self.size:  # CHUNK-05
             raise TruncatedError(f"chunk {chunk.label} ends at {end}, {self._name} at {self.size}")
-        return self._payload(chunk, self._want(chunk))
+        return self._read_payload(chunk, self._want(chunk))
 
-    def _payload(self, chunk: Chunk, wanted: int) -> Event:
+    def _read_payload(self, chunk: Chunk, wanted: int) -> Event:
         """The chunk, checked as far as it is read."""
         assert chunk.length is not None
         at, end = chunk.offset, chunk.offset + chunk.size
@@ -285,27 +292,20 @@ class Parser:
                     f"chunk {chunk.label}: {chunk.length} bytes are over the limit of {limit}"
                 )
             if chunk.size > max(BLOCK, kept) and not self._is_lost:
-                pos = self._position(at, at + kept)
-                event = ChunkEvent(chunk, self._data[pos : pos + kept], "")
-                return self._continued(event, 0)
-            pos = self._position(at, end)
-            data = self._data[pos : pos + chunk.size]
-            self._check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
-            data = data if kept == chunk.size else data[:kept]
+                return self._continue_large(ChunkEvent(chunk, self._bytes(at, at + kept), ""), 0)
+            data = self._bytes(at, end)
+            try:
+                check_crc(chunk, zlib.crc32(memoryview(data)[: -CRC.size]), data[-CRC.size :])
+            except ChecksumError:
+                self._pass(chunk)
+                raise
+            data = data[:kept]
         else:
-            pos = self._position(at, at + kept)
-            data = self._data[pos : pos + kept]
+            data = self._bytes(at, at + kept)
         self._go_to(end)
-        return self._placed(ChunkEvent(chunk, data, thing_of(chunk)))
+        return self._place(ChunkEvent(chunk, data, thing_of(chunk)))
 
-    def _check_crc(self, chunk: Chunk, computed: int, stored: bytes) -> None:
-        try:
-            check_crc(chunk, computed, stored)
-        except ChecksumError:
-            self._pass(chunk)
-            raise
-
-    def _continued(self, event: ChunkEvent, crc: int) -> Event:
+    def _continue_large(self, event: ChunkEvent, crc: int) -> Event:
         """A large chunk, of which no more is kept than the part that was fed last."""
         chunk = event.chunk
         covered = chunk.offset + chunk.size - CRC.size
@@ -315,13 +315,13 @@ class Parser:
         self._parts = event, crc
         if self.at < covered:
             raise Short(min(self.at + BLOCK, covered + CRC.size))
-        pos = self._position(covered, covered + CRC.size)
+        stored = self._bytes(covered, covered + CRC.size)
         self._parts, self.at = None, covered + CRC.size
-        check_crc(chunk, crc, self._data[pos : pos + CRC.size])
+        check_crc(chunk, crc, stored)
         event.thing = thing_of(chunk)
-        return self._placed(event)
+        return self._place(event)
 
-    def _placed(self, event: ChunkEvent) -> Event:
+    def _place(self, event: ChunkEvent) -> Event:
         """The chunk, or the Fault that it may not stand where it does."""
         rows, state = GRAMMAR[event.thing], self.state
         self.state = rows.get(state) or after_misplaced(event.thing, state)
@@ -332,9 +332,8 @@ class Parser:
         error = misplaced(event.thing, event.chunk.label, state)
         return Fault(event.offset, error, event.chunk, event, state)
 
-    def _foot(self, at: int) -> Event:
-        pos = self._position(at, at + FOOT.size, "a FOOT")
-        foot = parse_foot(self._data[pos : pos + FOOT.size], at)
+    def _read_foot(self, at: int) -> Event:
+        foot = parse_foot(self._bytes(at, at + FOOT.size, "a FOOT"), at)
         if foot is None:
             raise FormatError(f"at {at} there is neither a chunk nor a FOOT")
         event, state, rows = FootEvent(foot, at, self._index), self.state, GRAMMAR[FOOT_THING]
@@ -346,7 +345,7 @@ class Parser:
             return Fault(at, misplaced(FOOT_THING, f"FOOT at {at}", state), None, event, state)
         return event
 
-    def _packet(self) -> Event:
+    def _read_packet(self) -> Event:
         at, data = self.at, self._data
         pos = self._position(at, at + 1)
         try:
@@ -376,7 +375,7 @@ class Parser:
         self.at, self._sequence = self._start + end, sequence + 1
         self.state = GRAMMAR[END_PACKET if kind == END_KIND else PACKET][PACKETS]  # PACK-01
         try:
-            self._tell(event)
+            self._count_frames(event)
         except FormatError as error:
             return Fault(at, error, event.chunk, event)
         return event
@@ -399,7 +398,7 @@ class Parser:
             self._implied = mask_of(self._told)  # PACK-20
         return self._implied
 
-    def _tell(self, event: PacketEvent) -> None:
+    def _count_frames(self, event: PacketEvent) -> None:
         """Tell which frames are in a packet; raises FormatError."""
         packet = event.packet
         if packet.kind == FRAME:

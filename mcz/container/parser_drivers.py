@@ -6,8 +6,16 @@ from collections.abc import Callable, Iterator
 from typing import BinaryIO
 
 from mcz.container.chunks import Chunk, ChunkType
-from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
-from mcz.container.grammar import PACKETS, SIGNATURE, START
+from mcz.container.grammar import (
+    PACKETS,
+    START,
+    UNSIGNED,
+    ChunkEvent,
+    Event,
+    Fault,
+    FootEvent,
+    PacketEvent,
+)
 from mcz.container.parser import PASS, Parser
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
@@ -22,11 +30,10 @@ def events(source: ByteSource, parser: Parser) -> Iterator[Event]:
         at, size = parser.wants
         parser.feed(source.read(at, min(max(size, source.block), source.size - at)))
 
-    return _driven(parser, feed)
+    return _drive(parser, feed)
 
 
-def _driven(parser: Parser, feed: Callable[[], None]) -> Iterator[Event]:
-    """The events of a parser, for which ``feed`` feeds it where it needs more."""
+def _drive(parser: Parser, feed: Callable[[], None]) -> Iterator[Event]:
     while not parser.is_done:
         event = parser.next()
         if event is not None:
@@ -45,7 +52,7 @@ def sound_events(
         yield event
 
 
-def chunks(source: ByteSource, at: int = 0, state: str = SIGNATURE) -> Iterator[tuple[Chunk, int]]:
+def chunks(source: ByteSource, at: int = 0, state: str = UNSIGNED) -> Iterator[tuple[Chunk, int]]:
     """The chunks from ``at`` on, and where each ends; raises FormatError at a fault.
 
     Of their payloads packets alone are read.
@@ -66,6 +73,26 @@ def packets(source: ByteSource, chunk: Chunk) -> Iterator[PacketEvent]:
             return
 
 
+def repeated_chunks(payload: bytes, offset: int) -> list[ChunkEvent]:
+    """The chunks in the ``payload`` of a REPT, which begins at ``offset``; raises FormatError."""
+    stop = offset + len(payload)
+    parser, repeated = Parser(stop, at=offset, state=START), []
+    parser.feed(payload)
+    while parser.at < stop:
+        event = parser.next()
+        if isinstance(event, Fault):
+            raise event.error
+        if not isinstance(event, ChunkEvent):
+            raise FormatError(f"REPT before {offset} holds other things than chunks")
+        repeated.append(event)
+    kinds = [event.chunk.type for event in repeated]
+    middle = set(kinds[1:-1]) <= {ChunkType.SKEL, ChunkType.MODL}
+    if kinds[:1] != [ChunkType.HEAD] or kinds[-1:] != [ChunkType.CLIP] or not middle:
+        names = " ".join(kind.decode() for kind in kinds)
+        raise FormatError(f"REPT before {offset} holds {names or 'nothing'}")
+    return repeated
+
+
 class Stream:
     """A stream that is read front to back; it need not be seekable, and its end is not known.
 
@@ -78,7 +105,7 @@ class Stream:
 
     def events(self, parser: Parser) -> Iterator[Event]:
         """The events of the stream, each as soon as its bytes are there."""
-        return _driven(parser, lambda: self._feed(parser))
+        return _drive(parser, lambda: self._feed(parser))
 
     def _feed(self, parser: Parser) -> None:
         at, size = parser.wants
@@ -90,23 +117,3 @@ class Stream:
             parser.end()
         self.size += len(data)
         parser.feed(data[max(0, len(data) - (self.size - at)) :])
-
-
-def chunks_in(payload: bytes, offset: int) -> list[ChunkEvent]:
-    """The chunks in the ``payload`` of a REPT, which begins at ``offset``; raises FormatError."""
-    stop = offset + len(payload)
-    parser, found = Parser(stop, at=offset, state=START), []
-    parser.feed(payload)
-    while parser.at < stop:
-        event = parser.next()
-        if isinstance(event, Fault):
-            raise event.error
-        if not isinstance(event, ChunkEvent):
-            raise FormatError(f"REPT before {offset} holds other things than chunks")
-        found.append(event)
-    kinds = [event.chunk.type for event in found]
-    middle = set(kinds[1:-1]) <= {ChunkType.SKEL, ChunkType.MODL}
-    if kinds[:1] != [ChunkType.HEAD] or kinds[-1:] != [ChunkType.CLIP] or not middle:
-        held = " ".join(kind.decode() for kind in kinds)
-        raise FormatError(f"REPT before {offset} holds {held or 'nothing'}")
-    return found

@@ -12,7 +12,7 @@ from itertools import groupby
 
 from construct import GreedyBytes, If, Int8ul, this
 
-from mcz.container.versions import FORMAT, NEEDS_MINOR
+from mcz.container.limits import FORMAT, NEEDS_MINOR
 from mcz.model.numbers import GRID, Grid
 from mcz.model.schema import (
     EXTENDED,

@@ -12,7 +12,6 @@ from operator import attrgetter
 from weakref import finalize
 
 from mcz.container import payloads
-from mcz.container.attachments import joined_parts
 from mcz.container.chunk_repair import is_like, scan_for_salvage
 from mcz.container.chunks import (
     FOOT,
@@ -30,7 +29,7 @@ from mcz.container.chunks import (
 )
 from mcz.container.copies import Copy, copy_chunks, uncopied
 from mcz.container.decoded_cache import DecodedCache
-from mcz.container.dictionary_deflate import chunk_id, plain_id, plain_payload
+from mcz.container.dictionary_deflate import chunk_id, joined_parts, plain_id, plain_payload
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -103,7 +102,7 @@ class Container:
 
     def __reduce__(self) -> tuple[object, ...]:
         names = "salvage", "max_decoded", "reads_parts", "threads", "verify"
-        return _reopened, (self.source, {n: getattr(self, n) for n in names})
+        return _reopen, (self.source, {n: getattr(self, n) for n in names})
 
     def strictly(self) -> Container:
         """The same file, of which all that is read is checked as in a sound one."""
@@ -122,18 +121,18 @@ class Container:
         tail = self.source.read(self.source.size - tail_size, tail_size)
         if not self.source.remote:  # where requests cost, INDX's copy of HEAD must do
             check_signature(self.source)
-        foot = self._foot(tail)
+        foot = self._read_foot(tail)
         if not foot.index_length:
             return scan(self.source).directory
         self.index = foot
-        head = None if self.source.remote else self._head()  # HEAD-01
-        directory = self._directory(foot, tail)
+        head = None if self.source.remote else self._read_head()  # HEAD-01
+        directory = self._read_directory(foot, tail)
         directory.end = self.source.size
         if head not in (None, directory.head):
             raise FormatError("HEAD is not what the index says")
         return directory
 
-    def _head(self) -> bytes:
+    def _read_head(self) -> bytes:
         """The payload of HEAD; raises UnsupportedError: behind it nothing is known then."""
         head = read_chunk(self.source, len(SIGNATURE))
         if head.type != ChunkType.HEAD:
@@ -142,7 +141,7 @@ class Container:
         parse_head(payload)
         return payload
 
-    def _foot(self, tail: bytes) -> Foot:
+    def _read_foot(self, tail: bytes) -> Foot:
         foot = None
         at = self.source.size - FOOT.size
         if at >= len(SIGNATURE):
@@ -153,8 +152,7 @@ class Container:
             raise TruncatedError(f"the file ends at {self.source.size} without a FOOT")
         return foot
 
-    def _directory(self, foot: Foot, tail: bytes) -> Directory:
-        """The content of INDX, and of those that it continues."""
+    def _read_directory(self, foot: Foot, tail: bytes) -> Directory:
         if foot.index_length < FRAMING:
             raise FormatError(f"FOOT: an index of {foot.index_length} bytes")
         begin = self.source.size - len(tail)
@@ -224,14 +222,14 @@ class Container:
 
     def skeleton(self, id_: bytes) -> Skeleton:
         """The skeleton in the SKEL with this id, its own source file not read."""
-        return self._skeleton(id_)[1]
+        return self._find_skeleton(id_)[1]
 
     def skeleton_fields(self, id_: bytes) -> payloads.Skel:
         """The fields of the SKEL with this id, its hash checked."""
-        return self._skeleton(id_)[0]
+        return self._find_skeleton(id_)[0]
 
-    def _skeleton(self, id_: bytes) -> tuple[payloads.Skel, Skeleton]:
-        """Both; the last ones are kept, since the clips of a file share them."""
+    def _find_skeleton(self, id_: bytes) -> tuple[payloads.Skel, Skeleton]:
+        """The fields and the skeleton; the last ones are kept, for clips share them."""
         found = self._skeletons.get(id_)
         if found is None:
             payload, label = self._shared_payload(ChunkType.SKEL, id_)
@@ -294,12 +292,12 @@ class Container:
         """The stream table of a segment, with as little read as will do."""
         self._check_row(row)
         if row.packet == FRAME:
-            return frame_table(row.header, counts, row.size, len(self._mask(row)))
+            return frame_table(row.header, counts, row.size, len(self._implied_mask(row)))
         size = min(row.size, TABLE_PEEK + counts.total(row.header.flags) * 7 // 4)
         while True:
             data = self.source.read(row.offset, size)
             try:
-                return _table_in(data, row, counts)
+                return _parse_table(data, row, counts)
             except TruncatedError:
                 size = min(row.size, 4 * size)
 
@@ -337,24 +335,23 @@ class Container:
     def _all_streams(
         self, row: SegmentRow, counts: StreamCounts
     ) -> tuple[StreamTable, dict[int, bytes]]:
-        payload = self._packet(row) if row.packet else self.payload(row.chunk())
+        payload = self._read_packet(row) if row.packet else self.payload(row.chunk())
         if row.packet == FRAME:
-            mask = self._mask(row)
+            mask = self._implied_mask(row)
             streams = [mask, payload] if row.header.flags & MASKS else [payload]
             return frame_table(row.header, counts, row.size, len(mask)), dict(enumerate(streams))
-        table = _table_in(payload, row, counts)
+        table = _parse_table(payload, row, counts)
         return table, {
             index: payload[offset : offset + length]
             for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True))
         }
 
-    def _packet(self, row: SegmentRow) -> bytes:
-        """The checked body of a packet, which is what the row says."""
+    def _read_packet(self, row: SegmentRow) -> bytes:
         before = min(row.offset, MOST_HEAD)
         data = self.source.read(row.offset - before, before + row.size + CHECK_SIZE)
         body = data[before:-CHECK_SIZE]
         number, fresh = row.header.first, bool(row.header.flags & FRESH)
-        implied = implied_by(number, self._mask(row)) if row.packet == FRAME else b""
+        implied = implied_by(number, self._implied_mask(row)) if row.packet == FRAME else b""
         # INDX-02, INDX-03, PACK-04, PACK-08, PACK-09, PACK-11, PACK-15
         if not is_packet(data, Packet(row.packet, 0, body, fresh, implied)):
             raise ChecksumError(
@@ -363,13 +360,15 @@ class Container:
             )
         return body
 
-    def _mask(self, row: SegmentRow) -> bytes:
-        """The mask that a packet of kind 2 implies."""
+    def _implied_mask(self, row: SegmentRow) -> bytes:
         if row.told is None:
             return b""
         offset, mask = self._told
         if offset != row.told.offset:
-            offset, mask = self._told = row.told.offset, mask_of(self._packet(row.told))  # PACK-20
+            offset, mask = self._told = (
+                row.told.offset,
+                mask_of(self._read_packet(row.told)),
+            )  # PACK-20
         return mask
 
     def _check_row(self, row: SegmentRow) -> None:
@@ -382,7 +381,7 @@ class Container:
         check(f"DATA at {row.offset}: bytes", row.size, limit)
 
 
-def _reopened(source: ByteSource, options: Settings) -> Container:
+def _reopen(source: ByteSource, options: Settings) -> Container:
     """Reopen the file of a pickled Container; it is closed when it is released."""
     try:
         container = Container(source, **options)
@@ -393,7 +392,7 @@ def _reopened(source: ByteSource, options: Settings) -> Container:
     return container
 
 
-def _table_in(data: bytes, row: SegmentRow, counts: StreamCounts) -> StreamTable:
+def _parse_table(data: bytes, row: SegmentRow, counts: StreamCounts) -> StreamTable:
     """The table of a segment, of which ``data`` may have too little: that is a TruncatedError."""
     try:
         table = parse_table(data, counts)

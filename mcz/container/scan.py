@@ -1,24 +1,94 @@
 """The scan of a file: the way to a Directory without, or in spite of, INDX.
 
-A strict scan raises at the first fault. A salvaging one writes it down, and goes on with what the
-parser finds next. SPEC.md, "Grammar" and "Salvage", are normative.
+A strict scan raises at the first fault. A salvaging one notes it, and goes on with the next event;
+``Bounds`` decides which clip a part behind lost bytes belongs to. SPEC.md, "Grammar" and "Salvage",
+are normative.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
+from types import MappingProxyType
 
-from mcz.container.chunks import FOOT, REPEATED, Chunk, ChunkType, read_payload
-from mcz.container.clip_bounds import NOBODY, Bounds, Owners
+from mcz.container.chunks import FOOT, FRAMING, REPEATED, Chunk, ChunkType, read_payload
 from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import Found, SegmentRow
-from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
-from mcz.container.grammar import BODY, CLIP, GRAMMAR, INDEX, NAMED, OTHER, START
+from mcz.container.grammar import (
+    BODY,
+    CLIP,
+    GRAMMAR,
+    INDEX,
+    NAMED,
+    OTHER,
+    START,
+    ChunkEvent,
+    Event,
+    Fault,
+    FootEvent,
+    PacketEvent,
+)
 from mcz.container.packets import END
-from mcz.container.parser_drivers import chunks_in, events
+from mcz.container.parser_drivers import events, repeated_chunks
 from mcz.container.scanner import Scanner
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
+
+LEAST_BETWEEN = 2 * FRAMING  # bytes in which a CEND and the next CLIP can have been
+Owners = Mapping[tuple[int, int], str]  # offset and size of segments and CENDs -> name of the clip
+NOBODY: Owners = MappingProxyType({})
+
+
+class Bounds:
+    """Knowledge of the end of the clip that is open; ``owners``: that of an index.
+
+    ``doubt``: it may have ended, and another one have begun, in bytes that are lost.
+    """
+
+    def __init__(self, owners: Owners) -> None:
+        self.owners = owners
+        self.doubt = False
+        self._fault: int | None = None  # where what cannot be taken in began, up to here
+
+    def begin(self) -> None:
+        """Note that a clip begins or ends here."""
+        self.doubt = False
+
+    def begin_fault(self, at: int) -> None:
+        """Note that what lies at ``at`` cannot be taken in."""
+        self._fault = at if self._fault is None else self._fault
+
+    def skip(self, to: int) -> bool:
+        """Note that nothing is known up to ``to``; return whether there is a doubt."""
+        self.doubt = self.doubt or to - (self._fault or 0) >= LEAST_BETWEEN
+        return self.doubt
+
+    def is_sound(self) -> None:
+        """Note that what followed was taken in."""
+        self._fault = None
+
+    def settle(self, payload: bytes, offset: int, own: bytes) -> bool:
+        """Let the REPT with ``payload`` tell; return False where it is in another clip.
+
+        ``offset``: where that begins; ``own``: the payload of the CLIP that is open.
+        """
+        try:
+            chunks = repeated_chunks(payload, offset)
+        except FormatError:  # what is no REPT says nothing
+            return True
+        clips = [event.payload for event in chunks if event.chunk.type == ChunkType.CLIP]
+        self.doubt = clips != [own]
+        return not clips or clips == [own]
+
+    def check(self, clip: str, kind: str, offset: int, size: int) -> None:
+        """Raise FormatError for what may belong to another clip than ``clip``."""
+        owner = self.owners.get((offset, size))
+        if owner == clip:
+            self.doubt = False
+        elif owner is not None or self.doubt:  # SALV-10
+            raise FormatError(
+                f"{kind} at {offset} lies behind bytes that may have ended clip {clip!r}"
+            )
 
 
 def scan(
@@ -73,7 +143,7 @@ class Salvager(Scanner):
         else:
             try:
                 if isinstance(event, Fault):
-                    self._misplaced(event)
+                    self._take_misplaced(event)
                 else:
                     self._take(event)
             except FormatError as error:
@@ -81,14 +151,14 @@ class Salvager(Scanner):
                 if of_head and isinstance(error, UnsupportedError):
                     raise  # nothing is known of a file of another version
                 self._note(error)  # SALV-03
-                self._leave(event)
+                self._skip(event)
             else:
                 if not _is_inside(event):
                     self._bounds.is_sound()
         if self.parser.state in (START, BODY, CLIP):
             self.parser.state = BODY if self.clip is None else CLIP
 
-    def _misplaced(self, fault: Fault) -> None:
+    def _take_misplaced(self, fault: Fault) -> None:
         """Take in what is whole and not where it may be; raises what cannot be taken in."""
         event, chunk = fault.event, fault.chunk
         if isinstance(event, FootEvent):
@@ -136,7 +206,7 @@ class Salvager(Scanner):
         if self.clip is not None:
             self.clip.damage.append(str(error))
 
-    def _leave(self, event: Event) -> None:
+    def _skip(self, event: Event) -> None:
         """Go on behind what cannot be taken in."""
         fault = event if isinstance(event, Fault) else None
         inner, chunk = (fault.event if fault else event), getattr(event, "chunk", None)
@@ -162,7 +232,6 @@ class Salvager(Scanner):
         self._is_lost = True
 
     def _drain(self, event: Event) -> None:
-        """Pass over the packets that are whole behind one that is not right."""
         inner = event.event if isinstance(event, Fault) else event
         if not isinstance(inner, PacketEvent):
             self._search(event.offset, event.offset)
@@ -214,12 +283,12 @@ class Salvager(Scanner):
         if self._bounds.doubt and not self._bounds.settle(payload, chunk.offset, own):
             self._close_clip()
         if self.clip is None:
-            for inner in chunks_in(payload, chunk.payload_offset):
+            for inner in repeated_chunks(payload, chunk.payload_offset):
                 if inner.thing != "HEAD" or not held.head:
                     self._handlers[inner.thing](inner.chunk, inner.payload)
         elif self.found.damage:
             with suppress(FormatError):  # what is no REPT says nothing
-                for inner in chunks_in(payload, chunk.payload_offset):
+                for inner in repeated_chunks(payload, chunk.payload_offset):
                     if inner.thing in ("SKEL", "MODL"):
                         kind = inner.chunk.type
                         key = kind, chunk_id(kind, inner.payload)

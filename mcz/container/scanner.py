@@ -19,14 +19,13 @@ from mcz.container.directory import (
     parse_clip,
     parse_head,
 )
-from mcz.container.events import ChunkEvent, Event, Fault, FootEvent, PacketEvent
-from mcz.container.grammar import NAMED, OTHER
+from mcz.container.grammar import NAMED, OTHER, ChunkEvent, Event, Fault, FootEvent, PacketEvent
 from mcz.container.index_reader import IndexCheck
 from mcz.container.limits import check, index_limit
 from mcz.container.packets import SEGMENT
 from mcz.container.parser import ALL, PASS, Parser
 from mcz.container.segments import GROUP_NOTES, parse_header
-from mcz.container.small_profile import check_plain
+from mcz.container.strict import check_plain
 from mcz.errors import FormatError, LimitError
 from mcz.model.schema import parse
 

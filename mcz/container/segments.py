@@ -1,6 +1,7 @@
-"""The payload of DATA: one segment, its stream table first.
+"""The payload of DATA: one segment, its stream table first, and its masks and group notes.
 
-SPEC.md, "DATA", is normative. Tables are bulk data, so they are read and written by hand.
+SPEC.md, "DATA", "Masks" and "Group notes", are normative. Tables are bulk data, so they are read
+and written by hand.
 """
 
 from __future__ import annotations
@@ -8,10 +9,25 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as slot
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz.errors import ChecksumError, FormatError, TruncatedError
-from mcz.model.schema import EXTENDED, MAX_COUNT, read_varint, varint
+from mcz.model.numbers import GRID, Grid
+from mcz.model.schema import (
+    EXTENDED,
+    MAX_COUNT,
+    SIZED,
+    UVARINT,
+    Record,
+    counted,
+    field,
+    read_varint,
+    varint,
+)
 
 FRESH, FRAME_NOTES, GROUP_NOTES, MASKS = 1, 2, 4, 8
 KNOWN_FLAGS = 15 | EXTENDED
@@ -59,7 +75,7 @@ class StreamTable:
     offsets: tuple[int, ...]
     lengths: tuple[int, ...]
     extension: bytes = b""
-    _codec_start: int = field(init=False, repr=False, compare=False)  # asked for each stream
+    _codec_start: int = slot(init=False, repr=False, compare=False)  # asked for each stream
 
     def __post_init__(self) -> None:
         n_coded = self.counts.n_groups * self.counts.n_resolutions
@@ -111,10 +127,7 @@ def build_segment(header: SegmentHeader, streams: Sequence[bytes], extension: by
             present[index // 8] |= 1 << index % 8
     table = b"".join(
         (
-            *map(
-                varint,
-                (header.signal, header.first, header.n_frames, header.lead, header.tail),
-            ),
+            *map(varint, (header.signal, header.first, header.n_frames, header.lead, header.tail)),
             bytes((header.flags,)),
             bytes(present),
             *(varint(len(stream)) for stream in streams if stream),
@@ -210,3 +223,57 @@ def frame_table(
     if header.flags & MASKS:
         return StreamTable(header, counts, 0, (0, 0), (mask_size, size))
     return StreamTable(header, counts, 0, (0,), (size,))
+
+
+Mask = NDArray[np.bool_]
+
+
+def build_mask(mask: Mask) -> bytes:
+    """The runs of a mask of shape (n_rows, n_channels), column after column."""
+    flat = np.concatenate([[True], mask.T.reshape(-1)])
+    edges = [0, *np.flatnonzero(np.diff(flat)).tolist(), mask.size]
+    runs = [b - a for a, b in zip(edges, edges[1:], strict=False)]
+    return b"".join(map(varint, runs))
+
+
+def parse_mask(data: bytes, n_rows: int, n_channels: int, name: str) -> Mask:
+    """The mask of shape (n_rows, n_channels); raises FormatError."""
+    size = n_rows * n_channels
+    flat = np.ones(size, np.bool_)
+    at = start = 0
+    valid = True
+    while at < len(data):
+        run, after = read_varint(data, at)
+        if run > size - start or (run == 0 and at > 0):  # MASK-02
+            raise FormatError(f"a mask run of {run} at {start} of {size}", clip=name)
+        flat[start : start + run] = valid
+        start, at, valid = start + run, after, not valid
+    if start != size:  # MASK-03
+        raise FormatError(f"a mask of {start} values, not {size}", clip=name)
+    return flat.reshape(n_channels, n_rows).T  # MASK-01
+
+
+class GridChange(Record):
+    """A grid that differs from the clip's, in GROUP_NOTES."""
+
+    channel: int = field(UVARINT, "channel, counted within the group")
+    grid: Grid = field(GRID, "its grid in this segment")
+
+
+class OddToken(Record):
+    """A token that its grid does not print, in GROUP_NOTES."""
+
+    row: int = field(UVARINT, "rows after the exception before, or after the segment's first row")
+    channel: int = field(UVARINT, "channel, counted within the group")
+    text: bytes = field(SIZED, "the token")
+
+
+class GroupNotes(Record):
+    """The notes stream of a group in a segment."""
+
+    grid_changes: list[GridChange] = field(
+        counted(GridChange), "grids that differ from the clip's", default=[]
+    )
+    exceptions: list[OddToken] = field(
+        counted(OddToken), "tokens that the grid does not print, sorted", default=[]
+    )

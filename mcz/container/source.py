@@ -11,13 +11,7 @@ from threading import Lock
 from typing import Any, BinaryIO
 
 from mcz.container.locks import is_locked
-from mcz.errors import (
-    AccessError,
-    MczError,
-    OptionError,
-    TruncatedError,
-    reason_of,
-)
+from mcz.errors import AccessError, MczError, OptionError, TruncatedError, reason_of
 from mcz.model.extras import import_extra
 from mcz.model.types import Target
 

@@ -1,7 +1,7 @@
-"""Checks of a strict pass within chunks, beside their grammar.
+"""Checks within chunks: of a strict pass, and of files of the profile small.
 
 What only decoding shows is checked where clips are decoded. SPEC.md, "Strict reading", "QUAL",
-"META" and "COPY", are normative.
+"META", "COPY" and "Limits and profiles", are normative.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from pathlib import PurePosixPath
 from mcz.container import payloads
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.copies import check_copies, parse_copies
+from mcz.container.dictionary_deflate import is_packed
 from mcz.container.directory import Directory, Found
 from mcz.container.limits import Profile
 from mcz.container.metadata import parse_meta
 from mcz.container.skeletons import parse_skeleton
-from mcz.errors import FormatError
-from mcz.model.schema import parse
+from mcz.errors import FormatError, LimitError
+from mcz.model.numbers import GridKind
+from mcz.model.schema import Record, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 # The source formats of the registry, by what they are sources of.
@@ -119,3 +121,35 @@ def check_ancillary(
         copies = parse_copies(payload, chunk, file_bytes)
         if payload_of is not None:
             check_copies(copies, chunk, found.chunks, payload_of)
+
+
+CODECS = {0, 1}  # raw and fast
+ENCODED: dict[bytes, type[Record]] = {
+    ChunkType.SRCE: payloads.Srce,
+    ChunkType.ATTA: payloads.Atta,
+    ChunkType.META: payloads.Meta,
+}
+ABSENT = {ChunkType.INDX, ChunkType.COPY, ChunkType.MODL}
+
+
+def check_plain(kind: bytes, payload: bytes, where: str) -> None:
+    """Raise LimitError for a chunk that a file of the profile small cannot have."""
+    record = ENCODED.get(kind)
+    if record is not None:
+        packed = vars(parse(record, payload, where))["flags"] & payloads.ENCODING != payloads.STORED
+    else:
+        packed = kind == ChunkType.SKEL and is_packed(payload, where)
+    if packed:  # LIMIT-22
+        raise LimitError("the profile small packs nothing", where=where)
+    if kind in ABSENT:  # LIMIT-23
+        raise LimitError("the profile small has no such chunk", where=where)
+    if kind == ChunkType.CLIP:
+        _check_clip(parse(payloads.Clip, payload, where), where)
+
+
+def _check_clip(fields: payloads.Clip, where: str) -> None:
+    for signal in fields.signals:
+        if signal.codec not in CODECS:  # LIMIT-20
+            raise LimitError(f"codec {signal.codec}: small has raw and fast", where=where)
+        if any(run.grid.kind == GridKind.PRINTED for run in signal.grids):  # LIMIT-21
+            raise LimitError("grid PRINTED: the profile small does not have it", where=where)

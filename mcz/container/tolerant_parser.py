@@ -10,8 +10,7 @@ import zlib
 from itertools import chain
 
 from mcz.container.chunks import END_MAGIC, FOOT, REPEATED, Chunk, ChunkType, Foot
-from mcz.container.events import ChunkEvent, Event, Fault, FootEvent
-from mcz.container.grammar import CLIP, FILE, PACKETS
+from mcz.container.grammar import CLIP, FILE, PACKETS, ChunkEvent, Event, Fault, FootEvent
 from mcz.container.limits import BASE, MIB, check
 from mcz.container.packets import FRAME
 from mcz.container.parser import ALL, Parser, Short
@@ -61,32 +60,31 @@ class TolerantParser(Parser):
         self._searched = at
         self._short.clear()
 
-    def _signature(self) -> Event | None:
-        event = super()._signature()
+    def _read_signature(self) -> Event | None:
+        event = super()._read_signature()
         if isinstance(event, Fault) and event.offset == 0:
             self.search(0)
         return event
 
-    def _thing(self) -> Event | None:
+    def _read_next(self) -> Event | None:
         if self.state != PACKETS or self._parts is not None:
-            return super()._thing()
+            return super()._read_next()
         at = self.at
-        pos = self._position(at, at + 1)
-        if self._data[pos : pos + 1].isalpha():
-            return self._header(at)
+        if self._bytes(at, at + 1).isalpha():
+            return self._read_chunk(at)
         try:
-            event = self._packet()
+            event = self._read_packet()
         except Short:
             is_long = self._start + len(self._data) - at > PATIENCE * self._most
             if self._is_lost or not is_long:
                 raise
             self.search(at)
             self._suspect = at
-            return self._found()
+            return self._search_next()
         self._most = max(self._most, self.at - at)
         return event
 
-    def _found(self) -> Event | None:
+    def _search_next(self) -> Event | None:
         """The next thing that is whole; a packet that was short is tried when it came."""
         while True:
             end = self._start + len(self._data)
@@ -96,7 +94,7 @@ class TolerantParser(Parser):
                 [at for at, stop in self._short.items() if stop <= end],
                 (self._start + match.start() for match in ahead),
             ):
-                event = self._tried_at(at)
+                event = self._try_at(at)
                 if event is not None:
                     return event
                 if self.state != PACKETS and pattern is _ANY_PACKET:  # a packet of another DATA
@@ -106,18 +104,18 @@ class TolerantParser(Parser):
                 if self.size is not None and end >= self.size:
                     self._is_lost, self.at = False, self.size
                     self.state = CLIP if self.state == PACKETS else self.state
-                    return super()._thing()
+                    return super()._read_next()
                 self._searched = max(self._searched, end - _NAME_SIZE + 1)  # a name may have begun
                 self.at = min((self._searched, *self._short))
                 raise Short(max(end + 1, min(self._short.values(), default=0)))
 
-    def _tried_at(self, at: int) -> Event | None:
+    def _try_at(self, at: int) -> Event | None:
         """The thing that is whole at ``at``, or the end of a search that was given up."""
         state, chunk = self.state, self._chunk
         self.at, self._tried = at, 0
         self._short.pop(at, None)
         try:
-            event = self._thing()
+            event = self._read_next()
         except Short as short:
             if self._data[at - self._start : at - self._start + 1].isalpha():
                 self._searched = at
@@ -142,23 +140,22 @@ class TolerantParser(Parser):
     def _pass(self, chunk: Chunk) -> None:
         """Look for what is whole in a chunk that is not, too."""
 
-    def _payload(self, chunk: Chunk, wanted: int) -> Event:
+    def _read_payload(self, chunk: Chunk, wanted: int) -> Event:
         most = self.profile.chunk_bytes
         if wanted == ALL:
             most = min(most, max(self.profile.model_bytes, BASE.model_bytes))
         elif self._is_lost:
             most = SMALL
         check(f"chunk {chunk.label}: bytes", chunk.length or 0, most)
-        return super()._payload(chunk, wanted)
+        return super()._read_payload(chunk, wanted)
 
-    def _placed(self, event: ChunkEvent) -> Event:
+    def _place(self, event: ChunkEvent) -> Event:
         self.state = CLIP if self.state == PACKETS else self.state
-        return super()._placed(event)
+        return super()._place(event)
 
-    def _foot(self, at: int) -> Event:
+    def _read_foot(self, at: int) -> Event:
         """A FOOT, without the place of its index: that means nothing to who joined."""
-        pos = self._position(at, at + FOOT.size)
-        data = self._data[pos : pos + FOOT.size]
+        data = self._bytes(at, at + FOOT.size)
         crc = int.from_bytes(data[4:8], "little")
         if data[24:] != END_MAGIC or crc != zlib.crc32(data[:4] + data[8:]):
             raise FormatError("neither a chunk nor a FOOT")

@@ -24,26 +24,13 @@ from mcz.container.chunks import (
 )
 from mcz.container.copies import Copy, build_copies, runs, worth_it
 from mcz.container.dictionary_deflate import chunk_id, plain_id, smallest
-from mcz.container.directory import (
-    AttachmentRow,
-    ClipRow,
-    Directory,
-    SegmentRow,
-)
+from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
 from mcz.container.metadata import Record, build_metas
-from mcz.container.packets import (
-    CHECK_SIZE,
-    END,
-    FRAME,
-    SEGMENT,
-    Packet,
-    build_packet,
-    implied_by,
-)
+from mcz.container.packets import CHECK_SIZE, END, FRAME, SEGMENT, Packet, build_packet, implied_by
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
-from mcz.container.small_profile import check_plain
+from mcz.container.strict import check_plain
 from mcz.errors import FormatError, MotionError
 from mcz.model.motion import Skeleton
 from mcz.model.schema import build
@@ -222,11 +209,7 @@ class Writer:
         self._packet(clip, header, packet, told if masks else None)
 
     def _packet(
-        self,
-        clip: ClipRow,
-        header: SegmentHeader,
-        packet: Packet,
-        told: SegmentRow | None = None,
+        self, clip: ClipRow, header: SegmentHeader, packet: Packet, told: SegmentRow | None = None
     ) -> SegmentRow:
         size = len(packet.body)
         check("packet: bytes", size, self.profile.packet_bytes)

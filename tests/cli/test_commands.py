@@ -17,7 +17,7 @@ import mcz
 from mcz.cli.common import run
 from mcz.cli.info import command as info_command
 from mcz.cli.main import COMMANDS
-from mcz.container.versions import FORMAT_NAME as VERSION
+from mcz.container.limits import FORMAT_NAME as VERSION
 from tests.commands import Call, fails
 
 CLIP_KEYS = {

@@ -11,10 +11,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.container.recovery.code import LANE, encoded, runs_of
-from mcz.container.recovery.galois_field import Ints
-from mcz.container.recovery.layout import Shape
-from mcz.container.recovery.packets import Key, build_packet, short_hash
+from mcz.container.recovery.code import LANE, Ints, encoded, runs_of
+from mcz.container.recovery.layout import Key, Shape, build_packet, short_hash
 from mcz.errors import AccessError, reason_of
 
 READ = Callable[[int], bytes]  # a data block, its padding with it
@@ -95,14 +93,13 @@ def computed(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int,
     width = max(1, min(lanes, AT_ONCE // (runs_of(shape.n_recovery) * LANE)))
     for start in range(0, lanes, width):
         stop = min(start + width, lanes)
-        rows = _rows(shape, read, start, stop, step)
+        rows = _lane_reader(shape, read, start, stop, step)
         yield start, encoded(rows, shape.n_blocks, shape.n_recovery, stop - start)
 
 
-def _rows(
+def _lane_reader(
     shape: Shape, read: READ, start: int, stop: int, step: Step | None
 ) -> Callable[[int, int], Ints]:
-    """Return a reader of lanes of data blocks."""
 
     def rows(first: int, last: int) -> Ints:
         found = np.empty((last - first, stop - start), np.int64)

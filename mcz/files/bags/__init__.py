@@ -1,6 +1,6 @@
 """Bags: folders of files with the checksums of each, as RFC 8493 (BagIt) has them."""
 
-from mcz.files.bags.validation import BagCheck, check_bag, is_bag
+from mcz.files.bags.manifests import BagCheck, check_bag, is_bag
 from mcz.files.bags.writer import bag
 
 __all__ = ["BagCheck", "bag", "check_bag", "is_bag"]

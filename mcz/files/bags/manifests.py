@@ -1,4 +1,4 @@
-"""The text of bags: manifests, ``bagit.txt`` and ``bag-info.txt``, both ways.
+"""Manifests of bags, ``bagit.txt`` and ``bag-info.txt``: parsed, built, and checked against files.
 
 RFC 8493, section 2, is normative.
 """
@@ -6,11 +6,13 @@ RFC 8493, section 2, is normative.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from mcz.errors import OptionError
+from mcz.errors import AccessError, OptionError, reason_of
 
 PAYLOAD = "data"
 DECLARATION = "bagit.txt"
@@ -92,3 +94,168 @@ def _escaped(path: str) -> str:
 
 def _unescaped(path: str) -> str:
     return re.sub(r"%(0[AaDd]|25)", lambda found: chr(int(found[1], 16)), path)
+
+
+VERSIONS = ("0.93", "0.94", "0.95", "0.96", "0.97", "1.0")
+KNOWN = ("md5", "sha1", "sha224", "sha256", "sha384", "sha512")
+_MANIFEST = re.compile(r"(tag)?manifest-([a-z0-9]+)\.txt")
+
+
+@dataclass(slots=True)
+class BagCheck:
+    """Result of a validation: ``problems``, of which a valid bag has none.
+
+    ``files``: the paths of the payload, of ``n_bytes``. ``info``: the lines of bag-info.txt.
+    ``algorithms``: those of the payload's manifests.
+    """
+
+    folder: Path
+    version: str = ""
+    info: list[tuple[str, str]] = field(default_factory=list)
+    algorithms: list[str] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)
+    n_bytes: int = 0
+    problems: list[str] = field(default_factory=list)
+
+
+def is_bag(folder: str | os.PathLike[str]) -> bool:
+    """Return True if ``folder`` declares itself a bag."""
+    return (Path(folder) / DECLARATION).is_file()
+
+
+def check_bag(
+    folder: str | os.PathLike[str], progress: Callable[[int, int, str], object] | None = None
+) -> BagCheck:
+    """Compare each file of a bag with each manifest; what is missing, too many or changed.
+
+    Raises OptionError where the folder is no bag, AccessError where a file cannot be read.
+    """
+    found = BagCheck(Path(folder))
+    if not is_bag(folder):
+        raise OptionError(f"it is no bag: it has no {DECLARATION}", path=folder)
+    try:
+        _BagValidator(found, progress).run()
+    except OSError as error:
+        raise AccessError(reason_of(error), path=error.filename or folder) from None
+    return found
+
+
+class _BagValidator:
+    def __init__(self, found: BagCheck, progress: Callable[[int, int, str], object] | None) -> None:
+        self.found, self.progress = found, progress
+        self.encoding = "utf-8"
+
+    def run(self) -> None:
+        found = self.found
+        self._read_declaration()
+        found.files = sorted(self._list_files(PAYLOAD))
+        payload, tags = self._read_manifests()
+        found.algorithms = sorted(payload)
+        if not payload:
+            self._fault("no manifest-ALGORITHM.txt of an algorithm that is known")
+        self._check_listing(payload)
+        self._compare(payload, tags)
+        self._check_oxum()
+        if (found.folder / "fetch.txt").is_file():
+            self._fault("fetch.txt: the bag has files elsewhere; fetch them first")
+
+    def _fault(self, text: str) -> None:
+        self.found.problems.append(text)
+
+    def _text(self, name: str) -> str:
+        data = (self.found.folder / name).read_bytes()
+        try:
+            return data.decode("utf-8-sig" if self.encoding == "utf-8" else self.encoding)
+        except UnicodeDecodeError as error:
+            self._fault(f"{name}: no {self.encoding} at byte {error.start}")
+            return data.decode("utf-8", "replace")
+
+    def _tags(self, name: str) -> list[tuple[str, str]]:
+        try:
+            return read_tags(self._text(name))
+        except OptionError as error:
+            self._fault(f"{name}: {error}")
+            return []
+
+    def _read_declaration(self) -> None:
+        tags = dict(self._tags(DECLARATION))
+        self.found.version = tags.get("BagIt-Version", "")
+        if self.found.version not in VERSIONS:
+            self._fault(f"{DECLARATION}: BagIt-Version {self.found.version!r} is not known")
+        said = tags.get("Tag-File-Character-Encoding", "")
+        try:
+            "".encode(said or "none")
+            self.encoding = said.lower()
+        except LookupError:
+            self._fault(f"{DECLARATION}: Tag-File-Character-Encoding {said!r} is not known")
+        if (self.found.folder / INFO).is_file():
+            self.found.info = self._tags(INFO)
+
+    def _list_files(self, name: str) -> Iterable[str]:
+        """The paths of all files below a folder of the bag."""
+        root = self.found.folder
+        if not (root / name).is_dir():
+            self._fault(f"no folder {name}")
+        for folder, _, names in os.walk(root / name):
+            for file in names:
+                yield (Path(folder) / file).relative_to(root).as_posix()
+
+    def _read_manifests(self) -> tuple[dict[str, dict[str, str]], dict[str, dict[str, str]]]:
+        """The digests that the manifests state, by algorithm and path: of payload and of tags."""
+        payload: dict[str, dict[str, str]] = {}
+        tags: dict[str, dict[str, str]] = {}
+        for name in sorted(path.name for path in self.found.folder.iterdir()):
+            matched = _MANIFEST.fullmatch(name)
+            if matched is None:
+                continue
+            if matched[2] not in KNOWN or matched[2] not in hashlib.algorithms_available:
+                self._fault(f"{name}: the algorithm {matched[2]} is not known")
+                continue
+            (tags if matched[1] else payload)[matched[2]] = self._read_rows(name, not matched[1])
+        return payload, tags
+
+    def _read_rows(self, name: str, of_payload: bool) -> dict[str, str]:
+        rows: dict[str, str] = {}
+        try:
+            for path, digest in read_manifest(self._text(name)):
+                path = path.removeprefix("./")
+                if not is_inside(path) or path.startswith(f"{PAYLOAD}/") != of_payload:
+                    self._fault(f"{name}: {path!r} does not belong there")
+                elif rows.setdefault(path, digest) != digest:
+                    self._fault(f"{name}: {path} is listed twice, with two digests")
+        except OptionError as error:
+            self._fault(f"{name}: {error}")
+        return rows
+
+    def _check_listing(self, payload: dict[str, dict[str, str]]) -> None:
+        """Every file must be in every manifest, before version 1.0 in one of them."""
+        everywhere = self.found.version == "1.0"
+        for path in self.found.files:
+            absent = [name for name, rows in payload.items() if path not in rows]
+            if absent and (everywhere or len(absent) == len(payload)):
+                self._fault(f"{path} is not in manifest-{absent[0]}.txt")
+
+    def _compare(self, payload: dict[str, dict[str, str]], tags: dict[str, dict[str, str]]) -> None:
+        stated: dict[str, dict[str, str]] = {}
+        for manifests in (payload, tags):
+            for algorithm, rows in manifests.items():
+                for path, digest in rows.items():
+                    stated.setdefault(path, {})[algorithm] = digest
+        for done, (path, digest_of) in enumerate(stated.items()):
+            if self.progress is not None:
+                self.progress(done, len(stated), path)
+            file = self.found.folder / path
+            if not file.is_file():
+                self._fault(f"{path} is missing")
+                continue
+            for algorithm, digest in digests(file, digest_of).items():
+                if digest != digest_of[algorithm]:
+                    self._fault(f"{path}: its {algorithm} is {digest}, not {digest_of[algorithm]}")
+
+    def _check_oxum(self) -> None:
+        found = self.found
+        found.n_bytes = sum((found.folder / path).stat().st_size for path in found.files)
+        counted = f"{found.n_bytes}.{len(found.files)}"
+        for name, value in found.info:
+            if name.lower() == "payload-oxum" and value != counted:
+                self._fault(f"{INFO}: Payload-Oxum is {value}, there is {counted}")

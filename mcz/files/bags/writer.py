@@ -10,13 +10,7 @@ from contextlib import suppress
 from datetime import date
 from pathlib import Path
 
-from mcz.errors import (
-    AccessError,
-    ExistsError,
-    FormatError,
-    OptionError,
-    reason_of,
-)
+from mcz.errors import AccessError, ExistsError, FormatError, OptionError, reason_of
 from mcz.files.bags.manifests import (
     ALGORITHMS,
     DECLARATION,
@@ -53,7 +47,7 @@ def bag(
     lines = _info_lines(dict(info or {}), software)
     if os.path.lexists(target):
         raise ExistsError("it exists; a bag is a new folder", path=target)
-    _check(paths)
+    _check_files(paths)
     try:
         temporary = Path(
             tempfile.mkdtemp(prefix=f".{target.name[:48]}.", suffix=".part", dir=target.parent)
@@ -87,7 +81,7 @@ def _info_lines(info: dict[str, str], software: str) -> list[tuple[str, str]]:
     return lines
 
 
-def _check(paths: Sequence[Path]) -> None:
+def _check_files(paths: Sequence[Path]) -> None:
     """Raise for what cannot be in one bag, or is damaged."""
     if not paths:
         raise OptionError("a bag of no files")
@@ -120,7 +114,7 @@ def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> 
         shutil.copyfile(path, copy)
         _sync(copy)
         size += copy.stat().st_size
-        if _note(found, f"{PAYLOAD}/{path.name}", copy) != digests(path):
+        if _add_digests(found, f"{PAYLOAD}/{path.name}", copy) != digests(path):
             raise AccessError("it changed while it was copied", path=path)
     tags = {
         DECLARATION: "BagIt-Version: 1.0\nTag-File-Character-Encoding: UTF-8\n",
@@ -130,13 +124,12 @@ def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> 
     stated: dict[str, dict[str, str]] = {name: {} for name in ALGORITHMS}
     for name, text in tags.items():
         _write(folder / name, text)
-        _note(stated, name, folder / name)
+        _add_digests(stated, name, folder / name)
     for name, rows in stated.items():
         _write(folder / f"tagmanifest-{name}.txt", manifest_text(rows))
 
 
-def _note(found: dict[str, dict[str, str]], name: str, path: Path) -> dict[str, str]:
-    """Add the digests of a file to each manifest; return them."""
+def _add_digests(found: dict[str, dict[str, str]], name: str, path: Path) -> dict[str, str]:
     digest_of = digests(path)
     for algorithm, digest in digest_of.items():
         found[algorithm][name] = digest

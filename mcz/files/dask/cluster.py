@@ -67,7 +67,7 @@ class Task:
     """One call, in work on the cluster from now on."""
 
     def __init__(self, client: Client, key: str, packed: bytes, item: object) -> None:
-        self._client, self._key, self._call = client, key, (done, packed, item)
+        self._client, self._key, self._call = client, key, (run_task, packed, item)
         self.future = self._submitted(0)
 
     def _submitted(self, again: int) -> Future:
@@ -107,9 +107,9 @@ def _answer(task: Task | None) -> Answer[Any] | None:
     return None if task is None else task.answer
 
 
-def done(packed: bytes, item: object) -> tuple[bool, object]:
-    """On a worker: whether the call went well, and its result or its MczError."""
-    function, state = _unpacked(packed)
+def run_task(packed: bytes, item: object) -> tuple[bool, object]:
+    """Call on a worker: True and the result, or False and the MczError."""
+    function, state = _unpack(packed)
     try:
         with limited(1):  # the cluster knows how many tasks a machine takes
             return True, function(state, item)
@@ -118,13 +118,13 @@ def done(packed: bytes, item: object) -> tuple[bool, object]:
 
 
 @lru_cache(maxsize=4)
-def _unpacked(packed: bytes) -> Any:
+def _unpack(packed: bytes) -> Any:
     """Function and state, an open file among it: kept for the next task."""
     return pickle.loads(packed)
 
 
 @contextmanager
-def connected(client: Client | str | None) -> Iterator[Client]:
+def connect(client: Client | str | None) -> Iterator[Client]:
     """The client itself, or one of the scheduler at an address ("tcp://host:8786").
 
     None: the client that the process has. Raises OptionError where there is none, or no Dask.

@@ -75,12 +75,11 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
         end = container.directory.end  # the writer moves it
         with tempfile.SpooledTemporaryFile(IN_MEMORY, dir=str(path.parent)) as added:
             yield Growth(container, cast(BinaryIO, added), tail)
-            _check_place(stream, path)
-            _write(stream, end, cast(BinaryIO, added))
+            _check_not_replaced(stream, path)
+            _write_at(stream, end, cast(BinaryIO, added))
 
 
-def _check_place(stream: BinaryIO, path: Path) -> None:
-    """Refuse to write to a file that was replaced by another one in the meantime."""
+def _check_not_replaced(stream: BinaryIO, path: Path) -> None:
     try:
         same = os.path.samestat(os.fstat(stream.fileno()), path.stat())
     except OSError:
@@ -89,8 +88,8 @@ def _check_place(stream: BinaryIO, path: Path) -> None:
         raise AccessError("it was replaced by another file while its addition was coded", path=path)
 
 
-def _write(stream: BinaryIO, end: int, added: BinaryIO) -> None:
-    """Put what was ``added`` at ``end``; where that fails the file ends there, whole as it was."""
+def _write_at(stream: BinaryIO, end: int, added: BinaryIO) -> None:
+    """Write what was ``added`` at ``end``; where that fails the file ends there, as it was."""
     try:
         stream.seek(end)
         added.seek(0)
@@ -107,7 +106,7 @@ def _write(stream: BinaryIO, end: int, added: BinaryIO) -> None:
 
 
 def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tuple[Container, Tail]:
-    """The file as far as it will stay, and what else it has."""
+    """The file as far as it will stay, and the rest of it."""
 
     def up_to(end: int, salvage: bool = False) -> Container:
         return Container(ByteSource(stream, name=str(path), size=end), salvage=salvage)
@@ -127,7 +126,7 @@ def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tup
     end = _whole_until(ByteSource(stream), foot or 0)
     longer = up_to(end, salvage=True) if end > (foot or len(SIGNATURE)) else None
     shorter = up_to(foot) if foot else None
-    names = _names(longer) - _names(shorter)
+    names = _restorable_names(longer) - _restorable_names(shorter)
     if not names or not (salvage or force):
         if shorter is None:
             raise reason
@@ -145,8 +144,7 @@ def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tup
     return shorter, Tail(tuple(sorted(names)))
 
 
-def _names(container: Container | None) -> set[str]:
-    """Names that can be restored."""
+def _restorable_names(container: Container | None) -> set[str]:
     if container is None:
         return set()
     rows = container.directory

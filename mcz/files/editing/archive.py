@@ -12,14 +12,12 @@ from pathlib import Path
 
 from mcz.container import payloads
 from mcz.container.limits import profile_named
-from mcz.container.metadata import Record
-from mcz.container.metadata_keys import SAID
+from mcz.container.metadata import SAID, Record
 from mcz.errors import MczError, OptionError, SourceError, remark_of
 from mcz.files.editing.appending import growing
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import UNPROTECTED
 from mcz.files.editing.coded_parts import Far, ahead
-from mcz.files.editing.file_times import stamp
 from mcz.files.editing.folders import (
     files_below,
     left_out,
@@ -27,6 +25,7 @@ from mcz.files.editing.folders import (
     not_kept,
     size_of,
     sources_named,
+    stamp,
 )
 from mcz.files.editing.merging import add_files
 from mcz.files.editing.metadata_edit import set_metadata
@@ -106,7 +105,7 @@ def pack(
         report = _write_entries(transaction, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
         if mtimes:
-            _note_times(transaction, entries)
+            _write_times(transaction, entries)
         transaction.finish()
     report.size = transaction.writer.offset
     report.left_out += not_kept(root, paths, with_times=mtimes)
@@ -115,8 +114,7 @@ def pack(
     return report
 
 
-def _note_times(transaction: WriteTransaction, entries: Sequence[SourceEncoder]) -> None:
-    """Say of each clip that was written when its file was last changed."""
+def _write_times(transaction: WriteTransaction, entries: Sequence[SourceEncoder]) -> None:
     records = []
     for entry in entries:
         if entry.name in transaction.clips:
@@ -127,7 +125,6 @@ def _note_times(transaction: WriteTransaction, entries: Sequence[SourceEncoder])
 
 
 def _inputs_of(entries: Sequence[SourceEncoder]) -> Iterator[Path]:
-    """The files that entries were made of, their skeletons among them."""
     return chain.from_iterable(entry.inputs for entry in entries)
 
 
@@ -311,7 +308,7 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
     old: list[str] = []
     if named:
         with open(target) as file:
-            old, said = _old(file, named)
+            old, said = _find_superseded(file, named)
     if not old:
         yield target
         return
@@ -330,7 +327,7 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
         os.replace(copy, target)
 
 
-def _old(file: File, named: Named) -> tuple[list[str], Said]:
+def _find_superseded(file: File, named: Named) -> tuple[list[str], Said]:
     """The things that came from the paths of the files, and their metadata by path."""
     paths, _ = stored_files(file.container)
     clips = {clip.source.path: clip for clip in file.clips.values() if clip.source is not None}

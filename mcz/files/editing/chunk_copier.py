@@ -90,7 +90,7 @@ class ChunkCopier:
         row = self.container.directory.attachments[name]
         parts = [self.container.payload(part) for part in row.parts]
         if as_name not in (None, name):
-            parts = [_renamed(part, as_name) for part in parts]
+            parts = [_rename_part(part, as_name) for part in parts]
         self.writer.attachment_parts(as_name or name, row.size, parts)
 
     def before_clips(self) -> None:
@@ -131,7 +131,7 @@ class ChunkCopier:
             self.shared(ChunkType.SRCE, head.source.template)
         self.skeleton(row.skeleton)
         if change != SAME:
-            payload = _changed(payload, row.clip.label, change)
+            payload = _apply_change(payload, row.clip.label, change)
         rate = change.rate
         new = PackedClipRow(
             change.name or name,
@@ -143,7 +143,7 @@ class ChunkCopier:
             row.clip,
         )
         self.writer.begin_carried(new, payload)
-        self._body(row, new)
+        self._copy_body(row, new)
         self.writer.end_carried()
         self.behind(row)
 
@@ -173,7 +173,7 @@ class ChunkCopier:
         if at != row.cend.offset:
             raise FormatError(f"{row.cend.label} is not where the index says", clip=row.name)
 
-    def _body(self, row: ClipRow, new: PackedClipRow) -> None:
+    def _copy_body(self, row: ClipRow, new: PackedClipRow) -> None:
         """Copy the chunks from behind CLIP up to CEND; ``new`` records their places."""
         packed = segment_rows(row)
         moved: list[tuple[int, int]] = []  # from where on how many bytes less lie before
@@ -191,7 +191,7 @@ class ChunkCopier:
         new.cend = self.writer.chunk(ChunkType.CEND, self.container.payload(row.cend))
         if moved:
             shift = new.clip.stop - row.clip.stop
-            new.segments = [_moved(segment, shift, moved) for segment in row.segments]
+            new.segments = [_move_segment(segment, shift, moved) for segment in row.segments]
         else:
             new.keep_packed(lambda: packed, parse_segments)
 
@@ -203,18 +203,17 @@ def metadata_records(container: Container, names: Iterable[tuple[str, str]]) -> 
     return [as_one(new, records) for new, records in said if records]
 
 
-def _moved(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:
+def _move_segment(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:
     less = max((size for start, size in moved if segment.offset >= start), default=0)
-    told = segment.told and _moved(segment.told, shift, moved)
+    told = segment.told and _move_segment(segment.told, shift, moved)
     return replace(segment, offset=segment.offset + shift - less, told=told)
 
 
-def _renamed(part: bytes, name: str) -> bytes:
+def _rename_part(part: bytes, name: str) -> bytes:
     return build(replace(parse(payloads.Atta, part, "ATTA"), name=name), "ATTA")
 
 
-def _changed(payload: bytes, where: str, change: Change) -> bytes:
-    """The CLIP ``payload`` with what ``change`` says."""
+def _apply_change(payload: bytes, where: str, change: Change) -> bytes:
     record = parse(payloads.Clip, payload, where)
     if change.name is not None:
         record.name = change.name

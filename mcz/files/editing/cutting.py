@@ -116,7 +116,7 @@ def plan_cut(
             f"it has {motion.counts.n_resolutions}",
             clip=clip.name,
         )
-    kept = None if joints is None else _kept_joints(clip, joints)
+    kept = None if joints is None else _find_joints(clip, joints)
     cut = ClipCut(clip, start, stop, kept, resolution, ())
     groups = [tuple(range(info.counts.n_groups)) for info in clip.signals]
     if kept is not None:
@@ -131,7 +131,7 @@ def plan_cut(
     return replace(cut, signals=tuple(signals))
 
 
-def _kept_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
+def _find_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
     """The joints as indices, None where no joint with channels is left out."""
     skeleton = clip.skeleton
     if not clip.signals[0].has_poses:
@@ -177,14 +177,14 @@ def _plan_signal(cut: ClipCut, info: SignalInfo, groups: tuple[int, ...]) -> Sig
     if cut.is_whole:
         return SignalCut(info, info.rows, groups, 0, info.skip, info.spare)
     start, stop = cut.start + info.skip, cut.stop + info.skip
-    rows = _kept_rows(info, start, stop)
+    rows = _needed_rows(info, start, stop)
     if not rows:
         return SignalCut(info, (), groups, dropped, 0, 0)
     skip, spare = start - rows[0].header.first, rows[-1].header.stop - stop
     return SignalCut(info, rows, groups, dropped, skip, spare)
 
 
-def _kept_rows(info: SignalInfo, start: int, stop: int) -> tuple[SegmentRow, ...]:
+def _needed_rows(info: SignalInfo, start: int, stop: int) -> tuple[SegmentRow, ...]:
     """The segments that bear upon the stored frames start <= f < stop, and those they need."""
     hits = [
         index
@@ -357,7 +357,7 @@ def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
     All are as they are stored: a cut leaves each joint its index. Where these say of a former cut
     what cannot be, it is taken for none. docs/guides/parts.md, "Keys of cuts", has their meaning.
     """
-    now = _keys(cut, old)
+    now = _cut_entries(cut, old)
     for key, value in old.items():
         if key.startswith(("param.", "uncut_")) or key in ("codec", "edit-joints"):
             now[key] = value
@@ -374,8 +374,7 @@ def recoded_quality(
     return before | {"cut-recoded": "yes"} | now
 
 
-def _keys(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
-    """The entries of a quality record about a cut; ``old`` has those of earlier ones."""
+def _cut_entries(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
     now = {key: value for key, value in old.items() if key.startswith("cut-")}
     if cut.resolution:
         before = _first_number(old.get("cut-resolution", ""), 1)

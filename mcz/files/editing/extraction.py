@@ -280,15 +280,15 @@ class Copier(ChunkCopier):
             cend = self.container.whole_cend(self.container.directory.clips[cut.clip.name])
             source, hashes = cend.source_sha256 or b"", list(cend.value_sha256)
         else:
-            source, hashes = self._decoded(cut, new)
+            source, hashes = self._hash_decoded(cut, new)
             if new.source is None:
-                self._without_units(cut, new)
+                self._drop_units(cut, new)
         if new.source is not None:
             self.shared(ChunkType.SRCE, new.source.template)
         return source, hashes
 
-    def _without_units(self, cut: ClipCut, new: payloads.Clip) -> None:
-        """Words whose meaning only the source told are words, and not in the unit of that."""
+    def _drop_units(self, cut: ClipCut, new: payloads.Clip) -> None:
+        """Drop the units of words whose meaning only the source told."""
         for info, signal in zip(cut.clip.signals, new.signals, strict=True):
             if cut.clip.is_scaled(info.index):
                 signal.channels = [replace(own, unit="") for own in signal.channels or ()]
@@ -296,7 +296,7 @@ class Copier(ChunkCopier):
                 words = f"the words of its signal {info.name}"
                 self._leave_out(cut, f"what {words} mean, as its source file was cut")
 
-    def _decoded(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
+    def _hash_decoded(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
         """The hashes of what is left, decoded once, and the source file that it has now."""
         held = new.source
         if held and cut.joints is not None:

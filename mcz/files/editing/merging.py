@@ -138,7 +138,7 @@ class Merging:
         with ExitStack() as stack:
             files = [stack.enter_context(open(source)) for source in sources]
             double: list[str] = []
-            found = [(file, self._plan(file, double)) for file in files]
+            found = [(file, self._plan_file(file, double)) for file in files]
             if double:
                 raise OptionError(
                     f"{listed(double)}: {counted(len(double), 'name')} in more than one file; "
@@ -146,8 +146,8 @@ class Merging:
                 )
             yield found
 
-    def _plan(self, file: File, double: list[str]) -> Plan:
-        """The parts of ``file`` that go into the new file; ``double`` learns those that cannot."""
+    def _plan_file(self, file: File, double: list[str]) -> Plan:
+        """Plan the parts of ``file`` that are carried over; ``double`` learns refused ones."""
         plan = whole(file)
         for thing in list(plan.things):
             kind, name = thing
@@ -161,7 +161,7 @@ class Merging:
             elif there is None and path_of(file, thing) not in self.paths:
                 result = "copied"
             elif self.rename:
-                new, result = self._free(file, thing), "renamed"
+                new, result = self._free_name(file, thing), "renamed"
                 path = path_of(file, thing) if kind == CLIP else ""
                 plan.things[thing] = Change(new, new.removesuffix(name) + path if path else None)
             else:
@@ -174,8 +174,7 @@ class Merging:
                 self.paths.add(path)
         return plan
 
-    def _free(self, file: File, thing: Thing) -> str:
-        """A name below that of the file, that nothing has."""
+    def _free_name(self, file: File, thing: Thing) -> str:
         kind, name = thing
         stem = PurePosixPath(file.name.replace("\\", "/")).stem or "file"
         folders = (stem if n == 1 else f"{stem}~{n}" for n in count(1))
@@ -199,11 +198,11 @@ def _content(file: File, thing: Thing) -> Callable[[], object]:
     """A finder of the content of a thing, the same in two that can stand for each other."""
     kind, name = thing
     if kind == ALIAS:
-        return _of_alias(file, name)
-    return partial(_of_clip if kind == CLIP else _of_attachment, file, name)
+        return _alias_content(file, name)
+    return partial(_clip_content if kind == CLIP else _attachment_content, file, name)
 
 
-def _of_clip(file: File, name: str) -> object:
+def _clip_content(file: File, name: str) -> object:
     clip = file.clips[name]
     hashes = clip.container.whole_cend(clip.container.directory.clips[name])
     digests = [hashes.source_sha256, *hashes.value_sha256]
@@ -211,18 +210,18 @@ def _of_clip(file: File, name: str) -> object:
     return clip.skeleton_id, clip.frame_rate, path, dict(clip.metadata), digests
 
 
-def _of_attachment(file: File, name: str) -> tuple[int, bytes]:
+def _attachment_content(file: File, name: str) -> tuple[int, bytes]:
     part = file.container.directory.attachments[name].parts[0]
     fields = parse(payloads.Atta, file.container.payload(part), part.label)
     return fields.size, bytes(fields.sha256)
 
 
-def _of_alias(file: File, alias: str) -> Callable[[], object]:
+def _alias_content(file: File, alias: str) -> Callable[[], object]:
     """The content of what an alias stands for; of a skeleton's file its id."""
     kind, name = file.alias_of(alias)
     if kind == CLIP and name in file.clips.rows:
         source = file.clips[name].source
         return lambda: None if source is None else source.sha256
     if kind == ATTACHMENT and name in file.attachments:
-        return lambda: _of_attachment(file, name)[1]
+        return lambda: _attachment_content(file, name)[1]
     return lambda: (kind, name)

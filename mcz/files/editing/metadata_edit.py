@@ -1,27 +1,38 @@
-"""Edits of metadata and frame rates, without re-encoding."""
+"""Edits of metadata and frame rates without re-encoding, and tables of metadata: a row a clip."""
 
 from __future__ import annotations
 
+import csv
+import io
 import os
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from mcz.container.metadata import Record, applied
-from mcz.container.metadata_keys import SPELLINGS, check_said
+from mcz.container.metadata import (
+    INTERPRETED,
+    KEYS,
+    PRIVATE,
+    SPELLINGS,
+    Record,
+    applied,
+    check_said,
+)
 from mcz.container.writer import Writer
-from mcz.errors import ChecksumError, OptionError
+from mcz.errors import ChecksumError, OptionError, reason_of
 from mcz.files.editing.appending import growing
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import Change
 from mcz.files.editing.protecting import redundancy_of, still_protect
 from mcz.files.editing.rewriting import CLIP, rewriting, steps, whole
 from mcz.files.reading.clip import Clip
+from mcz.files.reading.clips import listed, names_of
+from mcz.files.reading.fidelity import states_rate
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open
-from mcz.files.reading.rate_notes import states_rate
 from mcz.model.motion import frame_rate_of
-from mcz.model.text_format import shown
+from mcz.model.text_format import among, cell_text, shown
 from mcz.model.types import Progress, Target
 from mcz.sources import FORMATS
 
@@ -45,14 +56,14 @@ def set_metadata(
     Raises OptionError for a name, a key or a value that cannot be, and AccessError while another
     process is appending; ``force`` is that of ``mcz.append``.
     """
-    changes = {name: _respelled(said) for name, said in changes.items()}
+    changes = {name: _respell(said) for name, said in changes.items()}
     for said in changes.values():
         for key, value in said.items():
             check_said(key, value)
     report = Report()
     with growing(Path(target), salvage=False, force=force) as growth:
         file = File(growth.container)
-        records = [_record(file, name, said) for name, said in changes.items()]
+        records = [_changes_record(file, name, said) for name, said in changes.items()]
         records = [record for record in records if record.entries or record.removed]
         for record in records:
             text = ", ".join([*record.entries, *(f"no {key}" for key in record.removed)])
@@ -91,7 +102,7 @@ def registered_key(key: str) -> str:
     return SPELLINGS.get(key, key)
 
 
-def _respelled(said: Said) -> Said:
+def _respell(said: Said) -> Said:
     """``said`` under registered keys; raises OptionError where two of them are one."""
     found = {registered_key(key): value for key, value in said.items()}
     if len(found) < len(said):
@@ -100,8 +111,7 @@ def _respelled(said: Said) -> Said:
     return found
 
 
-def _record(file: File, name: str, said: Said) -> Record:
-    """Record of the changes; empty if nothing changes."""
+def _changes_record(file: File, name: str, said: Said) -> Record:
     clip = file.only_clip(name) if name else None
     before = file.metadata if clip is None else clip.metadata
     entries = {k: v for k, v in said.items() if v is not None and before.get(k) != v}
@@ -168,3 +178,151 @@ def _check_sources(target: Target, names: Iterable[str]) -> None:
             clip = file.clips[name]
             if clip.source is not None and len(clip.source_bytes()) != clip.source.size:
                 raise ChecksumError("its source is not restored", clip=name)
+
+
+NAMES = ("clip", "name", "path", "file")  # columns that name the clip, the first that there is
+DELIMITERS = ",;\t"
+FIELD = re.compile(r"\{([^{}:!.\[\]]+)(:[^{}]*)?\}")  # a column, and how wide it is
+
+
+def from_table(
+    path: str | os.PathLike[str],
+    file: File,
+    *,
+    match: str | None = None,
+    take: Sequence[str] | None = None,
+    skip_unknown: bool = False,
+) -> tuple[dict[str, dict[str, str]], list[str]]:
+    """Read the metadata of the clips of ``file`` from a table (CSV or TSV, UTF-8, with a head).
+
+    A row names its clip in a column ``clip``, ``name``, ``path`` or ``file``, or by ``match``, a
+    text with columns in braces: "{subject:0>2}_{trial:0>2}". That is a name as ``File.only_clip``
+    takes it. ``take``: the columns to take, by default all but the one with the name; each must be
+    a key of the registry or begin with ``x-``, or stand behind one: "description=What they do".
+    Empty cells say nothing. Also returns the names of rows without a clip, where ``skip_unknown``;
+    otherwise those are an OptionError, as are a clip that two rows name and a column that is no
+    key.
+    """
+    rows = _read_rows(Path(path))
+    head = list(rows[0]) if rows else []
+    name_of = _namer(path, head, match)
+    columns = _chosen_columns(path, head, match, take)
+    known = names_of(file.clips)
+    said: dict[str, dict[str, str]] = {}
+    unknown: list[str] = []
+    for number, row in enumerate(rows, 2):
+        name = name_of(row)
+        found = known.get(name, ())
+        if len(found) > 1:
+            raise OptionError(
+                f"row {number}: {name!r} may be {listed(sorted(found))}; write one of "
+                "these, or make it of more columns with match, such as {folder}/{trial}",
+                path=path,
+            )
+        if not found:
+            unknown.append(name)
+            continue
+        clip = next(iter(found))
+        if clip in said:
+            raise OptionError(f"two rows are about clip {clip!r}", path=path)
+        cells = {key: row[column].strip() for key, column in columns.items()}
+        said[clip] = {key: text for key, text in cells.items() if text}
+    if unknown and not skip_unknown:
+        raise OptionError(
+            f"no clip for {len(unknown)} of {len(rows)} rows: {listed(unknown)}", path=path
+        )
+    return said, unknown
+
+
+def _read_rows(path: Path) -> list[dict[str, str]]:
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise OptionError(f"not UTF-8: {error}", path=path) from None
+    except OSError as error:
+        raise OptionError(reason_of(error), path=path) from None
+    first = text.partition("\n")[0]
+    delimiter = max(DELIMITERS, key=first.count)
+    reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    try:
+        rows = list(reader)
+    except csv.Error as error:
+        raise OptionError(str(error), path=path, line=reader.line_num) from None
+    head = reader.fieldnames or []
+    if len(set(head)) != len(head):
+        raise OptionError("two columns have the same name", path=path)
+    for number, row in enumerate(rows, 2):
+        if None in row or None in row.values():
+            raise OptionError(
+                f"row {number} has not the {len(head)} columns of the head", path=path
+            )
+    return [{cell_text(key): cell_text(value) for key, value in row.items()} for row in rows]
+
+
+def _match_columns(match: str) -> list[str]:
+    text = match.replace("{{", "").replace("}}", "")
+    if set("{}") & set(FIELD.sub("", text)):
+        raise OptionError(f"match {match!r}: columns stand in braces, such as {{subject:0>2}}")
+    return [name for name, _ in FIELD.findall(text)]
+
+
+def _namer(
+    path: str | os.PathLike[str], head: Sequence[str], match: str | None
+) -> Callable[[Mapping[str, str]], str]:
+    if match is not None:
+        form = match
+        for name in _match_columns(form):
+            if name not in head:
+                raise OptionError(f"no column {name!r}; there are {among(head, name)}", path=path)
+
+        def formatted(row: Mapping[str, str]) -> str:
+            try:
+                return form.format_map({key: cell.strip() for key, cell in row.items()})
+            except ValueError as error:
+                raise OptionError(f"match {form!r}: {error}") from None
+
+        return formatted
+    column = next((name for name in NAMES if name in head), None)
+    if column is None:
+        raise OptionError(
+            f"no column {', '.join(NAMES)} names the clips; say how by match, such as "
+            "{subject}_{trial}",
+            path=path,
+        )
+    return lambda row: row[column].strip()
+
+
+def _chosen_columns(
+    path: str | os.PathLike[str], head: Sequence[str], match: str | None, take: Sequence[str] | None
+) -> dict[str, str]:
+    """The columns that are taken, by the key that each is."""
+    if take is not None:
+        return dict(_parse_take(path, head, text) for text in take)
+    own = next((name for name in NAMES if name in head), None) if match is None else None
+    used = _match_columns(match or "")
+    columns = [name for name in head if name != own]
+    odd = [name for name in columns if not _is_key(name) and name not in used]
+    if odd:
+        raise OptionError(
+            f"{among(odd, None)}: no key of the metadata; name the columns to take, such "
+            f"as description={odd[0]}",
+            path=path,
+        )
+    return {name: name for name in columns if _is_key(name)}
+
+
+def _parse_take(path: str | os.PathLike[str], head: Sequence[str], text: str) -> tuple[str, str]:
+    """Key and column of ``key=column``, or of a column that is called as the key."""
+    key, equals, column = text.partition("=")
+    if text in head:
+        key, column = text, text
+    elif not equals:
+        column = text
+    if column not in head:
+        raise OptionError(f"no column {column!r}; there are {', '.join(head)}", path=path)
+    return key, column
+
+
+def _is_key(name: str) -> bool:
+    is_said = SPELLINGS.get(name, name) in KEYS and name not in INTERPRETED
+    return is_said or name.startswith(PRIVATE)

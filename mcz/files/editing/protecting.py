@@ -19,8 +19,7 @@ from mcz.container.directory import Directory
 from mcz.container.index import build_index
 from mcz.container.reader import Container
 from mcz.container.recovery.encoder import Step, encode_packets
-from mcz.container.recovery.layout import Shape, shape_for
-from mcz.container.recovery.packets import Key, read_packet
+from mcz.container.recovery.layout import Key, Shape, read_packet, shape_for
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, OptionError
 from mcz.files.editing.appending import IN_MEMORY, growing
@@ -112,7 +111,7 @@ def write_recovery(
 ) -> Shape:
     """Write RECV, INDX and FOOT behind the end of a file, for its bytes from ``start`` on."""
     directory, end = container.directory, container.directory.end
-    shape, tail = _settled(directory, start, end, redundancy)
+    shape, tail = _settle(directory, start, end, redundancy)
 
     def read(offset: int, size: int) -> bytes:
         behind = offset - shape.stop + len(tail)
@@ -136,8 +135,7 @@ def chunk_bytes(shape: Shape, packets: Iterator[bytes]) -> Iterator[bytes]:
     yield CRC.pack(crc)
 
 
-def _settled(directory: Directory, start: int, end: int, redundancy: float) -> tuple[Shape, bytes]:
-    """The shape, and the INDX and FOOT that name a chunk of its size."""
+def _settle(directory: Directory, start: int, end: int, redundancy: float) -> tuple[Shape, bytes]:
     last = directory.clips.last
     t_size = FOOT.size
     for _ in range(TRIES):

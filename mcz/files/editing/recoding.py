@@ -60,15 +60,15 @@ def recode_joint(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool)
     Raises OptionError for what cannot be edited, MotionError for values that do not suit.
     """
     info = clip.signals[0]
-    groups = _groups_of(clip, info, joint)
+    groups = _own_groups(clip, info, joint)
     edited = edit(clip, joint, values, on_grid)
     columns, motion = list(clip.skeleton.columns(edited.joint)), edited.motion
     signal = motion.signals[0]
-    source = _source_of(clip, info, signal)
+    source = _codec_source(clip, info, signal)
     reader = SignalReader(clip.container, info, tuple(range(len(info.layout.groups))), 0, clip.name)
     coded = groups if info.codec.subset is None else reader.groups
-    streams = _streams(clip, info, source, coded, reader)
-    decoded = _decoded(info, signal, source, streams, groups, reader)
+    streams = _recode_streams(clip, info, source, coded, reader)
+    decoded = _decode_recoded(info, signal, source, streams, groups, reader)
     n_segments = range(len(info.rows))
     n_resolutions = range(info.counts.n_resolutions)
     with np.errstate(invalid="ignore"):  # infinities
@@ -100,18 +100,18 @@ class Edited:
 
 def edit(clip: Clip, joint: int | str, values: ArrayLike, on_grid: bool) -> Edited:
     """A clip with other values for one joint; raises as ``recode_joint`` does."""
-    index = _editable(clip, joint)
+    index = _check_editable(clip, joint)
     columns = list(clip.skeleton.columns(index))
     before = clip.motion()
     for info, signal in zip(clip.signals, before.signals, strict=True):
         clip.check_hash(info, signal.stored, signal.mask)
-    given = _checked(clip, columns, values)
-    signal = _edited(clip, before, columns, given, on_grid)
+    given = _check_values(clip, columns, values)
+    signal = _edit_signal(clip, before, columns, given, on_grid)
     return Edited(index, replace(before, signals=(signal, *before.signals[1:])), given)
 
 
-def _editable(clip: Clip, joint: int | str) -> int:
-    """The joint's index, of a clip that may be edited."""
+def _check_editable(clip: Clip, joint: int | str) -> int:
+    """The index of a joint that may be edited."""
     if clip.container.salvage:
         raise OptionError("a file that is salvaged cannot be edited", clip=clip.name)
     if not clip.signals[0].has_poses:
@@ -125,12 +125,12 @@ def _editable(clip: Clip, joint: int | str) -> int:
 
 def is_coded_with_others(clip: Clip, joint: int | str) -> bool:
     """Return True if a group has channels of this joint and of another."""
-    return groups_of(clip, (_editable(clip, joint),))[1] is not None
+    return groups_of(clip, (_check_editable(clip, joint),))[1] is not None
 
 
-def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...]:
+def _own_groups(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...]:
     """The joint's groups, which hold no channel of another joint."""
-    groups, mixed = groups_of(clip, (_editable(clip, joint),))
+    groups, mixed = groups_of(clip, (_check_editable(clip, joint),))
     if mixed is not None:
         text = f"replaced alone, codec {info.codec.name} codes its channels"
         raise coded_together(clip, *mixed, text)
@@ -139,8 +139,7 @@ def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...
     return groups
 
 
-def _checked(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDArray[np.float64]:
-    """The values that were given as an array (rows, channels)."""
+def _check_values(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDArray[np.float64]:
     try:
         given = np.asarray(values, np.float64)
     except (TypeError, ValueError):
@@ -153,12 +152,8 @@ def _checked(clip: Clip, columns: Sequence[int], values: ArrayLike) -> NDArray[n
     return given
 
 
-def _edited(
-    clip: Clip,
-    before: Motion,
-    columns: Sequence[int],
-    given: NDArray[np.float64],
-    on_grid: bool,
+def _edit_signal(
+    clip: Clip, before: Motion, columns: Sequence[int], given: NDArray[np.float64], on_grid: bool
 ) -> Signal:
     """The motion signal with the new values; NaN is invalid, what lies beneath stays."""
     old = before.signals[0]
@@ -186,10 +181,10 @@ def _edited(
     signal = replace(old, values=new, mask=None if mask.all() else mask)
     if clip.signals[0].codec.domain == "values" or new.dtype == np.int64:
         return signal
-    return _placed(clip, old, signal, on_grid)
+    return _place_on_grids(clip, old, signal, on_grid)
 
 
-def _placed(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
+def _place_on_grids(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
     """The signal, its new values on their grids where that is wanted or must be."""
     ordinals, exact = signal.to_ordinals()
     changed = signal.values.view(np.int64) != old.values.view(np.int64)
@@ -219,7 +214,7 @@ def _placed(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
     return replace(signal, values=values)
 
 
-def _source_of(clip: Clip, info: SignalInfo, signal: Signal) -> MemorySource:
+def _codec_source(clip: Clip, info: SignalInfo, signal: Signal) -> MemorySource:
     """Source for the codec: all stored frames, of which ``signal`` has those shown."""
     if info.skip or info.spare:
         signal = _with_hidden(clip, info, signal)
@@ -259,14 +254,13 @@ def _with_hidden(clip: Clip, info: SignalInfo, shown: Signal) -> Signal:
     )
 
 
-def _streams(
+def _recode_streams(
     clip: Clip,
     info: SignalInfo,
     source: MemorySource,
     groups: tuple[int, ...],
     reader: SignalReader,
 ) -> Streams:
-    """The streams of ``groups`` in all segments."""
     assert info.codec.recode is not None
     spans, options = info.spans, recorded_options(info.codec, clip.quality or {})
     coded = info.codec.recode(
@@ -294,7 +288,7 @@ def recorded_options(codec: Codec, quality: Mapping[str, str]) -> Settings:
     return options
 
 
-def _decoded(
+def _decode_recoded(
     info: SignalInfo,
     signal: Signal,
     source: MemorySource,
@@ -302,7 +296,6 @@ def _decoded(
     groups: tuple[int, ...],
     reader: SignalReader,
 ) -> Signal:
-    """The motion signal as a reader of the new streams has it."""
 
     def fetch(segment: int, resolution: int, group: int) -> bytes:
         coded = streams.get((segment, group))

@@ -16,8 +16,15 @@ import numpy as np
 
 from mcz.container.recovery.code import LANE, encoded, recovered
 from mcz.container.recovery.encoder import Step, computed, encode_packets
-from mcz.container.recovery.layout import HASH, Shape
-from mcz.container.recovery.packets import BODY_AT, Key, Packet, find_packets, short_hash
+from mcz.container.recovery.layout import (
+    BODY_AT,
+    HASH,
+    Key,
+    Packet,
+    Shape,
+    find_packets,
+    short_hash,
+)
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError
 from mcz.files.editing.protecting import chunk_bytes
@@ -64,7 +71,7 @@ class Recovery:
 
 
 @dataclass(slots=True)
-class _Set:
+class _RecoverySet:
     """One RECV as far as it was found, and where its blocks are."""
 
     key: Key
@@ -82,27 +89,27 @@ class _Set:
         return min(map(abs, self.shifts), default=0)
 
 
-def recovery_sets(source: ByteSource) -> dict[int, list[_Set]]:
+def recovery_sets(source: ByteSource) -> dict[int, list[_RecoverySet]]:
     """The recovery data left in a file, by the offset of the range that they protect.
 
     A file may hold some of other files, whole ones that were attached or put behind it: those
     whose packets lie where they belong come first, and few of the others count.
     """
-    found: dict[Key, _Set] = {}
+    found: dict[Key, _RecoverySet] = {}
     places: dict[Key, dict[tuple[int, int], int]] = {}
     for key, packet in find_packets(source):
         if key.shape.stop > 2 * source.size + SLACK:
             continue  # more than half of the file is gone, or it never was its own
-        one = found.setdefault(key, _Set(key))
+        one = found.setdefault(key, _RecoverySet(key))
         place = places.setdefault(key, {(k, i): at for k, i, at in key.shape.packets()})
-        _keep(one, packet, place.get((packet.kind, packet.index)))
-    starts: dict[int, list[_Set]] = {}
+        _keep_packet(one, packet, place.get((packet.kind, packet.index)))
+    starts: dict[int, list[_RecoverySet]] = {}
     for one in sorted(found.values(), key=lambda one: (one.distance, -len(one.blocks))):
         starts.setdefault(one.shape.start, []).append(one)
     return {start: sets[:MOST_SETS] for start, sets in starts.items()}
 
 
-def _keep(one: _Set, packet: Packet, place: int | None) -> None:
+def _keep_packet(one: _RecoverySet, packet: Packet, place: int | None) -> None:
     if place is None:
         return
     if packet.kind:
@@ -118,7 +125,7 @@ def _keep(one: _Set, packet: Packet, place: int | None) -> None:
 class Examined:
     """One RECV, and of each data block that is there by how much its pieces are shifted."""
 
-    set: _Set
+    set: _RecoverySet
     there: dict[int, tuple[int, ...]]
 
     @property
@@ -136,10 +143,10 @@ class Examined:
         return self.there[max(self.there)][-1] if self.there else 0
 
 
-def _examined(source: ByteSource, one: _Set) -> Examined:
+def _examine_set(source: ByteSource, one: _RecoverySet) -> Examined:
     """Find the data blocks; those that are not there are bad."""
     shape = one.shape
-    table = _table(one)
+    table = _read_table(one)
     there: dict[int, tuple[int, ...]] = {}
     shifts = [0, *one.shifts]
     hint = 0
@@ -171,7 +178,7 @@ def _read(
     return b"".join(parts)
 
 
-def _table(one: _Set) -> bytes | None:
+def _read_table(one: _RecoverySet) -> bytes | None:
     """The hashes of the blocks; None where too few sections are left."""
     shape = one.shape
     n, size = shape.n_sections, shape.section_size
@@ -197,15 +204,15 @@ class Restorer:
     def __init__(self, source: ByteSource, out: BinaryIO, step: Step | None) -> None:
         self.source, self.out, self.step = source, out, step
 
-    def restore(self, one: _Set, there: dict[int, tuple[int, ...]]) -> None:
+    def restore(self, one: _RecoverySet, there: dict[int, tuple[int, ...]]) -> None:
         """Write what one RECV protects, and itself; raises FormatError where it is not that."""
         shape = one.shape
         for block, shifts in there.items():
             data = _read(self.source, shape.pieces(block), shifts)
             assert data is not None
             self._write(shape, block, data)
-        self._solve(one, there)
-        self._recv(one)
+        self._write_lost(one, there)
+        self._write_recv(one)
 
     def _write(self, shape: Shape, block: int, data: bytes, first: int = 0) -> None:
         """Write what a block has from its byte ``first`` on; the padding is no part of the file."""
@@ -217,7 +224,7 @@ class Restorer:
                 self.out.write(data[begin - first : end - first])
             at += size
 
-    def _solve(self, one: _Set, there: dict[int, tuple[int, ...]]) -> None:
+    def _write_lost(self, one: _RecoverySet, there: dict[int, tuple[int, ...]]) -> None:
         """Write the bad blocks, of large ones some columns at a time."""
         shape = one.shape
         lost = [block for block in range(shape.n_blocks) if block not in there]
@@ -236,7 +243,7 @@ class Restorer:
             for at, block in enumerate(lost):
                 self._write(shape, block, found[at].tobytes(), LANE * start)
 
-    def _recv(self, one: _Set) -> None:
+    def _write_recv(self, one: _RecoverySet) -> None:
         """The RECV chunk, made anew of what was written around it; raises NotThatError."""
         shape = one.shape
 
@@ -253,7 +260,7 @@ class Restorer:
             self.out.write(data)
             at += len(data)
 
-    def rest(self, last: _Set, size: int) -> None:
+    def rest(self, last: _RecoverySet, size: int) -> None:
         """Copy the bytes behind all protected ones."""
         stop = self.source.size
         self.out.seek(last.shape.stop)
@@ -266,7 +273,7 @@ def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
     """Examine a file by its recovery data: bad blocks, and their places."""
     starts, chain, at = recovery_sets(source), list[Examined](), 0
     while at in starts:
-        tried = map(partial(_examined, source), starts[at])
+        tried = map(partial(_examine_set, source), starts[at])
         fallback = next(tried)
         every = chain_from((fallback,), tried)
         chain.append(next((one for one in every if one.is_possible), fallback))
@@ -281,12 +288,11 @@ def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
         bad = (block for block in range(shape.n_blocks) if block not in one.there)
         found.bad_bytes += [(at, at + size) for block in bad for at, size in shape.pieces(block)]
     if chain:
-        found.behind = _behind(source, chain[-1])
+        found.behind = _bytes_behind(source, chain[-1])
     return found, chain
 
 
-def _behind(source: ByteSource, last: Examined) -> int:
-    """Bytes behind what one RECV protects."""
+def _bytes_behind(source: ByteSource, last: Examined) -> int:
     return max(0, source.size - last.set.shape.stop - last.shift)
 
 
@@ -325,7 +331,7 @@ def recover(
         out.seek(0)
         out.truncate()
         return (found if sets else None), 0
-    restorer.rest(done.set, _behind(source, done))
+    restorer.rest(done.set, _bytes_behind(source, done))
     out.flush()
     return found, done.set.shape.stop
 

@@ -69,7 +69,7 @@ def delete_clips(
     """
     with rewriting(target, output, force=force) as job:
         file = job.file
-        named = [_named(file, name) for name in ([names] if isinstance(names, str) else names)]
+        named = [_find_thing(file, name) for name in ([names] if isinstance(names, str) else names)]
         if where is not None:
             named += [(CLIP, clip.name) for clip in file.find(where)]
         if not named:
@@ -84,7 +84,7 @@ def delete_clips(
                 path=file.name,
             )
         gone |= dict.fromkeys(others)
-        plan = _without(file, gone)
+        plan = _plan_without(file, gone)
         what = {thing: thing[0] for kind in KINDS for thing in gone if thing[0] == kind}
         for thing in things_in(file):
             if thing not in plan.things:  # with the clips that had the skeleton
@@ -93,8 +93,7 @@ def delete_clips(
         return _finish(job, plan, report, progress)
 
 
-def _named(file: File, name: str) -> Thing:
-    """The clip, attachment or alias of this name."""
+def _find_thing(file: File, name: str) -> Thing:
     tables: tuple[Container[str], ...] = (file.clips.rows, file.attachments, file.aliases)
     for kind, table in zip(KINDS, tables, strict=True):
         if name in table:
@@ -109,7 +108,7 @@ def _named(file: File, name: str) -> Thing:
     raise OptionError(f"nothing is called {name!r}{said}", path=file.name)
 
 
-def _without(file: File, gone: Collection[Thing]) -> Plan:
+def _plan_without(file: File, gone: Collection[Thing]) -> Plan:
     """Plan a file without ``gone`` and without anything that only these need."""
     plan = whole(file)
     plan.things = {thing: SAME for thing in plan.things if thing not in gone}
@@ -153,15 +152,15 @@ def rename_clips(
         file, report = job.file, Report()
         plan = whole(file)
         for old, new in names.items():
-            thing = _named(file, old)
+            thing = _find_thing(file, old)
             check_name(new)
-            plan.things[thing] = _renamed(file, thing, new)
+            plan.things[thing] = _rename_change(file, thing, new)
             report.outcomes.append(Outcome(thing[1], "renamed", 0, new))
         _refuse_equal(file, plan)
         return _finish(job, plan, report, progress)
 
 
-def _renamed(file: File, thing: Thing, new: str) -> Change:
+def _rename_change(file: File, thing: Thing, new: str) -> Change:
     """The change that names a thing ``new``: the path of a clip's source may follow."""
     path = path_of(file, thing) if thing[0] == CLIP else ""
     suffix = PurePosixPath(path).suffix
@@ -250,22 +249,21 @@ def split(
     """
     folder, report = Path(directory), Report()
     with open(target) as file:
-        groups = _groups(file, by, rest)
+        groups = _group_clips(file, by, rest)
         portable = PortableNames()
         outputs = {v: folder / portable(f"{v.replace('/', '_')}.mcz") for v in groups}
         _check_outputs(outputs.values(), force)
         folder.mkdir(parents=True, exist_ok=True)
         step = steps(progress, len(file.clips))
         for value, names in groups.items():
-            plan, part = _part(file, names, with_rest=value == rest), Report()
+            plan, part = _plan_part(file, names, with_rest=value == rest), Report()
             Rewriting(target, outputs[value], force, file).write(plan, part, step)
             said = counted(len(names), "clip")
             report.outcomes.append(Outcome(str(outputs[value]), "written", part.size or 0, said))
     return report
 
 
-def _groups(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
-    """The names of the clips for each file."""
+def _group_clips(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
     get = _folder if by == FOLDER else getter_of(by, file.clips.values())
     groups: dict[str, list[str]] = {}
     without = []
@@ -302,7 +300,7 @@ def _check_outputs(outputs: Iterable[Path], force: bool) -> None:
             raise ExistsError("it exists", path=path, hint=Hint.FORCE)
 
 
-def _part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
+def _plan_part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:
     """Plan the file of these clips; ``with_rest``: with all that is no clip's."""
     needed = used_by(file, names)
     if with_rest:

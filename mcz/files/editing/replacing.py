@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mcz.container import note_records, payloads
+from mcz.container import payloads
 from mcz.container.directory import SegmentRow
-from mcz.container.segments import GROUP_NOTES, MASKS, SegmentHeader
+from mcz.container.segments import GROUP_NOTES, MASKS, GroupNotes, SegmentHeader
 from mcz.container.value_hash import value_hash
 from mcz.files.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment, plan_cut
 from mcz.files.editing.extraction import Copier, Copying
@@ -127,7 +127,7 @@ class _Sizes:
         """Count group notes or a mask, as ``flag`` says."""
         self.size += len(stream)
         if flag == GROUP_NOTES and stream:
-            notes = parse(note_records.GroupNotes, stream, "group notes")
+            notes = parse(GroupNotes, stream, "group notes")
             self.n_exceptions += len(notes.exceptions)
 
 
@@ -239,11 +239,11 @@ class _AnewEditor(_Editor):
             super().write(cut)
             return
         self.before.size = sum(row.size for info in cut.clip.signals for row in info.rows)
-        self.recode(cut.clip, self.edit.motion, settings_of(cut.clip), self._record)
+        self.recode(cut.clip, self.edit.motion, settings_of(cut.clip), self._amend_record)
         segments = self.writer.directory.clips[cut.clip.name].segments
         self.after.size = sum(row.size for row in segments)
 
-    def _record(self, now: dict[str, str], decoded: Sequence[Values]) -> dict[str, str]:
+    def _amend_record(self, now: dict[str, str], decoded: Sequence[Values]) -> dict[str, str]:
         wanted = self.edit.motion.signals[0].masked()
         with np.errstate(invalid="ignore"):  # infinities
             difference = np.abs(decoded[0] - wanted)

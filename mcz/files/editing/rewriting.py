@@ -26,12 +26,7 @@ from mcz.container.recovery import encoder
 from mcz.container.recovery.layout import check_redundancy
 from mcz.container.source import path_of as named_path
 from mcz.container.writer import Writer
-from mcz.errors import (
-    AccessError,
-    FormatError,
-    OptionError,
-    reason_of,
-)
+from mcz.errors import AccessError, FormatError, OptionError, reason_of
 from mcz.files.editing.batch_report import Report
 from mcz.files.editing.chunk_copier import SAME, UNPROTECTED, Change, ChunkCopier, metadata_records
 from mcz.files.editing.protecting import (

@@ -150,13 +150,13 @@ class Folder:
         place = self._root
         for part in parts[:-1]:
             place = place / part
-            found = _found(place)
+            found = _lstat(place)
             if found is None:
                 place.mkdir(exist_ok=True)
             elif not stat.S_ISDIR(found.st_mode) or _is_junction(place):
                 raise AccessError(f"it is {_kind(found)}, where a folder is needed", path=place)
         place = place / parts[-1]
-        found = _found(place)
+        found = _lstat(place)
         if found is None:
             return place
         if not stat.S_ISREG(found.st_mode):
@@ -178,13 +178,12 @@ class Folder:
         place = self.place(path, force=force)
         with replacing(place, force=force, inputs=(source,)) as stream:
             stream.write(data)
-        if (found := _found(place)) is not None:
+        if (found := _lstat(place)) is not None:
             self._written[found.st_dev, found.st_ino] = name or path
         return place
 
 
-def _found(place: Path) -> os.stat_result | None:
-    """Stat a path without following links; None if nothing is there."""
+def _lstat(place: Path) -> os.stat_result | None:
     try:
         return place.lstat()
     except FileNotFoundError:
@@ -194,7 +193,6 @@ def _found(place: Path) -> os.stat_result | None:
 
 
 def _is_junction(place: Path) -> bool:
-    """Return True for a junction of Windows."""
     attributes = getattr(place.lstat(), "st_file_attributes", 0)
     return bool(attributes & getattr(stat, "FILE_ATTRIBUTE_REPARSE_POINT", 0))
 

@@ -135,20 +135,20 @@ class Repairer(Copier):
 
     def quality(self, cut: ClipCut, row: ClipRow) -> None:
         """Figures are of the motion."""
-        if has_motion(cut.clip) and self._degree(cut) == FULL:
+        if has_motion(cut.clip) and self._degree_of(cut) == FULL:
             super().quality(cut, row)
 
-    def _degree(self, cut: ClipCut) -> int:
+    def _degree_of(self, cut: ClipCut) -> int:
         return self.degrees.get(self.name_of(cut), FULL)
 
     def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> None:
         for cut in cuts:
-            if degree := self._degree(cut):
+            if degree := self._degree_of(cut):
                 what = "chunks that belong to it, which break a rule"
                 if degree == NOTHING:
                     what = "all of it, which breaks a rule"
                 self.repair.lost.append(f"clip {self.name_of(cut)!r}: {what}")
-        super().run([cut for cut in cuts if self._degree(cut) < NOTHING], alone=alone)
+        super().run([cut for cut in cuts if self._degree_of(cut) < NOTHING], alone=alone)
 
     def note(self, cut: ClipCut) -> None:
         if isinstance(cut, WholeRun):
@@ -192,10 +192,10 @@ class Repairer(Copier):
                 wanted = self.container.skeleton_fields(wanted).base
         for one in reversed(chain):
             with suppress(FormatError) if one != id_ else nullcontext():
-                self._skeletons[one] = self._after_its_base(one)
+                self._skeletons[one] = self._copy_skeleton(one)
         return self._skeletons[id_]
 
-    def _after_its_base(self, id_: bytes) -> bytes:
+    def _copy_skeleton(self, id_: bytes) -> bytes:
         """Copy a skeleton, whose base is copied; return its id."""
         fields = self.container.skeleton_fields(id_)
         base = self._skeletons.get(fields.base) if fields.base else None
@@ -214,13 +214,12 @@ class Repairer(Copier):
 
     def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
         for name, (of, target) in self.file.aliases.items():
-            if self._restores(of, target):
+            if self._is_restored(of, target):
                 self.writer.alias(name, of, target)
             else:
                 self.repair.lost.append(f"{name!r}, another name of what is lost")
 
-    def _restores(self, of: int, target: bytes) -> bool:
-        """Return whether the file that is written gives what an alias stands for."""
+    def _is_restored(self, of: int, target: bytes) -> bool:
         if of == payloads.OF_SKELETON:
             return (ChunkType.SKEL, target) in self.writer.directory.shared
         here = self.repair.clips if of == payloads.OF_CLIP else self.repair.attachments
@@ -230,7 +229,7 @@ class Repairer(Copier):
         if isinstance(cut.clip, SomeSignals):
             note_source(new, NOTE_OF_SIGNALS)
         try:
-            if self._degree(cut) >= WITHOUT_SOURCE_FILE and new.source:
+            if self._degree_of(cut) >= WITHOUT_SOURCE_FILE and new.source:
                 raise FormatError("what it gives is not what the clip says")
             found = super().finish_record(cut, new)
         except FormatError as error:

@@ -27,7 +27,7 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
     """
     paths: dict[str, Digest] = {}
     contents: Content = {}
-    for name, path, digest in _of_clips(container):
+    for name, path, digest in _clip_sources(container):
         contents.setdefault(digest, (payloads.OF_CLIP, name.encode()))
         if path:
             paths.setdefault(path, digest)
@@ -42,11 +42,11 @@ def stored_files(container: Container) -> tuple[dict[str, Digest], Content]:
     file = File(container)
     for name, alias in aliases.items():
         found = by_target.get((alias[0], bytes(alias[1])))
-        paths.setdefault(name, found or partial(_digest_of, _restoring(file, *alias)))
+        paths.setdefault(name, found or partial(_digest_of, _restorer_of(file, *alias)))
     return paths, contents
 
 
-def _of_clips(container: Container) -> Iterator[tuple[str, str, bytes]]:
+def _clip_sources(container: Container) -> Iterator[tuple[str, str, bytes]]:
     """Name, path and digest of each clip with a source; no row of the directory is made for it."""
     read = Forward(container.source, 0)
     for name, at, size, cend_at, cend_size in container.directory.clips.places():
@@ -54,19 +54,19 @@ def _of_clips(container: Container) -> Iterator[tuple[str, str, bytes]]:
             continue
         clip, cend = read.at_offset(at, size), read.at_offset(cend_at, cend_size)
         with suppress(FormatError, IndexError, UnicodeDecodeError):
-            path, digest = _path_in(_checked(clip)), _digest_in(_checked(cend))
+            path, digest = _parse_path(_check_chunk(clip)), _parse_digest(_check_chunk(cend))
             if path is not None and digest:
                 yield name, path, digest
 
 
-def _checked(chunk: bytes) -> bytes:
+def _check_chunk(chunk: bytes) -> bytes:
     """The payload of a whole chunk; raises FormatError where its crc is wrong."""
     if CRC.pack(zlib.crc32(memoryview(chunk)[: -CRC.size])) != chunk[-CRC.size :]:
         raise FormatError("a damaged chunk")
     return chunk[HEADER.size : -CRC.size]
 
 
-def _path_in(clip: bytes) -> str | None:
+def _parse_path(clip: bytes) -> str | None:
     """The path of the source in the payload of a CLIP, None without one."""
     size, at = read_varint(clip, 2)
     flags, at = clip[at + size], at + size + 17
@@ -86,7 +86,7 @@ def _path_in(clip: bytes) -> str | None:
     return clip[at : at + size].decode()
 
 
-def _digest_in(cend: bytes) -> bytes:
+def _parse_digest(cend: bytes) -> bytes:
     """The hash of the source file in the payload of a CEND, empty without one."""
     _, at = read_varint(cend, 0)
     if cend[at]:  # runs of missing frames
@@ -94,7 +94,7 @@ def _digest_in(cend: bytes) -> bytes:
     return cend[at + 2 : at + 34] if cend[at + 1] else b""
 
 
-def _restoring(file: File, of: int, target: bytes) -> Callable[[], bytes]:
+def _restorer_of(file: File, of: int, target: bytes) -> Callable[[], bytes]:
     if of == payloads.OF_SKELETON:
         return partial(file.skeleton_bytes, target)
     name = target.decode("utf-8", "replace")

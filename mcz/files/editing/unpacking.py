@@ -12,17 +12,16 @@ from pathlib import Path, PurePosixPath
 from mcz.container.strict import check_path
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.files.editing.batch_report import Outcome, Report, failed
-from mcz.files.editing.file_times import set_time
+from mcz.files.editing.folders import set_time
 from mcz.files.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
 from mcz.files.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
 from mcz.files.jobs import limited
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import listed
-from mcz.files.reading.fidelity import RESTORED, fidelity_of
+from mcz.files.reading.fidelity import RESTORED, fidelity_of, text_notes
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open
 from mcz.files.reading.parallel_clips import shared_out
-from mcz.files.reading.rate_notes import text_notes
 from mcz.model.types import Progress, Settings, Target
 
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
@@ -70,7 +69,7 @@ def unpack(
         wanted, whole = file.chosen(clips, where), clips is None and where is None
         stored = list(files_of(file, None if whole else wanted))
         writing = _Writing(target, folder, force, names, [one.path for one in stored])
-        with shared_out(_restored, file, stored) as restoring:
+        with shared_out(_restore, file, stored) as restoring:
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
                 if outcome.result == RESTORED:
@@ -79,7 +78,7 @@ def unpack(
                     if mtimes and not set_time(writing.place, time):
                         timeless.append(one.path)
                     notes = () if clip is None else text_notes(clip)
-                    outcome = replace(outcome, result=_fidelity(file, one), notes=notes)
+                    outcome = replace(outcome, result=_fidelity_of(file, one), notes=notes)
                 if salvage and writing.is_damaged:
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)
@@ -87,12 +86,11 @@ def unpack(
                     progress(done + 1, len(stored), one.path)
         if timeless:
             report.left_out.append(f"times of files that are no clips: {listed(timeless)}")
-        report.outcomes += _without_file(wanted)
+        report.outcomes += _fileless_outcomes(wanted)
     return report
 
 
-def _without_file(clips: Iterable[Clip]) -> Iterator[Outcome]:
-    """The clips that have no source file, or one without a name."""
+def _fileless_outcomes(clips: Iterable[Clip]) -> Iterator[Outcome]:
     for clip in clips:
         with suppress(FormatError):  # it has failed already
             if clip.source is None or not clip.source.path:
@@ -130,18 +128,18 @@ def files_of(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Stored
 def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
     """Path and restoring function of every file that the archive holds under a name."""
     for one in files_of(file):
-        yield one.path, partial(_restored, (file, None), one)
+        yield one.path, partial(_restore, (file, None), one)
 
 
-def _meant(file: File, one: Stored) -> Thing:
+def _resolve(file: File, one: Stored) -> Thing:
     """The thing that a file is, or that the alias which it is stands for."""
     return file.alias_of(one.name) if one.kind == ALIAS else (one.kind, one.name)
 
 
-def _restored(shared: tuple[File, object], one: Stored) -> bytes:
+def _restore(shared: tuple[File, object], one: Stored) -> bytes:
     """The bytes of a file; raises FormatError where they cannot be restored."""
     file, _ = shared
-    kind, name = _meant(file, one)
+    kind, name = _resolve(file, one)
     if kind == SKELETON:
         return file.skeleton_bytes(bytes.fromhex(name))
     if one.kind == ALIAS and name not in (file.clips if kind == CLIP else file.attachments):
@@ -149,9 +147,9 @@ def _restored(shared: tuple[File, object], one: Stored) -> bytes:
     return file.clips[name].source_bytes() if kind == CLIP else file.attachments[name].read()
 
 
-def _fidelity(file: File, one: Stored) -> str:
-    """The word for a file that was written: only of a clip it may be another than "restored"."""
-    kind, name = _meant(file, one)
+def _fidelity_of(file: File, one: Stored) -> str:
+    """The word for a file that was written: other than "restored" only of a clip."""
+    kind, name = _resolve(file, one)
     clip = file.clips.get(name) if kind == CLIP else None
     return RESTORED if clip is None else fidelity_of(clip)
 

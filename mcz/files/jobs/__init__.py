@@ -1,8 +1,7 @@
 """Numbers of processes that work on the files of a command, and when they pay.
 
-``pool.py`` runs them, ``worker.py`` is what each of them does. Parsing is Python, which threads of
-one process share and processes do not: packing takes half the time with two. What comes out does
-not depend on the number.
+``pool.py`` runs them. Parsing is Python, which threads of one process share and processes do not:
+packing takes half the time with two. Results do not depend on the number.
 """
 
 from __future__ import annotations

@@ -3,12 +3,17 @@
 They are interpreters of their own, started without the caller's main module, so that a script
 needs no guard and threads that run are not forked. A process that dies takes nothing along: what
 it had in hand is done once more by another one.
+
+Messages to a process are a length of 8 bytes and a pickle: first the number of threads and the
+pickled state, then for each call a function and an item. The reply is a flag of success, and the
+result or the error.
 """
 
 from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from collections import deque
@@ -21,7 +26,6 @@ from typing import Any, BinaryIO, cast
 
 from mcz.errors import WorkerError
 from mcz.files.jobs import Answer, Item, Result, engine, threads_each
-from mcz.files.jobs.worker import receive, send
 from mcz.hints import Hint
 from mcz.model.types import Settings
 
@@ -122,7 +126,7 @@ class Worker:
     """One process, and its two pipes."""
 
     def __init__(self, first: bytes) -> None:
-        code = "from mcz.files.jobs.worker import main; main()"
+        code = "from mcz.files.jobs.pool import main; main()"
         code = f"import sys; sys.path[:] = {sys.path!r}; {code}"
         self.process = subprocess.Popen(
             [sys.executable, "-c", code],
@@ -186,3 +190,71 @@ def answers(
         return
     with Pool(jobs, state) as pool:
         yield pool.in_order(function, items)
+
+
+LENGTH = 8
+
+
+def send(stream: BinaryIO, message: bytes) -> None:
+    stream.write(len(message).to_bytes(LENGTH, "little"))
+    stream.write(message)
+    stream.flush()
+
+
+def receive(stream: BinaryIO) -> bytes | None:
+    """The next message, None where the other side has gone."""
+    head = stream.read(LENGTH)
+    if len(head) < LENGTH:
+        return None
+    size = int.from_bytes(head, "little")
+    message = stream.read(size)
+    return message if len(message) == size else None
+
+
+def main() -> None:
+    """Answer what comes on standard input; whatever prints prints to standard error."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the pool ends it
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    first = receive(sys.stdin.buffer)
+    if first is None:
+        return
+    from mcz.model.threads import limited
+
+    n_threads, packed = pickle.loads(first)
+    with limited(n_threads):
+        state = State(packed)
+        with suppress(BrokenPipeError):  # it was killed, and needs no answer any more
+            while (message := receive(sys.stdin.buffer)) is not None:
+                send(replies, _reply_to(state, message))
+
+
+class State:
+    """State of all calls, unpickled on the first, whose error it may be."""
+
+    def __init__(self, packed: bytes) -> None:
+        self._packed: bytes | None = packed
+        self._value: object = None
+
+    def __call__(self) -> Any:
+        if self._packed is not None:
+            self._value = pickle.loads(self._packed)
+            self._packed = None
+        return self._value
+
+
+def _reply_to(state: State, message: bytes) -> bytes:
+    try:
+        function, item = pickle.loads(message)
+        return pickle.dumps((True, function(state(), item)), pickle.HIGHEST_PROTOCOL)
+    except Exception as error:  # whatever it is, the caller gets it
+        return _failure(error)
+
+
+def _failure(error: Exception) -> bytes:
+    try:
+        packed = pickle.dumps((False, error))
+        pickle.loads(packed)
+    except Exception:  # one of a library, that cannot be pickled
+        packed = pickle.dumps((False, RuntimeError(f"{type(error).__name__}: {error}")))
+    return packed

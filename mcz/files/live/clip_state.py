@@ -20,10 +20,9 @@ from mcz.codecs.known_answers import check_known_answer
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, Chunk, ChunkType, build_foot
 from mcz.container.directory import ClipRow
-from mcz.container.masks import parse_mask
 from mcz.container.packets import FRAME
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, MASKS, SegmentHeader, frame_table, parse_table
+from mcz.container.segments import FRESH, MASKS, SegmentHeader, frame_table, parse_mask, parse_table
 from mcz.container.source import ByteSource
 from mcz.container.value_hash import ValueDigest
 from mcz.errors import ChecksumError, FormatError, TruncatedError, UnsupportedError

@@ -63,26 +63,25 @@ def stream_encode(
         metadata=metadata,
         repeat=repeat,
     )
-    yield _taken(sink)
+    yield _drain(sink)
     for row in frames:
         if isinstance(row, Mapping):
             writer.change(**{str(name): value for name, value in row.items()})
         else:
-            writer.push(_numbers(row))
-            yield _taken(sink)
+            writer.push(_to_floats(row))
+            yield _drain(sink)
     writer.close()
-    yield _taken(sink)
+    yield _drain(sink)
 
 
-def _numbers(row: ArrayLike) -> NDArray[np.float64]:
+def _to_floats(row: ArrayLike) -> NDArray[np.float64]:
     try:
         return np.asarray(row, np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise MotionError(f"a row that is not one of numbers: {error}") from None
 
 
-def _taken(sink: io.BytesIO) -> bytes:
-    """The bytes in ``sink``, which it has no longer."""
+def _drain(sink: io.BytesIO) -> bytes:
     data = sink.getvalue()
     sink.seek(0)
     sink.truncate()
@@ -145,7 +144,7 @@ def _stream_of(source: object) -> Any:
         return io.BytesIO(source)
     if isinstance(source, str) or not isinstance(source, Iterable):
         raise OptionError(f"cannot read from {source!r}: neither a binary stream nor bytes")
-    return _Fed(source)
+    return _PieceStream(source)
 
 
 class LiveReader:
@@ -164,7 +163,7 @@ class LiveReader:
         else:
             self._source = FramesWithLosses(stream, lost, join, self.summary)
         self._filter_rate = rate
-        self._frames = self._filtered() if post_filter else self._counted()
+        self._frames = self._filter_frames() if post_filter else self._count_frames()
 
     def __iter__(self) -> LiveReader:
         return self
@@ -172,7 +171,7 @@ class LiveReader:
     def __next__(self) -> LiveFrame:
         return next(self._frames)
 
-    def _counted(self) -> Iterator[LiveFrame]:
+    def _count_frames(self) -> Iterator[LiveFrame]:
         source, summary = self._source, self.summary
         try:
             for frame in source.frames():
@@ -185,17 +184,17 @@ class LiveReader:
         finally:
             summary.stream_bytes = source.size
 
-    def _filtered(self) -> Iterator[LiveFrame]:
+    def _filter_frames(self) -> Iterator[LiveFrame]:
         """The frames 12 later, their positions filtered; gaps in their numbers separate them."""
         waiting: deque[LiveFrame] = deque()
         stage: PostFilter | None = None
         clip: LiveClip | None = None
         try:
-            for frame in self._counted():
+            for frame in self._count_frames():
                 follows = waiting and frame.number == waiting[-1].number + 1
                 if stage is None or clip is not self.clip or not follows:
                     now, self.clip = self.clip, clip or self.clip
-                    yield from _rest(stage, waiting)
+                    yield from _flush(stage, waiting)
                     self.clip = clip = now
                     stage = self._stage()
                 waiting.append(frame)
@@ -203,9 +202,9 @@ class LiveReader:
                 if row is not None:
                     yield _with_values(waiting.popleft(), row)
         except FormatError:
-            yield from _rest(stage, waiting)
+            yield from _flush(stage, waiting)
             raise
-        yield from _rest(stage, waiting)
+        yield from _flush(stage, waiting)
 
     def _stage(self) -> PostFilter:
         from mcz.files.reading.post_filtering import live_filter
@@ -216,8 +215,7 @@ class LiveReader:
         return live_filter(self.clip.skeleton, rate, self.clip.name)
 
 
-def _rest(stage: PostFilter | None, waiting: deque[LiveFrame]) -> Iterator[LiveFrame]:
-    """Yield the frames that are left in the filter."""
+def _flush(stage: PostFilter | None, waiting: deque[LiveFrame]) -> Iterator[LiveFrame]:
     if stage is not None:
         for row in stage.finish():
             yield _with_values(waiting.popleft(), row)
@@ -227,9 +225,7 @@ def _with_values(frame: LiveFrame, row: Any) -> LiveFrame:
     return replace(frame, values=np.where(frame.valid, row, np.nan))
 
 
-class _Fed:
-    """A binary stream of pieces of bytes that come one by one."""
-
+class _PieceStream:
     def __init__(self, pieces: Iterable[bytes]) -> None:
         self._pieces = iter(pieces)
 

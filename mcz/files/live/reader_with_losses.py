@@ -16,9 +16,9 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType
 from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import parse_head
-from mcz.container.events import ChunkEvent, Fault, FootEvent, PacketEvent
+from mcz.container.grammar import ChunkEvent, Fault, FootEvent, PacketEvent
 from mcz.container.limits import BASE, check
-from mcz.container.parser_drivers import Stream, chunks_in
+from mcz.container.parser_drivers import Stream, repeated_chunks
 from mcz.container.segments import FRESH, SegmentHeader, parse_header
 from mcz.container.tolerant_parser import TolerantParser
 from mcz.errors import (
@@ -79,7 +79,7 @@ class FramesWithLosses:
         self._lost, self._summary = lost, summary
         self._joining = join  # until a frame has come whose number is known
         self._head, self._shared = b"", Shared()
-        self._course: _Course | None = None
+        self._course: _ClipCourse | None = None
         self._least: int | None = None  # no frame of the open DATA comes before
         self._made_up = 0
         self._all_checked: bool | None = None
@@ -165,7 +165,7 @@ class FramesWithLosses:
 
     def _repeat(self, event: ChunkEvent) -> Iterator[LiveFrame]:
         try:
-            events = chunks_in(event.payload, 0)
+            events = repeated_chunks(event.payload, 0)
         except FormatError as error:
             self._fault(str(error))
             return
@@ -190,7 +190,7 @@ class FramesWithLosses:
                 f"clip {fields.name!r} needs all of its frames, and cannot be read with losses"
             )
         counts = followed.info.layout.n_channels, self._lost, followed.shown, self._spend
-        self._course = _Course(followed, event.data, Concealer(*counts, join=self._joining))
+        self._course = _ClipCourse(followed, event.data, Concealer(*counts, join=self._joining))
         self.clip, self._parser.n_signals = followed.clip, followed.n_signals
 
     def _close(self, event: ChunkEvent) -> Iterator[LiveFrame]:
@@ -243,7 +243,7 @@ class FramesWithLosses:
         if due is not None:
             yield from course.frames.reach(min(due, MAX_COUNT))
 
-    def _segment(self, course: _Course, payload: bytes) -> Iterator[LiveFrame]:
+    def _segment(self, course: _ClipCourse, payload: bytes) -> Iterator[LiveFrame]:
         """The frame of a closed DATA."""
         try:
             header, _ = parse_header(payload)
@@ -254,7 +254,7 @@ class FramesWithLosses:
             yield from self._frame(course, header, 0, payload)
 
     def _frame(
-        self, course: _Course, header: SegmentHeader, kind: int, payload: bytes
+        self, course: _ClipCourse, header: SegmentHeader, kind: int, payload: bytes
     ) -> Iterator[LiveFrame]:
         number, frames = header.first, course.frames
         self._joining = False
@@ -279,7 +279,7 @@ class FramesWithLosses:
 
 
 @dataclass(slots=True)
-class _Course:
+class _ClipCourse:
     """A clip that has begun: what decodes it, and what puts its frames in order."""
 
     followed: ClipState

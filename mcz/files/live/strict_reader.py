@@ -17,7 +17,7 @@ from mcz.container import payloads
 from mcz.container.chunks import ChunkType, build_foot
 from mcz.container.dictionary_deflate import chunk_id
 from mcz.container.directory import SegmentRow
-from mcz.container.events import ChunkEvent, PacketEvent
+from mcz.container.grammar import ChunkEvent, PacketEvent
 from mcz.container.parser_drivers import Stream
 from mcz.container.reader import Container
 from mcz.container.scanner import Scanner
@@ -68,7 +68,7 @@ class StrictFrames:
         """As ``live_frames``."""
         head = b""
         shared: Shared = {}
-        clip: ClipState | _Held | None = None
+        clip: ClipState | _WholeClip | None = None
         for event in self._stream.events(self.scanner.parser):
             self.scanner.take(event)
             if not isinstance(event, (ChunkEvent, PacketEvent)):
@@ -83,7 +83,7 @@ class StrictFrames:
                 assert row is not None
                 fields = parse(payloads.Clip, event.payload, row.clip.label)
                 before = opening(head, shared, fields)
-                clip = begin(head, shared, row, fields) or _Held(before + event.data, row.name)
+                clip = begin(head, shared, row, fields) or _WholeClip(before + event.data, row.name)
             elif isinstance(clip, ClipState):
                 if kind == ChunkType.CEND:
                     clip.check_hash(parse(payloads.Cend, event.payload, "CEND"))  # PACK-19
@@ -118,9 +118,7 @@ class StrictFrames:
             yield LiveFrame(frame, np.where(mask, values, np.nan), mask)
 
 
-class _Held:
-    """A clip that is decoded when it has ended."""
-
+class _WholeClip:
     def __init__(self, data: bytes, name: str) -> None:
         self._parts, self._name = [data], name
 

@@ -30,7 +30,7 @@ class LiveText:
 
     def __init__(self, arriving: Arriving, writer: LiveWriter, remarks: tuple[str, ...]) -> None:
         self.writer, self.remarks = writer, remarks
-        self._arriving = arriving
+        self._open_source = arriving
 
     def push_all(self) -> None:
         """Write each frame before the next line is read.
@@ -38,8 +38,8 @@ class LiveText:
         Raises SourceError at text that is none of the format, at a last line without a line end,
         and where fewer frames came than are declared; the clip has all frames before that.
         """
-        due, is_renumbered = self._arriving.first_number, False
-        for number, values in self._arriving.frames:
+        due, is_renumbered = self._open_source.first_number, False
+        for number, values in self._open_source.frames:
             if number is not None and number != due:
                 if number > due:
                     self.writer.miss(number - due)
@@ -50,7 +50,7 @@ class LiveText:
                 due = number
             self.writer.push(values)
             due += 1
-        declared, n_frames = self._arriving.declared, self.writer.n_frames
+        declared, n_frames = self._open_source.declared, self.writer.n_frames
         if declared not in (None, n_frames):
             remark = f"{declared} frames are declared, {n_frames} came"
             if n_frames < declared:
@@ -71,7 +71,7 @@ def begin_live(
     needs the ``skeleton`` of ``options``, its ASF. Raises SourceError at text that is none of the
     format, and otherwise as ``LiveWriter`` does.
     """
-    arriving, base = _arriving(_whole_lines(lines), source_format, options)
+    arriving, base = _open_source(_check_lines(lines), source_format, options)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
     if base is not None:
@@ -88,10 +88,10 @@ def begin_live(
         first_number=arriving.first_number,
         base=base,
     )
-    return LiveText(arriving, writer, _remark(arriving, options))
+    return LiveText(arriving, writer, _remarks_on(arriving, options))
 
 
-def _whole_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
+def _check_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
     """Lines as they come; raises SourceError for a last one that may have been cut."""
     for number, line in enumerate(lines, 1):
         if not line.endswith(b"\n") and line.strip():
@@ -99,7 +99,7 @@ def _whole_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
         yield line
 
 
-def _arriving(
+def _open_source(
     lines: Iterable[bytes], source_format: str, options: SourceOptions
 ) -> tuple[Arriving, Skeleton | None]:
     """Open a source that arrives line by line, and the skeleton that it needs."""
@@ -116,8 +116,7 @@ def _arriving(
     return arriving, base
 
 
-def _remark(arriving: Arriving, options: SourceOptions) -> tuple[str, ...]:
-    """Remarks on the skeleton and the rate that were given."""
+def _remarks_on(arriving: Arriving, options: SourceOptions) -> tuple[str, ...]:
     notes = tuple(rate_notes(arriving.frame_rate, options))
     if SKELETON_NOTE not in arriving.metadata:
         return notes

@@ -5,7 +5,10 @@ SPEC.md, "Open DATA and packets", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import signal
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import MappingProxyType, TracebackType
@@ -16,14 +19,11 @@ from numpy.typing import NDArray
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container.chunks import REPEATED, ChunkFlag, ChunkType
-from mcz.container.masks import build_mask
-from mcz.container.segments import FRESH, MASKS, SegmentHeader
+from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_mask
 from mcz.container.time_base import ComingGaps
 from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
-from mcz.files.live.interrupts import defer_sigint
-from mcz.files.live.quality_figures import Figures
 from mcz.files.reading.stored_clip import with_indices
 from mcz.files.writing.clip_writer import begin_open_clip
 from mcz.files.writing.planning import (
@@ -35,7 +35,7 @@ from mcz.files.writing.planning import (
     under_its_path,
     wants_positions,
 )
-from mcz.files.writing.quality import CHUNK, quality_payload, texts_of
+from mcz.files.writing.quality import CHUNK, RunningFigures, quality_payload, texts_of
 from mcz.files.writing.signal_source import MemorySource
 from mcz.files.writing.write_transaction import check_metadata
 from mcz.kinematics.frames import FramePositions
@@ -142,7 +142,7 @@ class LiveWriter:
             note = metadata.get("source-note", "")
             metadata = dict(metadata) | {"source-note": SEPARATOR.join(filter(None, (NOTE, note)))}
         motion = Motion(coded, (signal,), frame_rate, frame_rate_exact, name, metadata)
-        self._encoder, self._decoder = _coders(self.codec, motion, self.options, self._writer)
+        self._encoder, self._decoder = _open_coders(self.codec, motion, self.options, self._writer)
         live = self._encoder
         encoded = Encoded(live.header, iter(()), 1, live.models, (), live.version, live.preset)
         prepared = Prepared(motion, skeletons)
@@ -150,7 +150,7 @@ class LiveWriter:
         begin_open_clip(self._writer, plan, first_number)
         self._is_open = True
         self._digest = ValueDigest()
-        self._figures = Figures(coded)
+        self._figures = RunningFigures(coded)
         self._opening = self._outlet.chunks(REPEATED) if repeat != 0 else b""  # REPT-01
         self._outlet.send()
 
@@ -333,7 +333,7 @@ class LiveWriter:
         self._outlet.send()
 
 
-def _coders(
+def _open_coders(
     codec: Codec, motion: Motion, options: Params, writer: Writer
 ) -> tuple[LiveEncoder, LiveDecoder]:
     if codec.live is None or codec.follow is None:
@@ -349,8 +349,6 @@ def _coders(
 
 
 class _Outlet:
-    """Collects what is written and sends it in one call."""
-
     def __init__(self, sink: Sink, traffic: LiveTraffic) -> None:
         self._sink, self._traffic = sink, traffic
         self._parts: list[bytes] = []
@@ -377,3 +375,28 @@ class _Outlet:
         flush = getattr(self._sink, "flush", None)
         if flush is not None:
             flush()
+
+
+@contextmanager
+def defer_sigint() -> Iterator[None]:
+    """Let an interrupt (Ctrl-C) wait for the end of the block; a second one does not wait.
+
+    Only the main thread is ever interrupted, and only where Python handles the signal.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    seen = []
+
+    def wait(number: int, frame: object) -> None:
+        seen.append(number)
+        signal.signal(signal.SIGINT, handler)
+
+    signal.signal(signal.SIGINT, wait)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if seen:
+            signal.raise_signal(signal.SIGINT)

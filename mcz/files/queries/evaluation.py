@@ -1,30 +1,77 @@
-"""A tree as a function that is asked of one clip after the other.
+"""Trees of queries: their values, their text, and their evaluation for one clip after the other.
 
-Logic is that of SQL: ``not`` of what is unknown is unknown; ``and`` is false where a part is false,
-``or`` true where one is true, and otherwise unknown where a part is. Parts are asked from left to
-right, and no more of them than it takes.
+A comparison is true, false, or None where it is unknown: a value may be missing. Logic is that of
+SQL: ``not`` of what is unknown is unknown; ``and`` is false where a part is false, ``or`` true
+where one is true, and otherwise unknown where a part is. Parts are asked from left to right, and no
+more of them than it takes.
 """
 
 from __future__ import annotations
 
+import operator
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from fnmatch import translate
+from math import isfinite
+from typing import Any
 
-from mcz.files.queries.tree import (
-    And,
-    Compare,
-    In,
-    Like,
-    Literal,
-    Missing,
-    Name,
-    Node,
-    Not,
-    Operand,
-    Or,
-)
-from mcz.files.queries.values import Lookup, Value, compared
+Value = str | bool | int | float | None  # None: missing
+Lookup = Callable[[str], Value]  # the value of a name
+
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+LONGEST_NUMBER = 100  # characters; Python refuses to read integers of some thousand digits
+_NUMBER = re.compile(NUMBER)
+
+COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+def as_number(text: str) -> int | float | None:
+    """The number that all of ``text`` reads as, None where it is none or not finite.
+
+    >>> as_number("05"), as_number("-2.50"), as_number("1e3"), as_number("5 cm")
+    (5, -2.5, 1000.0, None)
+    """
+    if len(text) > LONGEST_NUMBER or not _NUMBER.fullmatch(text):
+        return None
+    if text.lstrip("+-").isdigit():
+        return int(text)
+    number = float(text)
+    return number if isfinite(number) else None
+
+
+def compared(left: Value, sign: str, right: Value) -> bool | None:
+    """Compare ``left`` and ``right`` by a sign of ``COMPARISONS``; None: unknown.
+
+    >>> compared("05", "==", 5), compared("05", "==", "5"), compared("a", "<", 5)
+    (True, False, None)
+    """
+    if left is None or right is None:
+        return None
+    if isinstance(left, bool) or isinstance(right, bool):
+        same_kind = isinstance(left, bool) and isinstance(right, bool)
+        return COMPARISONS[sign](left, right) if same_kind and is_equality(sign) else None
+    if isinstance(left, str) != isinstance(right, str):
+        left, right = _number(left), _number(right)
+        if left is None or right is None:  # a text that is no number
+            return sign == "!=" if is_equality(sign) else None
+    return COMPARISONS[sign](left, right)
+
+
+def is_equality(sign: str) -> bool:
+    return sign in ("==", "!=")
+
+
+def _number(value: str | int | float) -> int | float | None:
+    return as_number(value) if isinstance(value, str) else value
+
 
 Test = Callable[[Lookup], bool | None]  # None: unknown
 
@@ -103,3 +150,125 @@ def _until(decisive: bool, parts: Sequence[Test]) -> Test:
         return result
 
     return test
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    value: str | bool | int | float
+
+
+Operand = Name | Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """``left sign right``; the sign is one of ``values.COMPARISONS``."""
+
+    left: Operand
+    sign: str
+    right: Operand
+
+
+@dataclass(frozen=True, slots=True)
+class In:
+    """``operand in (a, b)``, of at least one literal."""
+
+    operand: Operand
+    literals: tuple[Literal, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Like:
+    """``operand like 'pattern'``."""
+
+    operand: Operand
+    pattern: str
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """``name is missing``."""
+
+    name: Name
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    part: Node
+
+
+@dataclass(frozen=True, slots=True)
+class And:
+    """Two parts or more."""
+
+    parts: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Or:
+    """Two parts or more."""
+
+    parts: tuple[Node, ...]
+
+
+Node = Compare | In | Like | Missing | Not | And | Or
+
+
+def names_in(node: Node | Operand) -> Iterator[str]:
+    """Every name, as often as it occurs, from left to right."""
+    match node:
+        case Name(name):
+            yield name
+        case Compare(left, _, right):
+            yield from names_in(left)
+            yield from names_in(right)
+        case In(operand, _) | Like(operand, _) | Missing(operand) | Not(operand):
+            yield from names_in(operand)
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from names_in(part)
+
+
+def printed(node: Node | Operand) -> str:
+    """The text of which the parser makes this tree.
+
+    >>> printed(Not(And((Missing(Name("subject")), Like(Name("name"), "it's *")))))
+    "not (subject is missing and name like 'it\\\\'s *')"
+    """
+    match node:
+        case Name(name):
+            return name
+        case Literal(value):
+            return _literal(value)
+        case Compare(left, sign, right):
+            return f"{printed(left)} {sign} {printed(right)}"
+        case In(operand, literals):
+            return f"{printed(operand)} in ({', '.join(map(printed, literals))})"
+        case Like(operand, pattern):
+            return f"{printed(operand)} like {_literal(pattern)}"
+        case Missing(operand):
+            return f"{printed(operand)} is missing"
+        case Not(part):
+            return f"not {_nested(part)}"
+        case And(parts):
+            return " and ".join(map(_nested, parts))
+        case Or(parts):
+            return " or ".join(printed(p) if isinstance(p, And) else _nested(p) for p in parts)
+
+
+def _nested(part: Node) -> str:
+    """A part that stands beside ``and``, ``or`` or ``not``."""
+    return f"({printed(part)})" if isinstance(part, And | Or) else printed(part)
+
+
+def _literal(value: str | bool | int | float) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return "'" + re.sub(r"(['\\])", r"\\\1", value) + "'"
+    return repr(value)

@@ -16,12 +16,19 @@ from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError
-from mcz.files.reading.decimation import decimated, decimated_rows
 from mcz.files.reading.signal_info import SignalInfo, groups_of
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.files.reading.source_info import SourceInfo, read_source, sourced_skeleton, stating_rate
 from mcz.files.reading.stored_clip import StoredClip
-from mcz.files.reading.views import ClipValues, FrameValues, Masked, Preview, preview
+from mcz.files.reading.views import (
+    ClipValues,
+    FrameValues,
+    Masked,
+    Preview,
+    decimated,
+    decimated_rows,
+    preview,
+)
 from mcz.hints import Hint
 from mcz.kinematics import point_names
 from mcz.model.clock import (
@@ -78,7 +85,7 @@ class Clip(StoredClip):
         velocities, accelerations = _OfPoses(), _OfPoses()
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _reopened, (self.container, self.name)
+        return _reopen, (self.container, self.name)
 
     def __repr__(self) -> str:
         return f"<Clip {shown(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
@@ -172,14 +179,11 @@ class Clip(StoredClip):
 
     def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
         """The groups that hold the channels of these joints, and where each is among theirs."""
-        return groups_of(info.layout, self._columns(info, joints))
-
-    def _columns(self, info: SignalInfo, joints: Joints) -> list[int]:
         if joints is None:
-            return list(range(info.layout.n_channels))
+            return groups_of(info.layout, range(info.layout.n_channels))
         if info.channels is not None:
             raise OptionError(f"signal {info.name!r} has channels of its own, no joints")
-        return joint_columns(self.skeleton, joint_list(joints))
+        return groups_of(info.layout, joint_columns(self.skeleton, joint_list(joints)))
 
     def check_values(self, signal: int) -> None:
         """Decode a whole signal, a few segments in memory at a time, and compare its hash."""
@@ -194,21 +198,17 @@ class Clip(StoredClip):
         """Raise ChecksumError where these are not the values and the mask of a whole signal."""
         self._compare(info, value_hash(values, mask))
 
-    def _compare(self, info: SignalInfo, found: bytes) -> None:
+    def _compare(self, info: SignalInfo, digest: bytes) -> None:
         stored = self.value_hashes[info.index]
-        if found != stored:
+        if digest != stored:
             raise ChecksumError(
-                f"value hash is {found.hex()}, stored is {stored.hex()}",
+                f"value hash is {digest.hex()}, stored is {stored.hex()}",
                 clip=self.name,
                 where=f"signal {info.index}",
             )
 
     def motion(
-        self,
-        frames: tuple[int, int] | None = None,
-        resolution: int = 0,
-        *,
-        decimate: bool = False,
+        self, frames: tuple[int, int] | None = None, resolution: int = 0, *, decimate: bool = False
     ) -> Motion:
         """The whole clip, or frames a <= f < b of it, as a Motion with its source.
 
@@ -218,9 +218,7 @@ class Clip(StoredClip):
         source then is left out where its text states the rate.
         """
         motion = self._motion(frames, resolution, decimate)
-        scalings = [self.scaling(info.index) for info in self.signals]
-        pairs = zip(motion.signals, scalings, strict=True)
-        signals = tuple(signal.in_units(scaling) for signal, scaling in pairs)
+        signals = tuple(s.in_units(self.scaling(n)) for n, s in enumerate(motion.signals))
         return replace(motion, skeleton=self._sourced_skeleton, signals=signals)
 
     @cached_property
@@ -280,9 +278,8 @@ class Clip(StoredClip):
         except FormatError as error:
             self._complain(f"its source file is lost: {error}", error)
             return None
-        if (start, stop, resolution) == (0, self.n_frames, 0):
-            return source
-        return source.of_no_file()
+        whole = (start, stop, resolution) == (0, self.n_frames, 0)
+        return source if whole else source.of_no_file()
 
     @cached_property
     def timeline(self) -> Timeline | None:
@@ -319,8 +316,8 @@ class Clip(StoredClip):
         these frames where the codec has some that it stores apart (qbc: its marks); otherwise
         they are its coarsest resolution. Raises OptionError where there is no such thing.
         """
-        found = self.previewed(joints)
-        return FrameValues(found.frames, found.masked())
+        shown = self.previewed(joints)
+        return FrameValues(shown.frames, shown.masked())
 
     def previewed(self, joints: Joints = None) -> Preview:
         """``preview`` with the mask apart, and how far its frames lie from each other."""
@@ -358,7 +355,7 @@ class Clip(StoredClip):
         flat: bool = False,
     ) -> DataFrame:
         """A table of the whole clip as a ``pandas.DataFrame``: see ``mcz.to_pandas``."""
-        from mcz.files.tables.frames import to_pandas
+        from mcz.files.tables.labelled import to_pandas
 
         return to_pandas(self.motion(), what, joints=joints, unit=unit, flat=flat)
 
@@ -370,11 +367,7 @@ class Clip(StoredClip):
         return contacts(self.motion(), feet, rule or RULE)
 
     def source_bytes(
-        self,
-        frames: tuple[int, int] | None = None,
-        resolution: int = 0,
-        *,
-        decimate: bool = False,
+        self, frames: tuple[int, int] | None = None, resolution: int = 0, *, decimate: bool = False
     ) -> bytes:
         """The source file, byte for byte (of a lossy clip: like it), or a part of it.
 
@@ -412,7 +405,7 @@ class Clip(StoredClip):
             )
 
 
-def _reopened(container: Container, name: str) -> Clip:
+def _reopen(container: Container, name: str) -> Clip:
     """Reopen a pickled Clip; raises OptionError if the file has changed meanwhile."""
     row = container.directory.clips.get(name)
     if row is None:

@@ -36,7 +36,7 @@ def clip_called(clips: Clips, name: str) -> str:
 def names_of(clips: Clips) -> dict[str, set[str]]:
     """The names that clips may have, as ``clips_meant`` finds it, for who asks for many."""
     known: dict[str, set[str]] = {name: {name} for name in clips}
-    for names in _ways(clips):
+    for names in _naming_ways(clips):
         found: dict[str, set[str]] = {}
         for called, clip in names:
             found.setdefault(called, set()).add(clip)
@@ -48,17 +48,17 @@ def clips_meant(clips: Clips, name: str) -> list[str]:
     """The names of the clips that ``name`` may mean, sorted."""
     if name in clips.rows:
         return [name]
-    for names in _ways(clips):
+    for names in _naming_ways(clips):
         found = sorted({clip for known, clip in names if known == name})
         if found:
             return found
     return []
 
 
-def _ways(clips: Clips) -> Iterator[Named]:
+def _naming_ways(clips: Clips) -> Iterator[Named]:
     """The names that clips may have, the plainest way first; the last reads of their sources."""
     names = [(name, name) for name in clips]
-    others = list(_of_clips(clips))
+    others = list(_clip_aliases(clips))
     yield others
     yield _last_parts([*names, *others])
     paths = []
@@ -70,7 +70,7 @@ def _ways(clips: Clips) -> Iterator[Named]:
     yield _last_parts(paths)
 
 
-def _of_clips(clips: Clips) -> Iterator[tuple[str, str]]:
+def _clip_aliases(clips: Clips) -> Iterator[tuple[str, str]]:
     """The aliases of clips, which are paths of files, with their suffix and without."""
     for alias, (of, target) in clips.aliases.items():
         clip = target.decode("utf-8", "replace")

@@ -52,7 +52,9 @@ def differences(a: Motion, b: Motion) -> list[Difference]:
         if facts[0][what] != facts[1][what]
     ]
     if facts[0]["first frame"] == facts[1]["first frame"]:
-        found += _of_times(a, b, is_rate_same=facts[0]["frame rate"] == facts[1]["frame rate"])
+        found += _time_differences(
+            a, b, is_rate_same=facts[0]["frame rate"] == facts[1]["frame rate"]
+        )
     names = [list(side["joints"]) for side in things]
     if sorted(names[0]) == sorted(names[1]) and names[0] != names[1]:
         found.append(Difference("order of joints", None, None))
@@ -60,13 +62,13 @@ def differences(a: Motion, b: Motion) -> list[Difference]:
         groups = other["groups of parameters"]
         both = {key: value for key, value in one["parameters"].items() if key[0] in groups}
         one["parameters"] = {f"{group}:{name}": value for (group, name), value in both.items()}
-    found += filter(None, (_compared(what, things[0][what], things[1][what]) for what in things[0]))
-    if not found and (what := _otherwise(a, b)):
+    found += filter(None, (_compare(what, things[0][what], things[1][what]) for what in things[0]))
+    if not found and (what := _source_difference(a, b)):
         found.append(Difference(what, None, None))
     return found
 
 
-def _of_times(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Difference]:
+def _time_differences(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Difference]:
     """Differences of frame numbers and times beyond the first frame's number and the rate."""
     numbers = numbers_or_rows(a.frame_numbers, a.n_frames)
     if not np.array_equal(numbers, numbers_or_rows(b.frame_numbers, b.n_frames)):
@@ -84,7 +86,7 @@ def _of_times(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Differenc
         yield Difference("times", None, None)
 
 
-def _compared(what: str, a: Params, b: Params) -> Difference | None:
+def _compare(what: str, a: Params, b: Params) -> Difference | None:
     only_a, only_b = (tuple(name for name in x if name not in y) for x, y in ((a, b), (b, a)))
     changed = tuple(name for name in a if name in b and repr(a[name]) != repr(b[name]))
     if not (only_a or only_b or changed):
@@ -157,7 +159,7 @@ def _value(held: Parameters, parameter: Parameter) -> Any:
     return parameter.type, parameter.dims, held.numbers_of(parameter)
 
 
-def _otherwise(a: Motion, b: Motion) -> str:
+def _source_difference(a: Motion, b: Motion) -> str:
     """The kind of difference of two sources that is named nowhere else, "" if there is none."""
     one, other = a.source, b.source
     if one is None or other is None or one.format != other.format:

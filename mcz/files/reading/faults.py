@@ -10,7 +10,7 @@ from mcz.container.checksums import Checked, check_checksums
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.reader import Container
 from mcz.container.recovery.encoder import encode_packets
-from mcz.container.recovery.packets import read_packet
+from mcz.container.recovery.layout import read_packet
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.errors import (
@@ -69,8 +69,8 @@ def quick_check(
     try:
         if source.grows():
             with open(target) as file:
-                return _quickly_checked(file.container.source, progress)
-        return _quickly_checked(source, progress)
+                return _check_quickly(file.container.source, progress)
+        return _check_quickly(source, progress)
     except MczError as error:
         error.add(path=source.name)
         raise
@@ -78,7 +78,7 @@ def quick_check(
         source.close()
 
 
-def _quickly_checked(
+def _check_quickly(
     source: ByteSource, progress: Callable[[int, int], object] | None
 ) -> tuple[Checked, list[Problem]]:
     seen = check_checksums(source, progress)
@@ -184,7 +184,7 @@ def _restore_skeleton(file: File, id_: bytes) -> None:
 
 
 def _problems(offset: int, heading: str, work: Callable[[], object]) -> list[Problem]:
-    return [Problem(offset, heading, remark_of(error)) for error in _error(work)]
+    return [Problem(offset, heading, remark_of(error)) for error in _errors_of(work)]
 
 
 def clip_problems(file: File, clip: Clip) -> list[Problem]:
@@ -199,7 +199,7 @@ def clip_problems(file: File, clip: Clip) -> list[Problem]:
 
 def _clip_errors(clip: Clip) -> Iterator[MczError]:
     """The faults of each signal; one that is unsupported does not hide more."""
-    found = _error(lambda: clip.signals)
+    found = _errors_of(lambda: clip.signals)
     yield from found
     sound = not found
     for signal in clip.signals if sound else ():
@@ -209,12 +209,12 @@ def _clip_errors(clip: Clip) -> Iterator[MczError]:
             sound = False
             yield error
             if isinstance(error, UnsupportedError):
-                yield from _error(read_segments, clip.container, signal)
+                yield from _errors_of(read_segments, clip.container, signal)
     if sound and clip.source is not None:
-        yield from _error(clip.source_bytes)
+        yield from _errors_of(clip.source_bytes)
 
 
-def _error(work: Callable[..., object], *arguments: object) -> list[MczError]:
+def _errors_of(work: Callable[..., object], *arguments: object) -> list[MczError]:
     try:
         work(*arguments)
     except MczError as error:
@@ -239,12 +239,12 @@ def recovery_problems(container: Container) -> Iterator[tuple[str, list[Problem]
     """Yield the protected bytes of each RECV, and its faults."""
     for chunk in recovery_chunks(container):
         try:
-            yield _checked(container.source, chunk), []
+            yield _check_recovery(container.source, chunk), []
         except MczError as error:
             yield f"at {chunk.offset}", [Problem(chunk.offset, "RECV", remark_of(error))]
 
 
-def _checked(source: ByteSource, chunk: Chunk) -> str:
+def _check_recovery(source: ByteSource, chunk: Chunk) -> str:
     first = read_packet(source, chunk.payload_offset)
     if first is None:
         raise FormatError("its first packet is damaged", where=f"chunk {chunk.label}")

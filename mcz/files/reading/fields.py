@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from mcz.codecs import codec_by_id
 from mcz.container.chunks import FRAMING, HEADER, ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
-from mcz.container.metadata import Record
-from mcz.container.metadata_keys import SAID, SPELLINGS
+from mcz.container.metadata import SAID, SPELLINGS, Record
 from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.errors import OptionError, UnsupportedError
 from mcz.files.reading.clip import Clip
@@ -57,7 +56,7 @@ def filter_clips(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> l
 
 
 def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:
-    getters = {name: _getter(query, name, clips) for name in query.names if clips}
+    getters = {name: _query_getter(query, name, clips) for name in query.names if clips}
 
     def matches(clip: Clip) -> bool:
         return query.matches(lambda name: getters[name](clip))
@@ -65,11 +64,10 @@ def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:
     return matches
 
 
-def _getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
-    """Return the getter of a name in a query: a field, or a metadata key of any clip."""
-    found = _known(name, clips)
+def _query_getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
+    found = _find_getter(name, clips)
     if found is None:
-        raise query.unknown(name, _names(name, clips))
+        raise query.unknown(name, _known_names(name, clips))
     return found
 
 
@@ -78,38 +76,37 @@ def getter_of(name: str, clips: Collection[Clip]) -> Getter:
 
     Raises OptionError for a name that is neither.
     """
-    found = _known(name, clips)
+    found = _find_getter(name, clips)
     if found is None:
-        said = among(sorted(_names(name, clips)), name)
+        said = among(sorted(_known_names(name, clips)), name)
         raise OptionError(f"{name!r} is neither a field nor a metadata key; known are {said}")
     return found
 
 
-def _known(name: str, clips: Collection[Clip]) -> Getter | None:
+def _find_getter(name: str, clips: Collection[Clip]) -> Getter | None:
     if name in FIELDS:
         return FIELDS[name]
     key = name.removeprefix(METADATA)
     key = SPELLINGS.get(key, key)
-    is_key = key in SAID or any(_last_said(key, clip) for clip in clips)
+    is_key = key in SAID or any(_last_record(key, clip) for clip in clips)
     is_key = is_key or any(key in clip.metadata for clip in clips)
     if is_key:
         return partial(_metadata, key)
     return FIELDS[SHORT[name]] if name in SHORT else None
 
 
-def _names(name: str, clips: Collection[Clip]) -> list[str]:
-    """The names that ``name`` may have been meant to be."""
+def _known_names(name: str, clips: Collection[Clip]) -> list[str]:
     keys = {key for clip in clips for key in clip.metadata}
     return [METADATA + key for key in keys] if name.startswith(METADATA) else [*FIELDS, *keys]
 
 
 def _metadata(key: str, clip: Clip) -> Value:
     """Its value; CLIP is not read where a META has the last word."""
-    last = _last_said(key, clip)
+    last = _last_record(key, clip)
     return clip.metadata.get(key) if last is None else last.entries.get(key)
 
 
-def _last_said(key: str, clip: Clip) -> Record | None:
+def _last_record(key: str, clip: Clip) -> Record | None:
     """The record that says last what the key is, or that it is not there any more."""
     records = reversed(clip.container.metadata_records(clip.name))
     return next((r for r in records if key in r.entries or key in r.removed), None)

@@ -311,7 +311,7 @@ def open(
     }
     source = open_bytes(target)
     try:
-        return _opened(source, options)
+        return _open_source(source, options)
     except MczError as error:
         source.close()
         error.add(path=source.name)
@@ -336,7 +336,7 @@ def file_of(container: Container) -> File:
     return File(container)
 
 
-def _opened(source: ByteSource, options: Params) -> File:
+def _open_source(source: ByteSource, options: Params) -> File:
     """The file; while another process appends to it, the file up to its last end."""
     while True:
         try:

@@ -10,14 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.container import note_records
+from mcz.container.segments import GroupNotes
 from mcz.errors import FormatError
 from mcz.model.motion import Exceptions
 from mcz.model.numbers import Grid, values_of_texts
 from mcz.model.schema import parse
 
 # Grid changes (channel, grid) and exceptions (row, channel, text) of one group in one segment.
-GroupNotes = tuple[list[tuple[int, Grid]], list[tuple[int, int, bytes]]]
+ParsedNotes = tuple[list[tuple[int, Grid]], list[tuple[int, int, bytes]]]
 
 
 class Noted:
@@ -34,7 +34,7 @@ class Noted:
         self._row = max(0, row)
         self._grids.setdefault(self._row, {})
 
-    def add(self, shift: int, columns: Sequence[int], notes: GroupNotes) -> None:
+    def add(self, shift: int, columns: Sequence[int], notes: ParsedNotes) -> None:
         """The notes of a group, whose first row is ``shift`` and whose channels are ``columns``."""
         for channel, grid in notes[0]:
             self._grids[self._row][columns[channel]] = grid
@@ -67,7 +67,7 @@ class Noted:
         return tuple(changes)
 
 
-def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str) -> GroupNotes:
+def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str) -> ParsedNotes:
     """Grid changes (channel, grid) and exceptions (row, channel, text) of one group.
 
     ``grids`` are those of its channels in CLIP.
@@ -75,7 +75,7 @@ def parse_group_notes(data: bytes, n_rows: int, grids: Sequence[Grid], name: str
     if not data:
         return [], []
     where = f"clip {name!r}, group notes"
-    fields = parse(note_records.GroupNotes, data, where)
+    fields = parse(GroupNotes, data, where)
     n_channels = len(grids)
     changes = [(c.channel, c.grid) for c in fields.grid_changes]
     channels = [channel for channel, _ in changes]

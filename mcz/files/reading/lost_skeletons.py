@@ -40,23 +40,25 @@ NAMELESS = "skeleton"  # what a skeleton is called where neither its file nor a 
 
 def restore_skeletons(container: Container) -> None:
     """Give a salvaged file the skeletons that clips name, that it lost, and whose ASF it has."""
-    lost = _lost(container)
+    lost = _lost_ids(container)
     if not lost:
         return
     for (kind, id_), chunk in list(container.directory.shared.items()):
         if kind == ChunkType.SRCE:
             with suppress(MczError):  # of another format, damaged as well, or no ASF
-                made = _of_asf(container, id_, lost)
+                made = _asf_skels(container, id_, lost)
                 _restore(container, lost, made, f"its ASF, {chunk.label}")
     for kind, id_ in list(container.directory.shared):
         if kind == ChunkType.SKEL and lost:
             with suppress(MczError):
-                _restore(container, lost, _of_base(container, id_), f"SKEL {id_.hex()}")
+                _restore(container, lost, _base_skels(container, id_), f"SKEL {id_.hex()}")
     rows = [row for row in container.directory.clips.values() if row.skeleton in lost]
     for row in rows:
         if row.skeleton in lost:
             with suppress(MczError):
-                _restore(container, lost, _of_clip(container, row), f"the source of {row.name!r}")
+                _restore(
+                    container, lost, _clip_skels(container, row), f"the source of {row.name!r}"
+                )
     for row in rows:
         if row.skeleton in lost:
             with suppress(MczError):
@@ -69,7 +71,7 @@ def _without_joints(container: Container, row: ClipRow) -> None:
     Codecs of channels need no more of a skeleton than which of them belong together.
     """
     fields = container.clip(row)
-    motion = _of_zeros(container, fields, row, None)
+    motion = _zero_motion(container, fields, row, None)
     for sizes in _joint_sizes(motion.skeleton.n_channels, fields.signals[0].groups.kind):
         names = iter(motion.skeleton.joints[0].channels)
         joints = [Joint("", channels=tuple(islice(names, size))) for size in sizes]
@@ -117,7 +119,7 @@ def _restore(
             lost.remove(id_)
 
 
-def _lost(container: Container) -> set[bytes]:
+def _lost_ids(container: Container) -> set[bytes]:
     """The ids of the skeletons that clips, skeletons and aliases name and the file has not."""
     directory = container.directory
     named = {row.skeleton for row in directory.clips.values()}
@@ -130,27 +132,24 @@ def _lost(container: Container) -> set[bytes]:
     return {id_ for id_ in named if (ChunkType.SKEL, id_) not in directory.shared}
 
 
-def _of_asf(container: Container, template: bytes, lost: set[bytes]) -> Iterator[bytes]:
+def _asf_skels(container: Container, template: bytes, lost: set[bytes]) -> Iterator[bytes]:
     """The payloads of SKEL that writers make of an ASF: under each name and length unit."""
     text = container.template(template, ASF.id)
     source = payloads.SkeletonSource(
-        template=template,
-        format=ASF.id,
-        size=len(text),
-        sha256=hashlib.sha256(text).digest(),
+        template=template, format=ASF.id, size=len(text), sha256=hashlib.sha256(text).digest()
     )
-    for name in _names(container, lost):
-        yield from _payloads(ASF.read(text, name), source)
+    for name in _asf_names(container, lost):
+        yield from _unit_skels(ASF.read(text, name), source)
 
 
-def _payloads(skeleton: Skeleton, source: payloads.SkeletonSource | None) -> Iterator[bytes]:
+def _unit_skels(skeleton: Skeleton, source: payloads.SkeletonSource | None) -> Iterator[bytes]:
     """The payloads of SKEL of a skeleton, under each length unit that it may have been given."""
     for unit_cm in dict.fromkeys((skeleton.unit_cm, None, *UNIT_CM.values())):
         payload = build_skeleton(replace(skeleton, unit_cm=unit_cm), source)
         yield from (payload, pack_skeleton(payload))
 
 
-def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
+def _clip_skels(container: Container, row: ClipRow) -> Iterator[bytes]:
     """The payloads of SKEL that writers make of a clip's own file: the header says them all.
 
     What position channels do to the offset the frames decide, which may be lost: all ways.
@@ -160,17 +159,17 @@ def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
         form = format_by_id(source.format)
         template = container.template(bytes(source.template), source.format)
         stored = Source(form.name, template, bytes(source.detail))
-        text = form.write(_of_zeros(container, fields, row, stored))
+        text = form.write(_zero_motion(container, fields, row, stored))
         for base in _bases(container) if form.wants_skeleton else (None,):
             arguments = () if not form.wants_skeleton else (base,)
             skeleton: Skeleton = form.read(text, row.name, *arguments).skeleton
             for up_axis in dict.fromkeys((skeleton.up_axis, *AXES)):
-                for joints in dict.fromkeys(_ways(skeleton.joints)):
+                for joints in dict.fromkeys(_offset_ways(skeleton.joints)):
                     other = replace(skeleton, up_axis=up_axis, joints=joints)
-                    yield from _payloads(other, None)
+                    yield from _unit_skels(other, None)
 
 
-def _of_zeros(
+def _zero_motion(
     container: Container, fields: payloads.Clip, row: ClipRow, source: Source | None
 ) -> Motion:
     """A motion like that of a clip, all of whose values are zero, on a joint of plain channels.
@@ -205,7 +204,7 @@ def _bases(container: Container) -> Iterator[Skeleton | None]:
                 yield replace(container.skeleton(id_), base=id_)
 
 
-def _ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
+def _offset_ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
     """The joints, whose positions add to the offset or replace it, of roots and of others."""
     moving = [any(c.kind in POSITION_KINDS for c in joint.channels) for joint in joints]
     yield joints
@@ -218,7 +217,7 @@ def _ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
         )
 
 
-def _of_base(container: Container, base: bytes) -> Iterator[bytes]:
+def _base_skels(container: Container, base: bytes) -> Iterator[bytes]:
     """The payloads of SKEL that writers derive from a skeleton where another axis points up."""
     skeleton = container.skeleton(base)
     for up_axis in AXES:
@@ -226,8 +225,7 @@ def _of_base(container: Container, base: bytes) -> Iterator[bytes]:
         yield from (payload, pack_skeleton(payload))
 
 
-def _names(container: Container, lost: set[bytes]) -> list[str]:
-    """Possible names of an ASF that states none."""
+def _asf_names(container: Container, lost: set[bytes]) -> list[str]:
     aliases = container.directory.aliases.items()
     paths = [name for name, (_, target) in aliases if target in lost]
     return list(dict.fromkeys([*(PurePosixPath(path).stem for path in paths), NAMELESS]))

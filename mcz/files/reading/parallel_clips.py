@@ -41,11 +41,11 @@ def shared_out(
     if jobs == ONE:
         yield (partial(function, (file, said), item) for item in items)
         return
-    with answers(partial(_checked, function), items, jobs, (file, file.size, said)) as found:
+    with answers(partial(_check_and_call, function), items, jobs, (file, file.size, said)) as found:
         yield cast(Iterator[Answer[Result]], found)  # no item is None
 
 
-def _checked(
+def _check_and_call(
     function: Callable[[Shared, Item], Result], state: tuple[File, int, Any], item: Item
 ) -> Result:
     file, size, said = state

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from mcz.codecs.transforms.post_filter import PostFilter, filter_rows
 from mcz.errors import MotionError, OptionError
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.decimation import decimated_rows
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.reading.source_info import stating_rate
+from mcz.files.reading.views import decimated_rows
 from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import SEPARATOR
@@ -49,7 +49,7 @@ def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
     _check_markers(motion.name, motion.skeleton, first.channels)
     settings = _settings(motion.name, motion.skeleton, motion.frame_rate, first.samples_per_frame)
     signal = Signal(
-        _filtered(first.values, first.mask, *settings),
+        _filter(first.values, first.mask, *settings),
         name=first.name,
         samples_per_frame=first.samples_per_frame,
         mask=first.mask,
@@ -88,7 +88,7 @@ def filtered_part(
     columns: Any = slice(None)
     if joints is not None:
         columns = [c for joint in joints for c in skeleton.columns(skeleton.find(joint))]
-    filtered = _filtered(values, mask, *settings)[rows, columns]
+    filtered = _filter(values, mask, *settings)[rows, columns]
     return filtered, None if mask is None else mask[rows, columns]
 
 
@@ -181,7 +181,7 @@ def _settings(
     return rate.numerator / rate.denominator * per_frame, skeleton.unit_cm  # FILT-07
 
 
-def _filtered(values: Values, mask: Mask | None, rate: float, unit_cm: float) -> Floats:
+def _filter(values: Values, mask: Mask | None, rate: float, unit_cm: float) -> Floats:
     rows = np.asarray(values, np.float64)
     if mask is None:
         return filter_rows(rows, rate, unit_cm)

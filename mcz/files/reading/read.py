@@ -150,16 +150,16 @@ def choose(path: Path, source_format: Format, data: bytes, given: Given) -> Chos
     assert source_format.bones is not None
     counts = source_format.bones(data)
     if isinstance(given, Skeleton):
-        return _asked(path, given, _file_of(given) or f"the skeleton {given.name!r}", counts)
+        return _check_asked(path, given, _file_of(given) or f"the skeleton {given.name!r}", counts)
     if given is not None:
         if given == NONE:
             return None
-        found = _asked(path, read_skeleton(given), str(given), counts)
+        found = _check_asked(path, read_skeleton(given), str(given), counts)
         return replace(found, path=Path(given))
-    return _found(path, skeletons_around(path), counts) if counts else None
+    return _choose_candidate(path, skeletons_around(path), counts) if counts else None
 
 
-def _asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> Chosen:
+def _check_asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> Chosen:
     check_own(str(path), skeleton, label, counts)
     return Chosen(skeleton, how_given(skeleton))
 
@@ -171,7 +171,7 @@ def how_given(skeleton: Skeleton) -> str:
 
 
 def _file_of(skeleton: Skeleton) -> str:
-    return _text(Path(skeleton.source.path).name) if skeleton.source is not None else ""
+    return _printable(Path(skeleton.source.path).name) if skeleton.source is not None else ""
 
 
 def check_own(path: str, skeleton: Skeleton, label: str, counts: Counts) -> None:
@@ -207,7 +207,7 @@ class _Tried:
         return f"{path} (whose bones fit)"
 
 
-def _found(path: Path, around: Sequence[Candidate], counts: Counts) -> Chosen | None:
+def _choose_candidate(path: Path, around: Sequence[Candidate], counts: Counts) -> Chosen | None:
     """The one of the candidates that can be taken; None where there are none."""
     named = [_try(candidate, counts) for candidate in around if candidate.name_of]
     for grade in (2, 1):
@@ -217,13 +217,13 @@ def _found(path: Path, around: Sequence[Candidate], counts: Counts) -> Chosen | 
             return _only(path, nearest, named)
     others = [_try(candidate, counts) for candidate in around if not candidate.name_of]
     if named:
-        raise _riddle(path, [*named, *others], "a skeleton has its name, but not its bones")
+        raise _riddle_error(path, [*named, *others], "a skeleton has its name, but not its bones")
     for grade in (2, 1):
         fitting = [one for one in others if one.grade == grade]
         if fitting:
             return _only(path, fitting, others)
     if others:
-        raise _riddle(path, others, "no skeleton around has its name or its bones")
+        raise _riddle_error(path, others, "no skeleton around has its name or its bones")
     return None
 
 
@@ -241,12 +241,12 @@ def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> Chosen:
     first = fitting[0]
     if len(fitting) > 1:
         if first.candidate.name_of:
-            raise _ambiguous(path, fitting, f"{len(fitting)} skeletons are equally near")
+            raise _ambiguous_error(path, fitting, f"{len(fitting)} skeletons are equally near")
         text = f"no skeleton has its name, and {len(fitting)} have its bones"
-        raise _ambiguous(path, all_, text)
+        raise _ambiguous_error(path, all_, text)
     assert first.skeleton is not None
     asf, name_of = first.candidate.path, first.candidate.name_of
-    label = _text(asf.name)
+    label = _printable(asf.name)
     how = f"ASF of the name of {name_of}" if name_of else f"ASF the only one that fits: {label}"
     remark = "" if name_of else f"its skeleton is {asf}, the only one around whose bones fit"
     if first.match.differing:
@@ -261,9 +261,9 @@ def _with_misfits(
     """``chosen`` with a remark on the bones of the whole file that it does not fit."""
     assert source_format.bones is not None
     match = match_bones(chosen.skeleton, source_format.bones(data, whole=True))
-    label = _text(str(chosen.path or chosen.skeleton.name or "the skeleton"))
+    label = _printable(str(chosen.path or chosen.skeleton.name or "the skeleton"))
     if match.lacking and not asked:
-        found = label if chosen.path is None else _text(_seen_from(path.parent, chosen.path))
+        found = label if chosen.path is None else _printable(_seen_from(path.parent, chosen.path))
         raise SourceError(f"{found} lacks {_listed(match.lacking)}", path=path, hint=Hint.SKELETON)
     remark = chosen.remark
     if match.lacking:
@@ -280,15 +280,15 @@ class AmbiguousError(SourceError):
     reason = ""
 
 
-def _ambiguous(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError:
-    riddle = _riddle(path, tried, text)
+def _ambiguous_error(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError:
+    riddle = _riddle_error(path, tried, text)
     error = AmbiguousError(riddle.message, **riddle.fields)
-    error.reason = f"{text}: {_listed([_text(one.candidate.path.name) for one in tried])}"
+    error.reason = f"{text}: {_listed([_printable(one.candidate.path.name) for one in tried])}"
     return error
 
 
-def _riddle(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:
-    shown = first_of([_text(one.describe(path.parent)) for one in tried], SHOWN)
+def _riddle_error(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:
+    shown = first_of([_printable(one.describe(path.parent)) for one in tried], SHOWN)
     return SourceError(f"{text}: {shown}", path=path, hint=Hint.SKELETON)
 
 
@@ -304,6 +304,6 @@ def _listed(names: Sequence[str]) -> str:
     return " ".join(names[:3]) + more
 
 
-def _text(name: str) -> str:
+def _printable(name: str) -> str:
     """A name of a file as text that any file can hold."""
     return name.encode("utf-8", "backslashreplace").decode()

@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mcz.codecs.basis_models import known_model_name
-from mcz.container import note_records
 from mcz.container.chunks import ChunkType
 from mcz.container.reader import Container
-from mcz.container.segments import GROUP_NOTES
+from mcz.container.segments import GROUP_NOTES, GroupNotes
 from mcz.errors import FormatError, SkeletonWarning, UnsupportedError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
@@ -233,13 +232,13 @@ def exceptions_info(container: Container, clip: Clip) -> JsonObject:
             ]
             if wanted:
                 _, streams = container.streams(row, signal.counts, wanted)
-                n_exceptions += sum(_count(streams[i]) for i in wanted)
+                n_exceptions += sum(_count_exceptions(streams[i]) for i in wanted)
     share = n_exceptions / n_tokens if n_tokens else 0.0
     return {"n_exceptions": n_exceptions, "exceptions_share": share}
 
 
-def _count(notes: bytes) -> int:
-    return len(parse(note_records.GroupNotes, notes, "group notes").exceptions)
+def _count_exceptions(notes: bytes) -> int:
+    return len(parse(GroupNotes, notes, "group notes").exceptions)
 
 
 def source_info(

@@ -14,14 +14,19 @@ from mcz.codecs.contract import Request, Span
 from mcz.codecs.known_answers import check_known_answer
 from mcz.container.decoded_cache import MOST_OF_ONE, Run
 from mcz.container.limits import check_decoded
-from mcz.container.masks import parse_mask
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
+from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable, parse_mask
 from mcz.errors import FormatError, MczError
-from mcz.files.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
+from mcz.files.reading.group_notes import (
+    Noted,
+    ParsedNotes,
+    parse_group_notes,
+    values_of_exceptions,
+)
 from mcz.files.reading.segment_salvage import salvage
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.kernels import lacks_compiled_kernels
+from mcz.model.indexing import merged_ranges
 from mcz.model.motion import Exceptions, Signal
 from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.threads import in_force, in_order, timed, worthwhile
@@ -93,9 +98,9 @@ class SignalReader:
             return self._salvage(self._prepare(start, stop), start, stop)
         self._check_size(start, stop)
         near = ordinals is None and not self.container.reads_parts
-        return self._joined(self._near if near else self.blocks, start, stop, ordinals)
+        return self._join(self._near_blocks if near else self.blocks, start, stop, ordinals)
 
-    def _joined(
+    def _join(
         self,
         blocks: Callable[[int, int, Values], Iterator[Block]],
         start: int,
@@ -103,12 +108,11 @@ class SignalReader:
         ordinals: NDArray[np.int64] | None = None,
     ) -> tuple[Values, NDArray[np.bool_] | None]:
         """Values and mask of all blocks of the range; see ``_read``."""
-        per_frame = self.info.layout.samples_per_frame
         kind = np.int64 if self.info.is_integer else np.float64
         values: Values = np.empty(self._shape(start, stop), kind)
         mask: NDArray[np.bool_] | None = None
         for block in blocks(start, stop, values):
-            rows = slice((block.start - start) * per_frame, (block.stop - start) * per_frame)
+            rows = self._rows(start, block.start, block.stop)
             if block.values.base is not values:
                 values[rows] = block.values
             if ordinals is not None:
@@ -119,20 +123,25 @@ class SignalReader:
         return values, mask
 
     def _shape(self, start: int, stop: int) -> tuple[int, int]:
-        return (stop - start) * self.info.layout.samples_per_frame, len(self._columns)
+        return (stop - start) * self.info.samples_per_frame, len(self._columns)
+
+    def _rows(self, base: int, start: int, stop: int) -> slice:
+        """The rows of frames start <= f < stop in an array that begins with frame ``base``."""
+        per_frame = self.info.samples_per_frame
+        return slice((start - base) * per_frame, (stop - base) * per_frame)
 
     def blocks(self, start: int, stop: int, out: Values | None = None) -> Iterator[Block]:
         """The same block by block; values may lie in ``out``, of all rows, already."""
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
             self._decode(spans, start, stop)
-        per_frame, name = self.info.layout.samples_per_frame, self.info.codec.name
+        name = self.info.codec.name
 
         def block(ends: tuple[int, int]) -> Block:
             a, b = ends
             own = None
             if out is not None and not self.info.is_integer:
-                own = out[(a - start) * per_frame : (b - start) * per_frame]
+                own = out[self._rows(start, a, b)]
             with timed(name, math.prod(self._shape(a, b))):
                 coded = self._decode(spans, a, b)
                 return Block(a, b, coded, *self._finish(coded, a, b, own))
@@ -140,9 +149,8 @@ class SignalReader:
         threads = worthwhile(name, math.prod(self._shape(start, stop)), self._threads)
         yield from in_order(block, list(self._ranges(start, stop)), threads)
 
-    def _near(self, start: int, stop: int, out: Values) -> Iterator[Block]:
-        """The same; a run of which the range has a part is decoded whole, and kept."""
-        per_frame = self.info.layout.samples_per_frame
+    def _near_blocks(self, start: int, stop: int, out: Values) -> Iterator[Block]:
+        """``blocks``; a run of which the range has a part is decoded whole, and kept."""
         at = start
         if start < stop:
             run = self._run(start)
@@ -153,11 +161,11 @@ class SignalReader:
             run = self._run(stop - 1)
             if run is not None and stop < run[1]:
                 if at < run[0]:
-                    yield from self.blocks(at, run[0], out[(at - start) * per_frame :])
+                    yield from self.blocks(at, run[0], out[self._rows(start, at, stop)])
                 at = stop
                 yield from self._cut(run, run[0], stop)
         if at < stop or start == stop:
-            yield from self.blocks(at, stop, out[(at - start) * per_frame :])
+            yield from self.blocks(at, stop, out[self._rows(start, at, stop)])
 
     def _run(self, frame: int) -> tuple[int, int] | None:
         """The shown frames that hang together with one; None where they are too many to keep."""
@@ -183,19 +191,18 @@ class SignalReader:
         """Frames of a run, which is decoded where it is not at hand."""
         rows = self.info.covering(run[0], run[0] + 1)
         key = self.info.rows[rows[0]].offset, self.groups, self.resolution
-        held = self.container.runs.get(key)
-        if held is None:
+        decoded = self.container.runs.get(key)
+        if decoded is None:
             try:
-                values, mask = self._joined(self.blocks, *run)
+                values, mask = self._join(self.blocks, *run)
             except MczError:  # perhaps of a segment that these frames do not need
                 yield from self.blocks(start, stop)
                 return
-            held = Run(run[0], values, mask)
-            self.container.runs.put(key, held)
-        per_frame = self.info.layout.samples_per_frame
-        wanted = slice((start - run[0]) * per_frame, (stop - run[0]) * per_frame)
-        mask = None if held.mask is None else held.mask[wanted]
-        yield Block(start, stop, held.values[wanted], held.values[wanted], mask)
+            decoded = Run(run[0], values, mask)
+            self.container.runs.put(key, decoded)
+        cut = self._rows(run[0], start, stop)
+        mask = None if decoded.mask is None else decoded.mask[cut]
+        yield Block(start, stop, decoded.values[cut], decoded.values[cut], mask)
 
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
@@ -264,13 +271,13 @@ class SignalReader:
     def _salvage(
         self, spans: Sequence[Span], start: int, stop: int
     ) -> tuple[Values, NDArray[np.bool_]]:
-        per_frame, shape = self.info.layout.samples_per_frame, self._shape(start, stop)
+        shape = self._shape(start, stop)
         values = np.zeros(shape, np.int64) if self.info.is_integer else np.full(shape, np.nan)
         mask = np.zeros(shape, np.bool_)
 
         def rescue(a: int, b: int) -> None:
             part, valid = self._finish(self._decode(spans, a, b), a, b)
-            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            rows = self._rows(start, a, b)
             values[rows], mask[rows] = part, True if valid is None else valid
 
         salvage(spans, self.info.covering(start, stop), (start, stop), rescue, self._complain)
@@ -285,11 +292,7 @@ class SignalReader:
             found.append((a, b))
 
         salvage(spans, self.info.covering(start, stop), (start, stop), rescue, lambda *_: None)
-        runs: list[tuple[int, int]] = []
-        for a, b in sorted(found):
-            joined = bool(runs) and runs[-1][1] == a
-            runs[-1:] = [(runs[-1][0], b)] if joined else [*runs[-1:], (a, b)]
-        return runs
+        return merged_ranges(found)
 
     def _complain(self, start: int, stop: int, reason: object) -> None:
         self.container.damage.append(f"clip {self.name!r}, frames {start}:{stop}: {reason}")
@@ -306,34 +309,30 @@ class SignalReader:
 
     def _streams(self, segment: int) -> tuple[StreamTable, dict[int, bytes]]:
         with self._lock:
-            found = self._cache.get(segment)
-            if found is None:
-                found = self._cache[segment] = self._fetched(segment)
+            streams = self._cache.get(segment)
+            if streams is None:
+                streams = self._cache[segment] = self._fetch_segment(segment)
                 self._read_ones.add(segment)
                 while len(self._cache) > NEIGHBORS * self._threads:  # bounds the memory
                     self._cache.pop(next(iter(self._cache)))
-            return found
+            return streams
 
-    def _fetched(self, segment: int) -> tuple[StreamTable, dict[int, bytes]]:
+    def _fetch_segment(self, segment: int) -> tuple[StreamTable, dict[int, bytes]]:
         row, counts = self.info.rows[segment], self.info.counts
-        everything = len(self.groups) == counts.n_groups and not self.resolution
-        table = wanted = None
-        if not everything and self.container.in_part(row):
-            table = self.container.table(row, counts)
-            wanted = self._wanted(table)
-        return self.container.streams(row, counts, wanted, table)
-
-    def _wanted(self, table: StreamTable) -> list[int]:
-        stored = range(table.counts.n_resolutions - self.resolution)
+        is_all = len(self.groups) == counts.n_groups and not self.resolution
+        if is_all or not self.container.in_part(row):
+            return self.container.streams(row, counts, None)
+        table = self.container.table(row, counts)
+        stored = range(counts.n_resolutions - self.resolution)
         wanted = [table.codec(r, g) for r in stored for g in self.groups]
         for stream_of in (table.group_notes, table.mask):
             wanted += [i for i in map(stream_of, self.groups) if i is not None]
-        return wanted
+        return self.container.streams(row, counts, wanted, table)
 
     def _finish(
         self, coded: Values, start: int, stop: int, out: Values | None = None
     ) -> tuple[Values, NDArray[np.bool_] | None]:
-        """Ordinals to values, in ``out`` where that is given, exceptions and masks put in."""
+        """Turn ordinals into values, in ``out`` if given; put in exceptions and masks."""
         for index in self.info.covering(start, stop):
             if index not in self._read_ones:  # the codec wanted nothing of it: it is checked yet
                 self._streams(index)
@@ -382,7 +381,7 @@ class SignalReader:
                 noted.add(shift, [column[c] for c in layout.groups[group]], notes)
         return noted.exceptions(), noted.grid_changes()
 
-    def _group_notes(self, index: int, group: int) -> GroupNotes:
+    def _group_notes(self, index: int, group: int) -> ParsedNotes:
         table, streams = self._streams(index)
         at = table.group_notes(group)
         layout = self.info.layout
@@ -394,7 +393,7 @@ class SignalReader:
         )
 
     def _mask(self, start: int, stop: int) -> NDArray[np.bool_] | None:
-        layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
+        layout, per_frame = self.info.layout, self.info.samples_per_frame
         mask: NDArray[np.bool_] | None = None
         for index in self.info.covering(start, stop):
             header = self.info.rows[index].header
@@ -402,8 +401,7 @@ class SignalReader:
                 continue  # all of it is valid
             table, streams = self._streams(index)
             a, b = max(start, header.first), min(stop, header.stop)
-            rows = slice((a - start) * per_frame, (b - start) * per_frame)
-            cut = slice((a - header.first) * per_frame, (b - header.first) * per_frame)
+            rows, cut = self._rows(start, a, b), self._rows(header.first, a, b)
             at = 0
             for group in self.groups:
                 n = len(layout.groups[group])

@@ -21,7 +21,7 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     source_format, data = load(path)
     if not source_format.is_skeleton:
         raise OptionError("not a skeleton file", path=path)
-    skeleton: Skeleton = _named(path, source_format.read, data, path.stem)
+    skeleton: Skeleton = _read_with(path, source_format.read, data, path.stem)
     if skeleton.source is None:
         return skeleton
     return replace(skeleton, source=replace(skeleton.source, path=path.name))
@@ -48,7 +48,7 @@ def read_source(
 ) -> Motion:
     """The motion in the bytes ``data`` of the file ``path``."""
     arguments = (skeleton,) if source_format.wants_skeleton else ()
-    motion: Motion = _named(path, source_format.read, data, path.stem, *arguments)
+    motion: Motion = _read_with(path, source_format.read, data, path.stem, *arguments)
     if note := content_note(path, source_format):
         notes = filter(None, (note, motion.metadata.get("source-note", "")))
         metadata = dict(motion.metadata) | {"source-note": "; ".join(notes)}
@@ -58,8 +58,7 @@ def read_source(
     return replace(motion, source=replace(motion.source, path=path.name))
 
 
-def _named(path: Path, reader: Any, data: bytes, *arguments: object) -> Any:
-    """Read ``data`` with ``reader``; its errors name the file."""
+def _read_with(path: Path, reader: Any, data: bytes, *arguments: object) -> Any:
     if not data:
         raise SourceError("the file is empty", path=path)
     try:

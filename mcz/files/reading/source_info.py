@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.errors import FormatError, UnsupportedError
-from mcz.files.reading.decimation import picked_notes
 from mcz.files.reading.signal_info import SignalInfo
+from mcz.files.reading.views import picked_notes
 from mcz.model.clock import SAME_RATE, usual_step
 from mcz.model.motion import FrameNotes, Motion, Skeleton, Source
 from mcz.model.numbers.scaling import Scaling
@@ -90,17 +90,16 @@ def read_source(
         format=info.format,
         template=template,
         detail=bytes(fields.detail),
-        notes=_notes(container, source_format, signal, frames),
+        notes=_frame_notes(container, source_format, signal, frames),
         path=info.path,
         size=info.size,
         sha256=info.sha256,
     )
 
 
-def _notes(
+def _frame_notes(
     container: Container, source_format: Format, signal: SignalInfo, frames: range
 ) -> FrameNotes | None:
-    """The notes of ``frames``, numbered from 0."""
     if source_format.join_notes is None:
         return None
     base, parts = frames.start, []

@@ -1,10 +1,10 @@
-"""Views of a clip of which little is decoded: values to slice, and few frames as a preview."""
+"""Parts of a clip: values to slice, few frames as a preview, and every n-th frame."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -12,7 +12,9 @@ from numpy.typing import DTypeLike, NDArray
 from mcz.errors import OptionError
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.signal_reader import SignalReader
+from mcz.model.clock import numbers_or_rows
 from mcz.model.indexing import Rows, row_numbers
+from mcz.model.motion import Exceptions, FrameNotes, Motion, Signal
 from mcz.model.types import Values
 
 
@@ -114,7 +116,7 @@ def preview(
     ``columns`` are kept.
     """
     info = reader.info
-    frames, step = _frames(info, n_frames, reader.name)
+    frames, step = _preview_frames(info, n_frames, reader.name)
     per_frame = info.layout.samples_per_frame
     parts, masks = [], []
     for block in reader.blocks(info.skip, info.skip + n_frames):
@@ -132,7 +134,7 @@ def preview(
     return Preview(frames, values, None if valid.all() else valid, step)
 
 
-def _frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray[np.int64], int]:
+def _preview_frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray[np.int64], int]:
     """The frames that are shown, counted from the first of the clip, and how far apart they are."""
     codec = info.codec
     if codec.preview is not None:
@@ -148,3 +150,68 @@ def _frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray[np.int6
         )
     step = 2 ** (info.counts.n_resolutions - 1)
     return np.arange(0, n_frames, step, dtype=np.int64), step
+
+
+Item = TypeVar("Item", bound=np.generic)
+JoinNotes = Callable[[Sequence[tuple[int, int, bytes]]], FrameNotes]
+
+
+def decimated_rows(values: NDArray[Item], samples_per_frame: int, step: int) -> NDArray[Item]:
+    """The rows of frames 0, step, 2 * step, ...; ``values`` has samples_per_frame rows a frame."""
+    if samples_per_frame == 1:
+        return values[::step]
+    n_frames = len(values) // samples_per_frame
+    frames = values.reshape(n_frames, samples_per_frame, values.shape[1])[::step]
+    return frames.reshape(-1, values.shape[1])
+
+
+def decimated(motion: Motion, step: int) -> Motion:
+    """Frames 0, step, 2 * step, ... of ``motion``, with their numbers, at 1 / step of its rate.
+
+    Its source is left out.
+    """
+    numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
+    return replace(
+        motion,
+        signals=tuple(_decimated_signal(signal, step) for signal in motion.signals),
+        frame_rate=None if motion.frame_rate is None else motion.frame_rate / step,
+        frame_numbers=numbers[::step],
+        number_step=motion.number_step * step,
+        source=None,
+    )
+
+
+def _decimated_signal(signal: Signal, step: int) -> Signal:
+    per_frame = signal.samples_per_frame
+    frames, samples = np.divmod(signal.exceptions.rows, per_frame)
+    kept = np.flatnonzero(frames % step == 0)
+    n_frames = -(-signal.n_frames // step)
+    changes = {}
+    for row, channel, grid in sorted(signal.grid_changes, key=lambda change: change[0]):
+        frame = -(-(row // per_frame) // step)  # the first kept one that it holds for
+        if frame < n_frames:
+            changes[frame * per_frame, channel] = grid
+
+    def thin(values: NDArray[Item]) -> NDArray[Item]:
+        return decimated_rows(values, per_frame, step)
+
+    return replace(
+        signal,
+        values=thin(signal.values),
+        stored=thin(signal.stored),
+        mask=None if signal.mask is None else thin(signal.mask),
+        ordinals=None if signal.ordinals is None else thin(signal.ordinals),
+        exceptions=Exceptions(
+            frames[kept] // step * per_frame + samples[kept],
+            signal.exceptions.channels[kept],
+            tuple(signal.exceptions.texts[i] for i in kept),
+        ),
+        grid_changes=tuple((row, channel, grid) for (row, channel), grid in changes.items()),
+    )
+
+
+def picked_notes(join_notes: JoinNotes, notes: FrameNotes, frames: range) -> FrameNotes:
+    """The notes of some frames alone, numbered from 0."""
+    if frames.step == 1:
+        return notes.part(frames.start, frames.stop)
+    return join_notes([(i, i + 1, notes.cut(f, f + 1)) for i, f in enumerate(frames)])

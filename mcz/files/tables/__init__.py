@@ -5,7 +5,6 @@ xarray and pandas are imported when they are asked for.
 
 from __future__ import annotations
 
-from mcz.files.tables.frames import to_pandas
-from mcz.files.tables.labelled import to_xarray
+from mcz.files.tables.labelled import to_pandas, to_xarray
 
 __all__ = ["to_pandas", "to_xarray"]

@@ -1,4 +1,4 @@
-"""Tables of numbers as files, CSV and NPZ; docs/guides/tables.md describes them."""
+"""Tables of numbers and events as files, CSV and NPZ; docs/guides/tables.md describes them."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError
-from mcz.files.tables.arrays import pose_arrays
+from mcz.kinematics.frames import frame_poses_of
+from mcz.kinematics.poses import point_names, positions, rotations
 from mcz.model.clock import numbers_or_rows
 from mcz.model.motion import Channel, Joint, Motion, Skeleton
 from mcz.model.text_format import printable, spreadsheet_cell
-from mcz.model.types import Settings
+from mcz.model.types import Items, Settings
 
 DECIMALS = 12  # of times in a CSV
 
@@ -145,3 +146,104 @@ def to_npz(table: Table) -> bytes:
 
 
 EXPORTS: dict[str, Callable[[Table], bytes]] = {"csv": to_csv, "npz": to_npz}
+
+
+ABOUT = (
+    "MCZ arrays 1. World rotation of joint j in frame f: W[f, j] = W[f, parents[j]] R(quaternions"
+    "[f, j]), w first, active, column vectors; the identity in the rest pose. Its place: o[f, j] = "
+    "o[f, parents[j]] + W[f, parents[j]] translations[f, j]; for parents[j] = -1 without the first "
+    "term and W. Places of points are in positions, those of joint point_joints[p] at o[f, j] + "
+    "W[f, j] point_tails[p] where nothing is scaled. Lengths in units of unit_cm centimeters. "
+    "values are the channels as the file has them, called names; invalid where mask is False, and "
+    "what depends on them is NaN."
+)
+
+
+def pose_arrays(motion: Motion) -> dict[str, Items]:
+    """Skeleton, rotations, translations and positions of a motion, by name; see ``ABOUT``.
+
+    Rotations and places are left out where the skeleton has no kinematics.
+    """
+    skeleton = motion.skeleton
+    known: dict[str, Items] = {
+        "about": np.array(ABOUT),
+        "name": np.array(motion.name),
+        "joint_names": np.array(skeleton.joint_names, np.str_),
+        "parents": skeleton.parents,
+        "offsets": skeleton.offsets,
+        "unit_cm": np.array(np.nan if skeleton.unit_cm is None else skeleton.unit_cm),
+        "up_axis": np.array(skeleton.up_axis),
+        "forward_axis": np.array(skeleton.forward_axis),
+        "handedness": np.array(skeleton.handedness),
+        "angle_unit": np.array(skeleton.angle_unit),
+        "metadata_keys": np.array(list(motion.metadata), np.str_),
+        "metadata_values": np.array(list(motion.metadata.values()), np.str_),
+    }
+    try:
+        return known | _poses(motion)
+    except MotionError:  # plain scalars, or angles of an unknown unit
+        return known
+
+
+def _poses(motion: Motion) -> dict[str, Items]:
+    skeleton = motion.skeleton
+    poses = frame_poses_of(skeleton)
+    points = positions(motion)
+    joints = range(skeleton.n_joints)
+    values = np.asarray(motion.values, np.float64)
+    origins, world = poses.origins(values, joints), poses.world(values, joints)
+    translations = origins.copy()
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            step = origins[:, joint] - origins[:, parent]
+            translations[:, joint] = np.einsum("fji,fj->fi", world[:, parent], step)
+    return {
+        "quaternions": rotations(motion, "quat"),
+        "translations": translations,
+        "positions": points,
+        "point_names": np.array(point_names(skeleton), np.str_),
+        "point_joints": np.array(poses.joints_of(range(points.shape[1])), np.int64),
+        "point_tails": poses.tails(),
+    }
+
+
+TEXTS = ("label", "context", "subject", "description")
+
+
+class Event(Protocol):
+    """The part of a ``mcz.Event`` that a table shows: its time and ``TEXTS``."""
+
+    @property
+    def time(self) -> float: ...
+
+
+Events = Sequence[Event]
+
+
+def events_to_csv(events: Events) -> bytes:
+    """UTF-8 text: a header row, then a row an event; times in seconds, see ``mcz.times``.
+
+    Texts are escaped as in other tables.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time", *TEXTS])
+    for event in events:
+        texts = (spreadsheet_cell(printable(getattr(event, name))) for name in TEXTS)
+        writer.writerow([repr(event.time), *texts])
+    return text.getvalue().encode("utf-8", "surrogateescape")
+
+
+def events_to_npz(events: Events) -> bytes:
+    """A NumPy archive of times (float64, seconds), label, context, subject, description."""
+    buffer = io.BytesIO()
+    columns: Settings = {
+        name: np.array([getattr(event, name) for event in events], np.str_) for name in TEXTS
+    }
+    np.savez_compressed(
+        buffer, times=np.array([event.time for event in events], np.float64), **columns
+    )
+    return buffer.getvalue()
+
+
+EVENT_EXPORTS: dict[str, Callable[[Events], bytes]] = {"csv": events_to_csv, "npz": events_to_npz}

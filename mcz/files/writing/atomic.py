@@ -55,7 +55,7 @@ def replacing(target: Target, *, force: bool, inputs: Iterable[object] = ()) -> 
         raise OptionError("a folder; name the file in it", path=path)
     if not force and os.path.lexists(path):
         raise ExistsError("it exists", path=path, hint=Hint.FORCE)
-    with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:
+    with _write_in_place(path) if _is_special(path) else _temporary(path, force) as stream:
         yield stream
 
 
@@ -109,7 +109,7 @@ def _is_special(path: Path) -> bool:
 
 
 @contextmanager
-def _in_place(path: Path) -> Iterator[BinaryIO]:
+def _write_in_place(path: Path) -> Iterator[BinaryIO]:
     whole = io.BytesIO()
     yield whole
     try:
@@ -122,7 +122,7 @@ def _in_place(path: Path) -> Iterator[BinaryIO]:
 @contextmanager
 def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
     prefix = f".{path.name[:SHOWN]}."
-    _clear(path.parent, prefix)
+    _clear_leftovers(path.parent, prefix)
     stream, name = _locked_file(path, prefix)
     try:
         with stream:
@@ -158,8 +158,8 @@ def _locked_file(path: Path, prefix: str) -> tuple[BinaryIO, str]:
         stream.close()
 
 
-def _clear(folder: Path, prefix: str) -> None:
-    """Take away what writers of this name have left that were killed: nobody has locked it."""
+def _clear_leftovers(folder: Path, prefix: str) -> None:
+    """Delete temporary files of killed writers: nobody has locked them."""
     with suppress(OSError, ValueError):
         for entry in os.scandir(folder):
             named = entry.name.startswith(prefix) and entry.name.endswith(SUFFIX)
@@ -173,7 +173,7 @@ def _clear(folder: Path, prefix: str) -> None:
 def _give_name(name: str, path: Path, force: bool) -> None:
     """Rename ``name`` to ``path``; without ``force`` never over what has come there meanwhile."""
     try:
-        if not force and _linked(name, path):
+        if not force and _link(name, path):
             os.unlink(name)
         else:
             os.replace(name, path)
@@ -183,7 +183,7 @@ def _give_name(name: str, path: Path, force: bool) -> None:
         raise AccessError(reason_of(error), path=path) from None
 
 
-def _linked(name: str, path: Path) -> bool:
+def _link(name: str, path: Path) -> bool:
     """Make ``path`` a second name of the file; False where the file system has no such names.
 
     Raises FileExistsError, which a rename would not.
@@ -230,7 +230,6 @@ def _name(file: object) -> str:
 
 
 def _identity(file: object) -> object:
-    """The identity of a file; None for what is no file."""
     if isinstance(file, (str, os.PathLike)):
         path = os.fspath(file)
         if isinstance(path, str) and "://" in path:

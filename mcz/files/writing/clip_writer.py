@@ -86,11 +86,11 @@ class ClipCopy:
         for index, part in enumerate(coded):
             info = read_signal(container, row, record, index, motion.skeleton, motion.frame_rate)
             info = replace(info, own_codec=part.codec)
-            found.append(_decoded(container, info, motion.signals[index], part.lossy_channels()))
+            found.append(_decode(container, info, motion.signals[index], part.lossy_channels()))
         return found
 
 
-def _decoded(
+def _decode(
     container: Container, info: SignalInfo, signal: Signal, free: NDArray[np.bool_]
 ) -> Decoded:
     reader = SignalReader(container, info, None, 0, signal.name)
@@ -207,7 +207,7 @@ def write_plan(
     has the last word on it. ``copy`` decodes the clip before it ends.
     """
     motion, codec = plan.motion, plan.codec
-    record = _referred(writer, plan)
+    record = _write_references(writer, plan)
     copy = copy or ClipCopy(writer.profile)
     for model in plan.models:
         copy.writer.shared(ChunkType.MODL, model)
@@ -233,14 +233,14 @@ def begin_open_clip(writer: Writer, plan: ClipPlan, first_number: int = 1) -> No
 
     ``first_number`` is that of its first frame.
     """
-    record = _referred(writer, plan)
+    record = _write_references(writer, plan)
     record.flags |= payloads.OPEN_CLIP
     put_time_base(record, time_base_of(np.array([first_number], np.int64), None))
     writer.begin_clip(record)
 
 
-def _referred(writer: Writer, plan: ClipPlan) -> payloads.Clip:
-    """Write what CLIP refers to, and return the record."""
+def _write_references(writer: Writer, plan: ClipPlan) -> payloads.Clip:
+    """Write what CLIP refers to; return its record."""
     prepared, source = plan.prepared, plan.motion.source
     for model in plan.models:
         writer.shared(ChunkType.MODL, model)

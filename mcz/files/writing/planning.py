@@ -120,7 +120,7 @@ def with_true_sources(motion: Motion, *, lossless: bool) -> Motion:
         return motion
     if source.format not in FORMATS:
         raise MotionError(f"source format {source.format!r} is not one of {', '.join(FORMATS)}")
-    if source.sha256 and _facts(_restored(motion, lossless)) == (source.size, source.sha256):
+    if source.sha256 and _facts(_restore_source(motion, lossless)) == (source.size, source.sha256):
         return motion
     return with_source_hash(replace(motion, source=source.of_no_file()), lossless=lossless)
 
@@ -145,12 +145,12 @@ def with_source_hash(motion: Motion, *, lossless: bool) -> Motion:
     if motion.source is None or motion.source.sha256:
         return motion
     motion = stating_rate(motion)
-    size, digest = _facts(_restored(motion, lossless))
+    size, digest = _facts(_restore_source(motion, lossless))
     assert motion.source is not None
     return replace(motion, source=replace(motion.source, size=size, sha256=digest))
 
 
-def _restored(motion: Motion, lossless: bool) -> bytes:
+def _restore_source(motion: Motion, lossless: bool) -> bytes:
     assert motion.source is not None
     stored = as_stored(motion)
     signals = tuple(_as_read(signal, lossless) for signal in stored.signals)
@@ -228,7 +228,7 @@ def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile
     signals = tuple(
         _signal_plan(motion, index, codec, options, profile) for index in range(len(motion.signals))
     )
-    models = tuple(model for plan in signals for model in _models(plan.encoded, profile))
+    models = tuple(model for plan in signals for model in _model_payloads(plan.encoded, profile))
     return ClipPlan(Prepared(motion, prepared.skeletons), options, models, signals)
 
 
@@ -238,7 +238,7 @@ def plan_open_clip(
     """The plan of a clip of which no frame is known yet."""
     check("channels", prepared.motion.signals[0].n_channels, profile.channels)
     source = MemorySource(prepared.motion, 0, codec, profile.segment_bytes)
-    models = tuple(_models(encoded, profile))
+    models = tuple(_model_payloads(encoded, profile))
     return ClipPlan(prepared, options, models, (SignalPlan(source, codec, encoded),))
 
 
@@ -266,7 +266,7 @@ def _signal_plan(
     return SignalPlan(source, codec, codec.encode(source, options))
 
 
-def _models(encoded: Encoded, profile: Profile) -> Iterator[bytes]:
+def _model_payloads(encoded: Encoded, profile: Profile) -> Iterator[bytes]:
     """Models that a signal needs; well-known ones where all shall be in the file."""
     known = encoded.known if profile is LARGE else ()
     for model in (*encoded.models, *known):

@@ -1,13 +1,14 @@
 """Bounds of the signals beside the motion: coarser numbers, whose errors are measured.
 
-``analog.max_error=0.5mV`` asks for one. Each channel is put on a coarser number grid, or on fewer
-numbers of its own grid where its source can be written from that grid alone. Codec ``fast`` then
-codes it exactly, so that a decoder needs nothing new.
+``analog.max_error=0.5mV`` or ``1N,10Nmm`` asks for one. Each channel is put on a coarser number
+grid, or on fewer numbers of its own grid where its source can be written from that grid alone.
+Codec ``fast`` then codes it exactly, so that a decoder needs nothing new.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,12 +18,12 @@ from numpy.typing import NDArray
 from mcz.codecs.channel_size import channel_bytes
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError
-from mcz.files.writing.channel_limits import MAX_ERROR, MEAN_ERROR, limits_of
 from mcz.kinematics.metrics.comparison import named_signals, signal_errors
-from mcz.model.motion import Motion, Signal, Skeleton, Source
+from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal, Skeleton, Source
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.rules import MAX_SCALE, MIN_SCALE
 from mcz.model.types import JsonObject, Params
+from mcz.model.units import unit_ratio
 from mcz.sources import recording_of, with_analog_scales
 
 Floats = NDArray[np.float64]
@@ -69,7 +70,7 @@ def with_bounds(motion: Motion, codec: Codec, params: Params) -> tuple[Motion, d
             _limits(motion.skeleton, given, f"{name}.{error}", asked)
             for error in (MAX_ERROR, MEAN_ERROR)
         ]
-        motion, found = _coarser(motion, given, *limits)
+        motion, found = _coarsen(motion, given, *limits)
         signals[numbers[name]] = found
         errors = signal_errors(motion.skeleton, given, found)
         figures = {"mse": errors.mse, MAX_ERROR: errors.greatest, MEAN_ERROR: errors.mean}
@@ -111,19 +112,18 @@ class Column:
         numbers = np.where(self.kept, self.numbers, numbers + 0.0)  # no -0
         with np.errstate(all="ignore"):
             found = replace(self, grid=grid, numbers=numbers, values=self.meant(numbers))
-        return found if self.kept.any() <= _keeps(self.grid, grid) else None
+        return found if self.kept.any() <= _can_hold(self.grid, grid) else None
 
     def size(self) -> int:
         """The bytes that it takes alone."""
         return channel_bytes(self.grid.ordinals(self.numbers)[0], self.grid)
 
 
-def _keeps(old: Grid, new: Grid) -> bool:
-    """True where any number of one grid can stand among those of another."""
+def _can_hold(old: Grid, new: Grid) -> bool:
     return old == new or (old.is_text and new.is_text) or new.kind == GridKind.BINARY32
 
 
-def _coarser(
+def _coarsen(
     motion: Motion, signal: Signal, greatest: Floats, mean: Floats
 ) -> tuple[Motion, Signal]:
     """The signal within these bounds of each channel, and the motion with a source of it."""
@@ -131,7 +131,9 @@ def _coarser(
     of_c3d = recording_of(motion.source) is not None
     rescales = of_c3d and signal.role == "analog" and _states_scales(motion.source, given)
     found = [
-        _within(column, most, average, SourceRules(motion.source is not None, of_c3d, rescales))
+        _coarsen_column(
+            column, most, average, SourceRules(motion.source is not None, of_c3d, rescales)
+        )
         for column, most, average in zip(given, greatest.tolist(), mean.tolist(), strict=True)
     ]
     scales = {c: new.scale for c, new in enumerate(found) if new.scale != given[c].scale}
@@ -197,7 +199,7 @@ class SourceRules:
     rescales: bool
 
 
-def _within(column: Column, greatest: float, mean: float, rules: SourceRules) -> Column:
+def _coarsen_column(column: Column, greatest: float, mean: float, rules: SourceRules) -> Column:
     """The column on the coarsest numbers within the bounds, or as it is where none is smaller."""
     unit = abs(column.scale * column.general)
     most = 2 * greatest
@@ -205,7 +207,7 @@ def _within(column: Column, greatest: float, mean: float, rules: SourceRules) ->
     for _ in range(TRIALS):
         if not 0 < step < math.inf or not 0 < unit < math.inf or column.kept.all():
             break
-        found = _rounded(column, step, unit, rules)
+        found = _round_column(column, step, unit, rules)
         reached = math.inf if found is None else _mean_error(column, found, greatest)
         if found is not None and reached < math.inf and reached <= mean * (1 - 1e-9):
             if reached >= least:
@@ -238,7 +240,7 @@ def is_within(given: Floats, found: Floats, bound: float) -> Bools:
         return np.asarray((np.abs(error) < bound) | at_bound)
 
 
-def _rounded(column: Column, step: float, unit: float, rules: SourceRules) -> Column | None:
+def _round_column(column: Column, step: float, unit: float, rules: SourceRules) -> Column | None:
     """The column on numbers ``step`` apart, in its unit; None where there are none such."""
     kind, numbers, own = column.grid.kind, column.numbers, step / unit
     with np.errstate(all="ignore"):
@@ -251,7 +253,7 @@ def _rounded(column: Column, step: float, unit: float, rules: SourceRules) -> Co
         if kind == GridKind.INTEGER:
             own = 2 * math.floor(own / 2) + 1.0
         if rules.of_c3d:
-            return _rescaled(column, own) if rules.rescales and kind == GridKind.INTEGER else None
+            return _rescale(column, own) if rules.rescales and kind == GridKind.INTEGER else None
         own *= 1 - 2.0**-40 if kind != GridKind.INTEGER else 1  # for the rounding of products
         if column.kept.any() and kind != GridKind.INTEGER:
             return _on_floats(column, Grid(GridKind.BINARY32), own)
@@ -271,7 +273,7 @@ def _on_floats(column: Column, grid: Grid, step: float) -> Column | None:
     return column.on(grid, grid.values(grid.ordinals(np.rint(numbers / unit) * unit)[0]))
 
 
-def _rescaled(column: Column, step: float) -> Column | None:
+def _rescale(column: Column, step: float) -> Column | None:
     """Words of a converter that is coarser by ``step``, which the source then states."""
     scale = float(np.float32(column.scale * step))
     if step < 2 or not math.isfinite(scale):
@@ -279,3 +281,63 @@ def _rescaled(column: Column, step: float) -> Column | None:
     words = np.rint((column.numbers - column.offset) * (column.scale / scale)) + column.offset
     found = replace(column, scale=scale)
     return replace(found, numbers=words, values=found.meant(words))
+
+
+MAX_ERROR, MEAN_ERROR = "max_error", "mean_error"
+_BOUND = re.compile(r"([0-9.]+(?:[eE][-+]?[0-9]+)?) ?([^\s0-9.,].*)?")
+LENGTHS = (*POSITION_KINDS, "length")
+
+
+def parse_bound(key: str, text: str) -> tuple[float, str]:
+    """A bound and its unit, "" for the channel's own; raises OptionError.
+
+    >>> parse_bound("analog.max_error", "0.5 mV"), parse_bound("analog.max_error", "2")
+    ((0.5, 'mV'), (2.0, ''))
+    """
+    match = _BOUND.fullmatch(text.strip())
+    try:
+        size = float(match[1]) if match else math.nan
+    except ValueError:
+        size = math.nan
+    if match is None or not 0 <= size < math.inf:
+        raise OptionError(f"{key} is {text!r}, not a number and perhaps a unit, such as 0.5mV")
+    return size, match[2] or ""
+
+
+def limits_of(
+    skeleton: Skeleton, channels: Sequence[Channel], key: str, text: object
+) -> NDArray[np.float64]:
+    """The limit of each channel in its own unit: the first of the bounds in ``text`` that fits it.
+
+    Raises OptionError for a channel that none fits.
+    """
+    bounds = [parse_bound(key, one) for one in str(text).split(",")]
+    found = []
+    for number, channel in enumerate(channels):
+        ratios = [(size, _ratio(skeleton, channel, unit) if unit else 1.0) for size, unit in bounds]
+        fitting = [size * ratio for size, ratio in ratios if ratio is not None]
+        if not fitting:
+            units = " and ".join(unit for _, unit in bounds)
+            own = _unit_of(skeleton, channel)
+            raise OptionError(
+                f"{key}: channel {channel.label or number} is in {own or 'no unit that is known'}, "
+                f"which {units} does not fit; several bounds may be given, such as 1N,10Nmm,5"
+            )
+        found.append(fitting[0])
+    return np.array(found)
+
+
+def _unit_of(skeleton: Skeleton, channel: Channel) -> str:
+    if channel.kind in ANGLE_KINDS:
+        return skeleton.angle_unit
+    if channel.kind in LENGTHS:
+        return "" if skeleton.unit_cm is None else f"{skeleton.unit_cm:g} cm"
+    return channel.unit
+
+
+def _ratio(skeleton: Skeleton, channel: Channel, unit: str) -> float | None:
+    """The size of ``unit`` in that of the channel; None where it does not fit."""
+    if channel.kind not in LENGTHS:
+        return unit_ratio(unit, _unit_of(skeleton, channel))
+    ratio = unit_ratio(unit, "cm")
+    return None if ratio is None or skeleton.unit_cm is None else ratio / skeleton.unit_cm

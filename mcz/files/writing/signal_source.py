@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Layout
-from mcz.container import note_records, payloads
-from mcz.container.masks import build_mask
+from mcz.container import payloads
+from mcz.container.segments import GridChange, GroupNotes, OddToken, build_mask
 from mcz.errors import MotionError
 from mcz.files.reading.signal_info import parse_groups
 from mcz.model.motion import Exceptions, Motion, Signal
@@ -103,19 +103,19 @@ class MemorySource:
         changed = [c for c, grid in enumerate(signal.grids) if grid != self.layout.grids[c]]
         if not changed and not len(signal.exceptions):
             return []
-        notes = [note_records.GroupNotes() for _ in self.layout.groups]
+        notes = [GroupNotes() for _ in self.layout.groups]
         groups = enumerate(self.layout.groups)
         where = {c: (g, column) for g, group in groups for column, c in enumerate(group)}
         for channel in changed:
             group, column = where[channel]
-            change = note_records.GridChange(channel=column, grid=signal.grids[channel])
+            change = GridChange(channel=column, grid=signal.grids[channel])
             notes[group].grid_changes.append(change)
         before = [0] * len(notes)
         found = signal.exceptions
         for number, channel, text in zip(found.rows, found.channels, found.texts, strict=True):
             group, column = where[int(channel)]
             row = int(number) - before[group]
-            odd = note_records.OddToken(row=row, channel=column, text=text)
+            odd = OddToken(row=row, channel=column, text=text)
             notes[group].exceptions.append(odd)
             before[group] = int(number)
         return [build(n, "group notes") if n.grid_changes or n.exceptions else b"" for n in notes]
@@ -137,7 +137,6 @@ def _with_exceptions_of(signal: Signal, channels: Sequence[int]) -> Signal:
 
 
 def _freed(signal: Signal, channels: Sequence[int]) -> Signal:
-    """``signal`` with the grids of these channels alone: others may have any value."""
     free = Grid(GridKind.BINARY64)
     return replace(
         signal,
@@ -156,7 +155,7 @@ def as_stored(motion: Motion) -> Motion:
         return motion
     told = recording_of(motion.source)
     if told is None:
-        return replace(motion, signals=tuple(map(_in_units, motion.signals)))
+        return replace(motion, signals=tuple(map(_store_units, motion.signals)))
     for signal in motion.signals:
         if signal.scaling is not None and not signal.scaling.says(told.scaling):
             raise MotionError(
@@ -165,8 +164,7 @@ def as_stored(motion: Motion) -> Motion:
     return replace(motion, signals=tuple(signal.as_stored() for signal in motion.signals))
 
 
-def _in_units(signal: Signal) -> Signal:
-    """The signal with its values as what is stored, binary64."""
+def _store_units(signal: Signal) -> Signal:
     if signal.scaling is None:
         return signal
     return Signal(
@@ -188,7 +186,7 @@ def settle(signal: Signal) -> Block:
             raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
         return signal.values.astype(np.int64, copy=False), signal
     if len(signal.exceptions):
-        signal = replace(signal, exceptions=_holding(signal))
+        signal = replace(signal, exceptions=_valid_exceptions(signal))
     ordinals, exact = signal.to_ordinals()
     exact[signal.exceptions.rows, signal.exceptions.channels] = True
     if not exact.all():
@@ -199,7 +197,7 @@ def settle(signal: Signal) -> Block:
     return ordinals, signal
 
 
-def _holding(signal: Signal) -> Exceptions:
+def _valid_exceptions(signal: Signal) -> Exceptions:
     """The exceptions that still spell the value at their row and channel."""
     old = signal.exceptions
     meant, bad = values_of_texts(old.texts)

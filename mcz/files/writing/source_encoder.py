@@ -120,7 +120,7 @@ class SourceEncoder:
         given = self._given_skeleton(data)
         try:
             with transaction.step():
-                result = self._parsed(transaction.writer, data, given, progress)
+                result = self._parse(transaction.writer, data, given, progress)
         except (SourceError, MotionError, LimitError) as error:
             if not self.options.verbatim:
                 raise
@@ -139,7 +139,7 @@ class SourceEncoder:
         self.inputs.append(Path(given))
         return read_skeleton(given)
 
-    def _parsed(self, writer: Writer, data: bytes, given: Given, progress: Progress | None) -> str:
+    def _parse(self, writer: Writer, data: bytes, given: Given, progress: Progress | None) -> str:
         source_format = format_of(self.path, data)
         if source_format.is_skeleton:
             self.notes = tuple(filter(None, [content_note(self.path, source_format)]))
@@ -148,7 +148,7 @@ class SourceEncoder:
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
         taken = take(self.path, given, self.options.unit, data, flat=self.options.flat)
-        self._note(taken)
+        self._keep_notes(taken)
         motion = self.options.applied_to(taken.motion)
         notes = rate_notes(taken.motion.frame_rate, self.options)
         self.notes += tuple(filter(None, [*notes, height_note(motion.skeleton)]))
@@ -158,13 +158,12 @@ class SourceEncoder:
         codec, params = self.encoding.found, self.encoding.params
         if not codec.lossless:  # the file does not come back: what comes states its rate
             motion = stating_rate(motion)
-        base = None if taken.skeleton is None else self._stored(taken.skeleton)
+        base = None if taken.skeleton is None else self._store_skeleton(taken.skeleton)
         prepared = prepare(motion, codec, params, read_with(motion.skeleton, base))
         self.quality = write_motion(writer, prepared, codec, params, progress)
         return "parsed"
 
-    def _note(self, taken: Taken) -> None:
-        """Keep what was noticed, for those who asked for the file to be taken."""
+    def _keep_notes(self, taken: Taken) -> None:
         self.remark = taken.remark
         keys = ("source-note", *(() if taken.skeleton is not None else (NOTE,)))
         found = (taken.motion.metadata.get(key, "") for key in keys)
@@ -172,7 +171,7 @@ class SourceEncoder:
         if taken.chosen is not None and taken.chosen.path is not None:
             self.inputs.append(taken.chosen.path)
 
-    def _stored(self, skeleton: Skeleton) -> StoredSkeleton:
+    def _store_skeleton(self, skeleton: Skeleton) -> StoredSkeleton:
         """The skeleton of an ASF, under its own name where that is kept."""
         if not self.options.keep_skeleton:
             return StoredSkeleton(skeleton)

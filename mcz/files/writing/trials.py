@@ -22,9 +22,9 @@ from mcz.container.source import open_source
 from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.sizes import clip_sizes
-from mcz.files.writing.channel_limits import MEAN_ERROR
 from mcz.files.writing.clip_writer import file_in_memory
 from mcz.files.writing.planning import Prepared
+from mcz.files.writing.signal_bounds import MEAN_ERROR
 from mcz.kinematics import positions_of
 from mcz.kinematics.joint_groups import find_joints
 from mcz.kinematics.metrics import Comparison, compare
@@ -102,7 +102,7 @@ class Trials:
 
         It is that of positions in cm, unless ``target`` is one of channels.
         """
-        clip = self._written(self.alone, found)[1]
+        clip = self._write_trial(self.alone, found)[1]
         unit, decoded = self.motion.skeleton.unit_cm, clip.motion()
         if target.weights is not None:
             errors = self._weighed_errors(target.weights, decoded)
@@ -125,7 +125,7 @@ class Trials:
 
         0 for one that has no point.
         """
-        decoded = self._written(self.alone, found)[1].motion()
+        decoded = self._write_trial(self.alone, found)[1].motion()
         figures = compare(self.alone, decoded, virtual_markers=False, shell_cm=None).by_joint
         unit = self.motion.skeleton.unit_cm
         return np.array([(figure.mean_position_error or 0.0) * (unit or 0.0) for figure in figures])
@@ -140,7 +140,7 @@ class Trials:
             errors: Floats = channel_errors(self.motion.skeleton, signal, given, found) * weights
         return errors
 
-    def _written(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
+    def _write_trial(self, motion: Motion, found: Params) -> tuple[Container, Clip]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ContactWarning)  # that of the clip itself counts
             params = {**self.params, **self.kept, **found}
@@ -152,7 +152,7 @@ class Trials:
         return container, clip
 
     def _measure(self, motion: Motion, target: Target, found: Params) -> float:
-        container, clip = self._written(motion, found)
+        container, clip = self._write_trial(motion, found)
         if target.weights is not None:
             errors = self._weighed_errors(target.weights, clip.motion())
             n = np.isfinite(errors).sum(axis=0) if target.name == MEAN_ERROR else 1
@@ -197,7 +197,7 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict
             if not (errors > target.limit).any():
                 reached = float(errors.max(initial=0.0))
                 return found, {"target_reached": repr(reached)}
-            octaves = _refined(octaves, errors / target.limit)
+            octaves = _refine(octaves, errors / target.limit)
         missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
         step = max(step * FINER, dial.low)
     raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
@@ -241,7 +241,7 @@ def averaged(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dic
     return {dial.parameter: 2.0 ** (met / 4)}, {"target_reached": repr(reached)}
 
 
-def _refined(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
+def _refine(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
     """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and beside it."""
     with np.errstate(divide="ignore"):
         missing = np.where(ratios > 1, np.ceil(np.log2(ratios) + MARGIN), 0.0).astype(np.int64)

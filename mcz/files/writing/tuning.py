@@ -18,10 +18,16 @@ from mcz.codecs.parameters import Dial
 from mcz.container.limits import Profile
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
-from mcz.files.writing.channel_limits import MAX_ERROR, MEAN_ERROR, limits_of, parse_bound
 from mcz.files.writing.clip_writer import Amend, write_plan
 from mcz.files.writing.planning import Prepared, asked, check_bones, plan_clip
-from mcz.files.writing.signal_bounds import of_codec, with_bounds
+from mcz.files.writing.signal_bounds import (
+    MAX_ERROR,
+    MEAN_ERROR,
+    limits_of,
+    of_codec,
+    parse_bound,
+    with_bounds,
+)
 from mcz.files.writing.trials import (
     QUALITY,
     REFINEMENT,
@@ -97,7 +103,7 @@ def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Fou
     if limits:
         found, remarks = _with_quality(codec, target, trial, limits)
     else:
-        found, remarks = _meet(codec, target, trial)
+        found, remarks = _meet_target(codec, target, trial)
     return {**trial.params, **trial.kept, **found}, remarks
 
 
@@ -119,7 +125,7 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
     _check_unit(trial.motion, QUALITY)
     weights: JsonObject = {}
     for _ in range(MOST_TURNS):
-        found, remarks = _meet(codec, target, trial.given(weights))
+        found, remarks = _meet_target(codec, target, trial.given(weights))
         weights, kept = weighted(codec.dial, trial, limits, {**found, **weights})
         both = {**found, **weights}
         if target is None or trial.figure(target, both) <= target.limit:
@@ -128,7 +134,7 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
     raise OptionError(f"{QUALITY} and {name} cannot both be kept")
 
 
-def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
+def _meet_target(codec: Codec, target: Target | None, trial: Trials) -> Found:
     assert codec.dial is not None
     if target is None:
         return {}, {}
@@ -138,7 +144,7 @@ def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
         return bounded(codec.dial, target, trial)
     if target.weights is not None and codec.has(LIMITS):
         return averaged(codec.dial, target, trial)
-    return _searched(codec.dial, target, trial)
+    return _search_dial(codec.dial, target, trial)
 
 
 def _check_unit(motion: Motion, name: str) -> None:
@@ -157,7 +163,7 @@ def _check_places(motion: Motion, dial: Dial, target: Target) -> None:
         ) from error
 
 
-def _searched(dial: Dial, target: Target, trial: Trials) -> Found:
+def _search_dial(dial: Dial, target: Target, trial: Trials) -> Found:
     setting, reached, ended = search(dial, target, trial)
     remarks = {"target_reached": repr(reached)}
     if reached < PROMISED * target.limit:
@@ -214,13 +220,13 @@ def search(
     if ended:
         return *meets, True
     for _ in range(MOST_TRIALS):
-        if meets[1] >= GOAL * target.limit or _neighboring(dial, meets[0], misses[0]):
+        if meets[1] >= GOAL * target.limit or _is_neighbor(dial, meets[0], misses[0]):
             break
         setting = _between(meets, misses, target.limit)
         if dial.whole:  # strictly between the two
             low, high = sorted((meets[0], misses[0]))
             setting = min(max(round(setting), low + 1), high - 1)
-        found = setting, _figure(dial, measured, target, setting)
+        found = setting, _measure_figure(dial, measured, target, setting)
         if found[1] <= target.limit:
             meets = found
         else:
@@ -228,11 +234,11 @@ def search(
     met = (point for point in reversed(tried) if point[1] <= target.limit)
     best = max(met, key=itemgetter(1))
     if best[1] < PROMISED * target.limit:
-        best = _beside(best, dial, target, measure)
+        best = _search_beside(best, dial, target, measure)
     return *best, False
 
 
-def _beside(
+def _search_beside(
     best: Point, dial: Dial, target: Target, measure: Callable[[Target, float], float]
 ) -> Point:
     """A setting beside ``best`` that keeps the promise, or else the best of all."""
@@ -243,7 +249,7 @@ def _beside(
             beside = (middle + power, middle - power)
         for setting in beside:
             if dial.low <= setting <= dial.high:
-                found = setting, _figure(dial, measure, target, setting)
+                found = setting, _measure_figure(dial, measure, target, setting)
                 if found[1] <= target.limit:
                     best = max(best, found, key=itemgetter(1))
         if best[1] >= PROMISED * target.limit:
@@ -255,8 +261,8 @@ def _bracket(
     dial: Dial, target: Target, measure: Callable[[Target, float], float]
 ) -> tuple[Point, Point, bool]:
     guessed = dial.guess and dial.guess(target.name, target.limit)
-    setting = _fitting(dial, guessed or 1.0)
-    found = setting, _figure(dial, measure, target, setting)
+    setting = _fit_range(dial, guessed or 1.0)
+    found = setting, _measure_figure(dial, measure, target, setting)
     first_meets = found[1] <= target.limit
     falls = target.falls != dial.rises  # as the dial goes up
     upwards = first_meets != falls  # where the other side of the target lies
@@ -271,16 +277,16 @@ def _bracket(
                 f"gives {found[1]:g}"
             )
         moved = setting * factor if upwards else setting / factor
-        setting = end if same == SAME else _fitting(dial, moved)
+        setting = end if same == SAME else _fit_range(dial, moved)
         factor = min(factor * 2, 2.0**8)
-        other = setting, _figure(dial, measure, target, setting)
+        other = setting, _measure_figure(dial, measure, target, setting)
         if (other[1] <= target.limit) != first_meets:
             return (found, other, False) if first_meets else (other, found, False)
         same = same + 1 if other[1] == found[1] else 1
         found = other
 
 
-def _figure(
+def _measure_figure(
     dial: Dial, measure: Callable[[Target, float], float], target: Target, setting: float
 ) -> float:
     """The figure of a setting; one that the codec refuses as too fine has no bound on its size."""
@@ -294,12 +300,11 @@ def _figure(
         raise
 
 
-def _fitting(dial: Dial, setting: float) -> float:
+def _fit_range(dial: Dial, setting: float) -> float:
     return min(max(round(setting) if dial.whole else setting, dial.low), dial.high)
 
 
-def _neighboring(dial: Dial, a: float, b: float) -> bool:
-    """Return True if no setting between two would be more precise."""
+def _is_neighbor(dial: Dial, a: float, b: float) -> bool:
     return _ratio(a, b) < CLOSE or (dial.whole and abs(a - b) <= 1)
 
 

@@ -15,7 +15,7 @@ from mcz.container import payloads
 from mcz.container.copies import Copy
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
-from mcz.container.metadata_keys import KEYS, PRIVATE
+from mcz.container.metadata import KEYS, PRIVATE
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import MczError, MotionError, SourceError

@@ -31,7 +31,7 @@ from mcz.container.chunks import (
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
 from mcz.container.index import index_record
 from mcz.container.index_reader import named, place_of
-from mcz.container.limits import BASE, Profile
+from mcz.container.limits import BASE, FORMAT_NAME, Profile
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -43,7 +43,6 @@ from mcz.container.packets import (
 )
 from mcz.container.segments import FRESH, MASKS, SegmentHeader, build_segment, mask_of
 from mcz.container.value_hash import canonical, value_hash
-from mcz.container.versions import FORMAT_NAME
 from mcz.container.writer import Writer
 from mcz.files.writing.clip_writer import ClipCopy, Decoded, write_plan
 from mcz.files.writing.planning import Prepared, SignalPlan, plan_clip

@@ -13,7 +13,7 @@ from mcz.codecs.posewave.header import PosewaveHeader
 from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.codecs.wavelet.wavelet import WaveletHeader
-from mcz.container import index_records, note_records, payloads
+from mcz.container import index_records, payloads, segments
 from mcz.container.dictionary_deflate import decoded, words
 from mcz.container.index_records import Index
 from mcz.model.schema import (
@@ -148,7 +148,7 @@ VIEWS: dict[str, View] = {
 }
 STREAMS: dict[str, type[Record] | None] = {
     "DATA": None,
-    "NOTES": note_records.GroupNotes,
+    "NOTES": segments.GroupNotes,
     "ROWS": notes.Notes,
 }
 

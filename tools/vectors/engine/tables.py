@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.cli.conformance import answer
-from mcz.container.versions import FORMAT_NAME
+from mcz.container.limits import FORMAT_NAME
 from tools.vectors.bases import Base, base_bytes, base_of
 from tools.vectors.build.files import OK, REFUSED, Vector, arrays, partial
 from tools.vectors.engine.coded import CLIP_KEYS, coded_file
