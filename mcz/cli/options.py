@@ -216,14 +216,15 @@ def up_option(what: str) -> Callable[[Function], Function]:
 
 
 ARRAYS = ("positions", "rotation-vectors", "quaternions-wxyz", "quaternions-xyzw")
+ROBOTS = ("unitree-g1-29", "unitree-g1-23", "unitree-h1", "unitree-h1-2", "booster-t1")
 
 
 def arrays_option(function: Function) -> Function:
     """``--arrays``, as the argument ``arrays`` of ``mcz.read`` and ``mcz.encode``."""
     return click.option(
         "--arrays",
-        type=click.Choice(ARRAYS),
-        help="Set the meaning of the numbers of a plain .npy or .npz.",
+        type=click.Choice((*ARRAYS, *ROBOTS)),
+        help="Set the meaning of the numbers of a plain .npy or .npz, or name a robot's columns.",
     )(function)
 
 

@@ -141,7 +141,7 @@ FORMATS: dict[str, Format] = {
             Format(
                 name,
                 format_id,
-                (f".{name if kind else 'csv'}",),
+                (f".{name}",) if kind else (".csv", ".tsv"),
                 _of(module, f"read{kind}"),
                 _of(module, f"write{kind}"),
                 _of("tables.notes", "join_table_notes"),

@@ -13,6 +13,7 @@ from mcz.model.motion import Motion, Skeleton
 from mcz.model.units import facing, in_unit, unit_cm_of
 from mcz.sources import FORMATS, HEAD_BYTES, Format, format_of, has_known_suffix, likely_formats
 from mcz.sources.arrays.kinds import kinds_of, with_kinds
+from mcz.sources.tables.motion_bids import MOTION_SUFFIX, with_side_files
 
 
 def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
@@ -49,6 +50,8 @@ def read_source(
     """The motion in the bytes ``data`` of the file ``path``."""
     arguments = (skeleton,) if source_format.wants_skeleton else ()
     motion: Motion = _read_with(path, source_format.read, data, path.stem, *arguments)
+    if path.name.endswith(MOTION_SUFFIX):
+        motion = with_side_files(motion, path)
     if note := content_note(path, source_format):
         notes = filter(None, (note, motion.metadata.get("source-note", "")))
         metadata = dict(motion.metadata) | {"source-note": "; ".join(notes)}

@@ -13,6 +13,15 @@ from mcz.sources.tables.times import UNITS, rate_of_times
 
 TIMES = ("time", "times", "timestamp", "timestamps")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
+JOINT_NAMES = ("joint_names", "dof_names")
+BODY_NAMES = ("body_names", "link_names")
+JOINTS = {  # arrays of robots that have a column for each joint, and their units
+    "joint_pos": "rad",
+    "dof_pos": "rad",
+    "dof": "rad",
+    "joint_vel": "rad/s",
+    "dof_vel": "rad/s",
+}
 SHAPE = "betas"  # numbers of a body, of which it is said how many there are
 LONGEST = 200  # characters of a word
 EVEN = 1e-6  # of a step: times that are off by less are uniform
@@ -77,6 +86,31 @@ def facts_of(arrays: Sequence[Array]) -> dict[str, str]:
     return facts
 
 
+def names_of(arrays: Sequence[Array], keys: Sequence[str]) -> tuple[str, ...]:
+    """The texts of the first array that has one of the names ``keys``, () where there is none."""
+    for array in arrays:
+        if array.name in keys and array.words is None and len(array.head.shape) == 1:
+            code = array.head.code
+            size = int(code[1:]) * (4 if code[0] == "U" else 1) if code[:1] in ("U", "S") else 0
+            if size and size * array.head.shape[0] <= len(array.text):
+                parts = [array.text[k : k + size] for k in range(0, len(array.text), size)]
+                texts = [_decoded(part, array) for part in parts[: array.head.shape[0]]]
+                return tuple(text for text in texts if text) if all(texts) else ()
+    return ()
+
+
+def _decoded(data: bytes, array: Array) -> str | None:
+    """A text of an array of texts, None where it is empty or not printable."""
+    encoding = "utf-8"
+    if array.head.code[0] == "U":
+        encoding = "utf-32-be" if array.head.big_endian else "utf-32-le"
+    try:
+        text = data.decode(encoding).rstrip("\0")
+    except UnicodeDecodeError:
+        return None
+    return text if text.isprintable() and text else None
+
+
 def _text(array: Array) -> str | None:
     """A single word or number as text, None of all else."""
     if array.words is not None:
@@ -85,11 +119,5 @@ def _text(array: Array) -> str | None:
         return str(array.words.ravel()[0].item())
     if array.head.code[:1] not in ("U", "S") or np.prod(array.head.shape, dtype=np.float64) != 1:
         return None
-    encoding = "utf-8"
-    if array.head.code[0] == "U":
-        encoding = "utf-32-be" if array.head.big_endian else "utf-32-le"
-    try:
-        text = array.text[: 4 * LONGEST].decode(encoding).rstrip("\0")
-    except UnicodeDecodeError:
-        return None
-    return text if text.isprintable() and 0 < len(text) <= LONGEST else None
+    text = _decoded(array.text[: 4 * LONGEST], array)
+    return text if text and len(text) <= LONGEST else None

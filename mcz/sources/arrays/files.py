@@ -11,7 +11,7 @@ from mcz.sources.arrays.columns import unfit, words_of
 from mcz.sources.arrays.header import Head, read_head, refuse_odd
 
 LARGE = 1024  # bytes of an array: that a larger one is kept is said
-MAX_TEXT = 4096  # bytes of an array of text that are looked at
+MAX_TEXT = 2**16  # bytes of an array of text that are looked at
 DEFLATED = "deflated, which differs between builds"
 STAYS = "and stays so, since deflate differs between builds (numpy.savez stores)"
 

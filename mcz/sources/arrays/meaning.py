@@ -17,7 +17,16 @@ from mcz.model.clock import times_fault
 from mcz.model.motion import Channel, Joint, Skeleton
 from mcz.model.types import Items
 from mcz.sources.arrays.body import Body, body_of
-from mcz.sources.arrays.facts import SHAPE, TIMES, facts_of, rate_of
+from mcz.sources.arrays.facts import (
+    BODY_NAMES,
+    JOINT_NAMES,
+    JOINTS,
+    SHAPE,
+    TIMES,
+    facts_of,
+    names_of,
+    rate_of,
+)
 from mcz.sources.arrays.files import DEFLATED, STAYS, Array
 
 MAX_PER_FRAME = 1000  # rows a frame of an array that is longer than the motion
@@ -73,8 +82,8 @@ def meaning_of(arrays: Sequence[Array]) -> Meaning:
             continue
         place = len(meaning.parts), range(array.numbers.shape[1])
         meaning.places[index] = place
-        channels, role = _channels(array), ""
-        if per_frame == 1 and channels[0].unit and not meaning.has_times:
+        channels, role = _channels(array, arrays), ""
+        if per_frame == 1 and channels[0].unit == "s" and not meaning.has_times:
             fault = times_fault(array.numbers[:, 0].astype(np.float64))
             role = "" if fault else "times"
             meaning.notes += [f"the times do not count: {fault}"] if fault else []
@@ -112,19 +121,34 @@ def _reasons(arrays: Sequence[Array]) -> list[str]:
 
 
 def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> None:
-    """Add the array that is the motion: of the most axes, the first of several."""
+    """Add the array that is the motion: joint angles of a robot, else that of the most axes.
+
+    It is the first of several.
+    """
     fit = [
-        (min(len(array.head.shape), 3), -index)
+        (_is_robot(array), min(len(array.head.shape), 3), -index)
         for index, array in enumerate(arrays)
         if not array.kept and array.n_rows == n_frames and array.name not in TIMES
     ]
     if not fit:
         raise SourceError("; ".join((f"no array of {n_frames} frames", *_reasons(arrays))))
-    index = -max(fit)[1]
+    index = -max(fit)[2]
     array = arrays[index]
     meaning.parts.append(Part("motion", [array.numbers], role="motion"))
     meaning.places[index] = 0, range(array.numbers.shape[1])
-    meaning.skeleton = Skeleton(plain_joints(array.head.shape[1:], array.name), angle_unit="")
+    joints = plain_joints(array.head.shape[1:], array.name)
+    if _is_robot(array):
+        channel = Channel("", "value", JOINTS[array.name])
+        names = names_of(arrays, JOINT_NAMES)
+        if len(names) != len(joints):
+            names = tuple(joint.name for joint in joints)
+        joints = tuple(Joint(name, channels=(channel,)) for name in names)
+    meaning.skeleton = Skeleton(joints, angle_unit="")
+
+
+def _is_robot(array: Array) -> bool:
+    """Return True for the joint angles of a robot, a column for each joint."""
+    return JOINTS.get(array.name) == "rad" and len(array.head.shape) == 2
 
 
 def plain_joints(inner: Sequence[int], name: str) -> tuple[Joint, ...]:
@@ -143,9 +167,15 @@ def labels(inner: Sequence[int]) -> list[str]:
     return [" ".join(map(str, indices)) for indices in product(*map(range, inner))]
 
 
-def _channels(array: Array) -> tuple[Channel, ...]:
-    """The channels of a signal of its own."""
+def _channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...]:
+    """The channels of a signal of its own, named by the joints or bodies that ``arrays`` list."""
     inner = array.head.shape[1:]
+    joints, bodies = (names_of(arrays, keys) for keys in (JOINT_NAMES, BODY_NAMES))
+    if array.name in JOINTS and inner == (len(joints),):
+        return tuple(Channel("", name, JOINTS[array.name]) for name in joints)
+    if array.name.startswith("body_") and inner[:1] == (len(bodies),):
+        ends = [f" {label}".rstrip() for label in labels(inner[1:])]
+        return tuple(Channel("", name + end) for name in bodies for end in ends)
     if not inner:
         is_time = array.name in TIMES and array.head.code.startswith("f")
         return (Channel("", array.name, "s" if is_time else ""),)

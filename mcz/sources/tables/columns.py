@@ -13,6 +13,7 @@ from fractions import Fraction
 
 from mcz.errors import SourceError
 from mcz.model.motion import Channel, Joint, Motion, Skeleton
+from mcz.sources.robots import recognize_robot
 from mcz.sources.tables.csv_text import (
     COMMENTS,
     check_names,
@@ -108,6 +109,8 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         table_source("csv", data, [(section, rows, 1)]),
         rows.numbers,
     )
+    if head.labels == (0, 0):
+        motion = recognize_robot(motion)
     return motion if times.printed is None else motion.at_times(times.printed)
 
 

@@ -1,0 +1,124 @@
+"""Motion-BIDS: the side files that name the columns of a ``_motion.tsv`` and give its rate.
+
+The table has no header: ``_channels.tsv`` has a row for each of its columns, ``_motion.json`` the
+sampling frequency. Both are searched beside the table, then, by the inheritance principle of
+BIDS, in the folders above it. Source: BIDS 1.10, "Motion".
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from mcz.errors import SourceError
+from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Skeleton
+from mcz.sources.tables.layout import UNIT_CM
+
+MOTION_SUFFIX = "_motion.tsv"
+CHANNELS, ABOUT = "_channels.tsv", "_motion.json"
+LEVELS = 4  # folders above a table: motion, session, subject, data set
+MOST_BYTES = 2**24  # of a side file
+LEAST_RATE, MOST_RATE = 1e-3, 1e6  # hertz
+POSITION = "POS"
+AXES = ("x", "y", "z")
+
+
+def with_side_files(motion: Motion, path: Path) -> Motion:
+    """``motion``, the table ``path``, with names, units and rate of its side files, if any.
+
+    Markers become of channels that all are positions, x, y and z of one point after the other;
+    plain scalars of all others. Raises SourceError for a side file that does not fit the table.
+    """
+    channels = _find(path, CHANNELS)
+    if channels is not None:
+        rows = _rows(channels)
+        if len(rows) != motion.skeleton.n_channels:
+            raise SourceError(
+                f"{len(rows)} channels for the {motion.skeleton.n_channels} columns of {path.name}",
+                path=channels,
+            )
+        motion = replace(motion, skeleton=_markers(rows) or _scalars(rows, motion.skeleton))
+    about = _find(path, ABOUT)
+    rate = None if about is None or motion.frame_rate is not None else _rate(about)
+    return motion if rate is None else motion.at_rate(rate)
+
+
+def _find(path: Path, suffix: str) -> Path | None:
+    """The nearest side file whose entities are all among those of ``path``."""
+    entities = set(path.name.removesuffix(MOTION_SUFFIX).split("_"))
+    for folder in [path.parent, *path.absolute().parents[1 : 1 + LEVELS]]:
+        fit = [
+            (len(own), side)
+            for side in sorted(folder.glob(f"*{suffix}"))
+            if (own := set(side.name.removesuffix(suffix).split("_"))) <= entities
+        ]
+        if fit:
+            return max(fit, key=lambda each: each[0])[1]
+    return None
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise SourceError(f"a side file of more than {MOST_BYTES} bytes", path=path)
+        return data.decode("utf-8-sig")
+    except OSError as error:
+        raise SourceError(error.strerror or "cannot be read", path=path) from None
+    except UnicodeDecodeError:
+        raise SourceError("a side file that is no UTF-8", path=path) from None
+
+
+def _rows(path: Path) -> list[Mapping[str, str]]:
+    """The rows of a ``_channels.tsv``, each with a name."""
+    try:
+        lines = _text(path).splitlines()
+        rows: list[Mapping[str, str]] = [*csv.DictReader(lines, delimiter="\t", restval="")]
+    except csv.Error as error:
+        raise SourceError(f"no table of channels: {error}", path=path) from None
+    if not all(row.get("name") for row in rows):
+        raise SourceError("a channel without a name", path=path)
+    return rows
+
+
+def _markers(rows: Sequence[Mapping[str, str]]) -> Skeleton | None:
+    """Markers, where all channels are positions in one known unit."""
+    units = {row.get("units", "") for row in rows}
+    unit_cm = UNIT_CM.get(next(iter(units))) if len(units) == 1 else None
+    points = [row.get("tracked_point", "") for row in rows[::3]]
+    expected = [(point, axis) for point in points for axis in AXES]
+    stated = [(row.get("tracked_point", ""), row.get("component", "").lower()) for row in rows]
+    is_position = all(row.get("type", "").upper() == POSITION for row in rows)
+    if unit_cm is None or not is_position or stated != expected or len(set(points)) < len(points):
+        return None
+    channels = tuple(map(Channel, POSITION_KINDS))
+    return Skeleton(
+        tuple(Joint(point, channels=channels) for point in points), unit_cm=unit_cm, angle_unit=""
+    )
+
+
+def _scalars(rows: Sequence[Mapping[str, str]], skeleton: Skeleton) -> Skeleton:
+    """Plain scalars with the names and units of ``rows``."""
+    units = [row.get("units", "") for row in rows]
+    channels = [(Channel("", "value", "" if unit == "n/a" else unit),) for unit in units]
+    joints = (Joint(row["name"], channels=own) for row, own in zip(rows, channels, strict=True))
+    return replace(skeleton, joints=tuple(joints), unit_cm=None)
+
+
+def _rate(path: Path) -> Fraction | None:
+    """The sampling frequency; None where it is not stated."""
+    try:
+        frequency = json.loads(_text(path)).get("SamplingFrequency")
+        value = None if frequency is None else float(frequency)
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        raise SourceError("no object with a SamplingFrequency in hertz", path=path) from None
+    if value is None:
+        return None
+    if not LEAST_RATE <= value <= MOST_RATE:
+        raise SourceError(f"a SamplingFrequency of {value:g} Hz", path=path)
+    return Fraction(str(value)).limit_denominator(10**6)

@@ -1,0 +1,101 @@
+"""Motion-BIDS: names, units and rates of side files; every byte of the table again."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+
+NAME = "sub-01_ses-walk_task-walk_tracksys-omc_run-1"
+HEADER = "name\tcomponent\ttype\ttracked_point\tunits\n"
+AXES = "xyz"
+
+
+def data_set(folder: Path, channels: str, n_columns: int, about: object = None) -> Path:
+    """A table below ``folder``, which has the side file of channels beside it."""
+    motion = folder / "sub-01" / "ses-walk" / "motion"
+    motion.mkdir(parents=True)
+    rows = np.round(np.cumsum(np.ones((20, n_columns)), axis=0) / 7 + np.arange(n_columns), 4)
+    path = motion / f"{NAME}_motion.tsv"
+    np.savetxt(path, rows, fmt="%.4f", delimiter="\t")
+    (motion / "sub-01_ses-walk_task-walk_tracksys-omc_channels.tsv").write_text(channels)
+    if about is not None:
+        (motion / f"{NAME}_motion.json").write_text(json.dumps(about))
+    return path
+
+
+def positions(units: str = "mm") -> str:
+    rows = [
+        f"{point}_{axis}\t{axis}\tPOS\t{point}\t{units}\n"
+        for point in ("toe", "heel")
+        for axis in AXES
+    ]
+    return HEADER + "".join(rows)
+
+
+def test_positions_are_markers(tmp_path: Path) -> None:
+    path = data_set(tmp_path, positions(), 6, {"SamplingFrequency": 59.94})
+    motion = mcz.read(path)
+    assert motion.skeleton.joint_names == ("toe", "heel")
+    assert motion.skeleton.unit_cm == 0.1
+    assert float(motion.frame_rate or 0) == 59.94
+    assert mcz.positions(motion, unit="mm").shape == (20, 2, 3)
+    target = io.BytesIO()
+    mcz.encode(path, target)
+    with mcz.open(target.getvalue()) as file:
+        clip = next(iter(file))
+        assert clip.source_bytes() == path.read_bytes()
+        assert clip.source is not None
+        assert clip.source.path == path.name
+
+
+def test_other_channels_are_scalars_with_their_units(tmp_path: Path) -> None:
+    rows = HEADER + "acc_x\tx\tACCEL\tfoot\tm/s^2\n" + "flag\tn/a\tMISC\tn/a\tn/a\n"
+    motion = mcz.read(data_set(tmp_path, rows, 2))
+    assert motion.skeleton.joint_names == ("acc_x", "flag")
+    assert [channel.unit for channel in motion.skeleton.channels] == ["m/s^2", ""]
+    assert motion.frame_rate is None
+
+
+def test_side_files_of_the_folders_above_are_inherited(tmp_path: Path) -> None:
+    path = data_set(tmp_path, positions(), 6)
+    (tmp_path / "task-walk_motion.json").write_text('{"SamplingFrequency": 100}')
+    (tmp_path / "task-run_motion.json").write_text('{"SamplingFrequency": 50}')
+    assert mcz.read(path).frame_rate == 100
+
+
+def test_a_table_without_side_files_is_read_as_columns(tmp_path: Path) -> None:
+    path = data_set(tmp_path, positions(), 6)
+    plain = tmp_path / "plain.tsv"
+    plain.write_bytes(path.read_bytes())
+    assert mcz.read(plain).skeleton.joint_names[0] == "column 1"
+
+
+@pytest.mark.parametrize(
+    ("channels", "about", "fault"),
+    [
+        (positions() + "more\tx\tPOS\tmore\tmm\n", None, "7 channels for the 6 columns"),
+        (HEADER + "\tx\tPOS\ttoe\tmm\n" * 6, None, "a channel without a name"),
+        (positions(), [], "no object with a SamplingFrequency"),
+        (positions(), {"SamplingFrequency": "often"}, "no object with a SamplingFrequency"),
+        (positions(), {"SamplingFrequency": 0}, "a SamplingFrequency of 0 Hz"),
+        (positions(), {"SamplingFrequency": 1e300}, "a SamplingFrequency of 1e[+]300 Hz"),
+    ],
+)
+def test_side_files_that_do_not_fit_are_refused(
+    tmp_path: Path, channels: str, about: object, fault: str
+) -> None:
+    path = data_set(tmp_path, channels, 6, about)
+    with pytest.raises(mcz.SourceError, match=fault):
+        mcz.read(path)
+
+
+def test_units_that_differ_make_no_markers(tmp_path: Path) -> None:
+    mixed = positions().replace("mm", "m", 1)
+    motion = mcz.read(data_set(tmp_path, mixed, 6))
+    assert motion.skeleton.joint_names[0] == "toe_x"
