@@ -232,13 +232,13 @@ def test_a_rate_that_is_set_later(files: tuple[Path, Path], takes: Path, tmp_pat
 
     from mcz.files.editing.batch_report import Report
     from mcz.files.editing.chunk_copier import Change
-    from mcz.files.editing.rewriting import rewriting, whole
+    from mcz.files.editing.rewriting import plan_whole, rewriting
 
     path = tmp_path / "one.mcz"
     mcz.encode(takes / "a" / "walk.amc", path)
     with rewriting(path) as job:
         assert job.file.clips["walk"].frame_rate is None
-        plan = whole(job.file)
+        plan = plan_whole(job.file)
         plan.things["clip", "walk"] = Change(rate=Fraction(30000, 1001))
         job.write(plan, Report(), lambda name: None)
     assert sound(path).clips["walk"].frame_rate == Fraction(30000, 1001)

@@ -172,10 +172,10 @@ def test_a_cluster_packs_and_verifies(
 
 def slow(state: Any, ask: Any) -> Any:
     """Encode slowly, so that a worker can be killed in the middle."""
-    from mcz.files.dask.packing import coded_there
+    from mcz.files.dask.packing import encode_remotely
 
     time.sleep(0.3)
-    return coded_there(state, ask)
+    return encode_remotely(state, ask)
 
 
 @pytest.mark.cluster
@@ -191,7 +191,7 @@ def test_a_worker_that_is_killed_takes_no_clip_along(
     for number in range(24):  # no two are the same
         (root / f"{number:02}.bvh").write_bytes(text + b"\n" * number)
     mcz.pack(root, tmp_path / "one.mcz")
-    monkeypatch.setattr(packing, "coded_there", slow)
+    monkeypatch.setattr(packing, "encode_remotely", slow)
     killed: list[int] = []
 
     def kill_one(done: int, total: int, what: str) -> None:
@@ -210,9 +210,9 @@ def test_a_worker_that_is_killed_takes_no_clip_along(
 def fatal(state: Any, ask: Any) -> Any:
     if ask.name == "walk.c3d":
         os._exit(1)
-    from mcz.files.dask.packing import coded_there
+    from mcz.files.dask.packing import encode_remotely
 
-    return coded_there(state, ask)
+    return encode_remotely(state, ask)
 
 
 @pytest.mark.cluster
@@ -220,7 +220,7 @@ def fatal(state: Any, ask: Any) -> Any:
 def test_a_file_that_ends_its_workers_is_reported(
     cluster: Any, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(packing, "coded_there", fatal)
+    monkeypatch.setattr(packing, "encode_remotely", fatal)
     report = pack(folder, tmp_path / "all.mcz", cluster.scheduler_address)
     failed = {o.path: o.message for o in report.failures}
     assert set(failed) == {"walk.c3d", "more/broken.bvh"}

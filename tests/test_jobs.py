@@ -237,7 +237,7 @@ def test_a_process_that_dies_again_is_an_error(pool: Pool) -> None:
 def test_a_file_whose_process_dies_is_reported(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(coded_parts, "coded", dies_on_c3d)
+    monkeypatch.setattr(coded_parts, "encode_part", dies_on_c3d)
     report = mcz.pack(folder, tmp_path / "all.mcz", jobs=2)
     failed = {o.path: o.message for o in report.failures}
     assert failed["walk.c3d"] == "walk.c3d: it died"
@@ -245,13 +245,13 @@ def test_a_file_whose_process_dies_is_reported(
     assert mcz.verify(tmp_path / "all.mcz") == []
 
 
-def dies_on_c3d(state: object, ask: coded_parts.Ask) -> coded_parts.Part:
+def dies_on_c3d(state: object, ask: coded_parts.PartRequest) -> coded_parts.Part:
     if ask.path.name == "walk.c3d":
         raise mcz.WorkerError("it died")
     return CODED(state, ask)
 
 
-CODED = coded_parts.coded
+CODED = coded_parts.encode_part
 
 
 @pytest.mark.usefixtures("no_processes")
@@ -261,7 +261,7 @@ def test_full_disk_leaves_nothing(
     def full(*args: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(coded_parts, "join", full)
+    monkeypatch.setattr(coded_parts, "join_part", full)
     with pytest.raises(mcz.AccessError, match="No space"):
         mcz.pack(folder, tmp_path / "all.mcz", jobs=2)
     assert list(tmp_path.iterdir()) == []
@@ -311,7 +311,7 @@ def test_an_interrupt_leaves_nothing(
     def interrupted(*args: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(coded_parts, "join", interrupted)
+    monkeypatch.setattr(coded_parts, "join_part", interrupted)
     words = ["pack", str(folder), str(tmp_path / "all.mcz"), "--jobs", "2"]
     assert run(*words) == 130
     assert list(tmp_path.iterdir()) == []

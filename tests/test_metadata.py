@@ -23,10 +23,10 @@ from mcz.container.metadata import (
     KEYS,
     TYPES,
     Record,
-    applied,
-    as_one,
+    apply_records,
     build_metas,
-    check_said,
+    check_pair,
+    merge_records,
     parse_meta,
 )
 from mcz.container.writer import Writer
@@ -84,7 +84,7 @@ def test_what_is_written_is_read(records: list[Record]) -> None:
 
 @given(RECORDS, st.dictionaries(TEXTS, TEXTS, max_size=3))
 def test_one_record_says_what_many_say(records: list[Record], pairs: dict[str, str]) -> None:
-    assert applied(pairs, [as_one("", records)]) == applied(pairs, records)
+    assert apply_records(pairs, [merge_records("", records)]) == apply_records(pairs, records)
 
 
 @given(RECORDS, st.data())
@@ -182,14 +182,14 @@ BAD = {
 @pytest.mark.parametrize("key", GOOD)
 def test_good_values(key: str) -> None:
     for value in GOOD[key]:
-        check_said(key, value)
+        check_pair(key, value)
 
 
 @pytest.mark.parametrize("key", BAD)
 def test_bad_values(key: str) -> None:
     for value in BAD[key]:
         with pytest.raises(mcz.OptionError, match=key):
-            check_said(key, value)
+            check_pair(key, value)
 
 
 def test_nothing_is_written_where_nothing_changes(archive: Path) -> None:

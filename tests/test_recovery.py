@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container.recovery import encoder
 from mcz.container.recovery.code import (
-    encoded,
+    encode_blocks,
     log_weights,
     logarithms,
     over,
-    recovered,
+    recover_blocks,
     runs_of,
     times,
 )
@@ -64,7 +64,7 @@ def words(blocks: np.ndarray) -> np.ndarray:
 def test_blocks_are_those_of_the_formula(n: int, m: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     data = random.integers(-(2**63), 2**63 - 1, (n, 2))
-    found = words(encoded(lambda a, b: data[a:b], n, m, 2))
+    found = words(encode_blocks(lambda a, b: data[a:b], n, m, 2))
     exp, _ = logarithms()
     size = runs_of(m)
     weights = log_weights(np.arange(n), size)
@@ -82,14 +82,14 @@ def test_blocks_are_those_of_the_formula(n: int, m: int, seed: int) -> None:
 def test_any_lost_blocks_come_back(n: int, m: int, data: st.DataObject) -> None:
     random = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     blocks = random.integers(-(2**63), 2**63 - 1, (n, 3))
-    recovery = encoded(lambda a, b: blocks[a:b], n, m, 3)
+    recovery = encode_blocks(lambda a, b: blocks[a:b], n, m, 3)
     lost = sorted(data.draw(st.sets(st.integers(0, n - 1), min_size=1, max_size=min(n, m))))
     order = st.permutations(range(m))
     rows = data.draw(order)[: len(lost)]
     there = blocks.copy()
     there[lost] = 0
-    rest = (recovery ^ encoded(lambda a, b: there[a:b], n, m, 3))[rows]
-    np.testing.assert_array_equal(recovered(rest, lost, rows, m), blocks[lost])
+    rest = (recovery ^ encode_blocks(lambda a, b: there[a:b], n, m, 3))[rows]
+    np.testing.assert_array_equal(recover_blocks(rest, lost, rows, m), blocks[lost])
 
 
 # Files ---------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.container import payloads
-from mcz.container.dictionary_deflate import smallest, words
+from mcz.container.dictionary_deflate import encode_smallest, words
 from mcz.model.schema import deflate, inflate
 
 TINY = """HIERARCHY
@@ -40,10 +40,10 @@ def test_what_follows_words_comes_back(text: bytes | str) -> None:
     data = text if isinstance(text, bytes) else text.encode()
     packed = deflate(data, words=words())
     assert inflate(packed, len(data), "here", words=words()) == data
-    encoding, found = smallest(data, short=True)
+    encoding, found = encode_smallest(data, short=True)
     assert len(found) <= min(len(data), len(deflate(data)), len(packed))
     assert encoding in (payloads.STORED, payloads.DEFLATED, payloads.AFTER_WORDS)
-    assert smallest(data, short=False)[0] != payloads.AFTER_WORDS
+    assert encode_smallest(data, short=False)[0] != payloads.AFTER_WORDS
 
 
 def test_a_file_of_a_few_hundred_bytes(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import mcz
 from conformance.manifest import VECTORS, load
 from mcz import codecs
-from mcz.container.checksums import Checked, check_checksums
+from mcz.container.checksums import ChecksumReport, check_checksums
 from mcz.container.chunks import FOOT, build_foot
 from mcz.container.index import index_content
 from mcz.container.locks import lock
@@ -58,7 +58,7 @@ def packed(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "all.mcz"
 
 
-def checked(target: Any, progress: Callable[[int, int], object] | None = None) -> Checked:
+def checked(target: Any, progress: Callable[[int, int], object] | None = None) -> ChecksumReport:
     with closing(open_source(target)) as source:
         return check_checksums(source, progress)
 

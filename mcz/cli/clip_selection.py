@@ -81,7 +81,7 @@ class ClipSelection:
         names: list[str],
         units: Sequence[str] = (),
     ) -> Table:
-        from mcz.files.reading.views import decimated_rows
+        from mcz.files.reading.views import decimate_rows
         from mcz.files.tables.files import Table
 
         clip, per_frame = self.clip, self.clip.signals[signal].samples_per_frame
@@ -94,11 +94,11 @@ class ClipSelection:
             times = timeline.samples(per_frame)[start * per_frame : stop * per_frame]
         if self.decimate:
             step = 2**self.resolution
-            values = decimated_rows(values, per_frame, step)
-            mask = decimated_rows(mask, per_frame, step)
+            values = decimate_rows(values, per_frame, step)
+            mask = decimate_rows(mask, per_frame, step)
             numbers, rate = numbers[::step], rate and rate / step
             if times is not None:
-                times = decimated_rows(times[:, None], per_frame, step)[:, 0]
+                times = decimate_rows(times[:, None], per_frame, step)[:, 0]
         return Table(
             names,
             _floats(values),

@@ -138,9 +138,9 @@ def command(
     said = dict.fromkeys(removed) | pairs
     changes, unknown = _changes(file, clips, where, of_file, said, rows)
     if unknown:
-        from mcz.files.reading.clips import listed
+        from mcz.files.reading.clips import list_some
 
-        say(f"{table}: no clip for {plural(len(unknown), 'row')}: {listed(unknown)}")
+        say(f"{table}: no clip for {plural(len(unknown), 'row')}: {list_some(unknown)}")
     return _set(file, changes, rate, (clips, where, force), purge, as_json)
 
 

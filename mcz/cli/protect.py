@@ -85,10 +85,10 @@ def command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool
 
 
 def _check(file: str, as_json: bool) -> Exit:
-    from mcz.files.editing.recovering import Recovery, checked
+    from mcz.files.editing.recovering import Recovery, check_recovery
 
     with about(file):
-        found = checked(file)
+        found = check_recovery(file)
     if as_json:
         document = asdict(found or Recovery()) | {"protected": found is not None}
         print_json({"target": file} | document)

@@ -32,7 +32,7 @@ Report = Callable[[int, int], object]
 
 
 @dataclass(slots=True)
-class Checked:
+class ChecksumReport:
     """Findings of one pass; ``faults``: the place and kind of each, in file order.
 
     ``indexed``: whether the file ends with an INDX, which was compared with what is there.
@@ -44,7 +44,7 @@ class Checked:
     faults: list[tuple[int, str]] = field(default_factory=list)
 
 
-def check_checksums(source: ByteSource, progress: Report | None = None) -> Checked:
+def check_checksums(source: ByteSource, progress: Report | None = None) -> ChecksumReport:
     """Check each checksum of ``source``, and INDX and FOOT against the chunks that are there.
 
     Nothing is decoded: only a full check finds what is wrong within sound checksums. ``progress``
@@ -67,7 +67,7 @@ class _Check:
     def __init__(self, source: ByteSource) -> None:
         self._source = source
         self.parser = Parser(source.size, want=lambda chunk: ALL * (chunk.type in KEPT))
-        self.seen = Checked()
+        self.seen = ChecksumReport()
         self._places = _Places()
         self._index: Chunk | None = None  # that the last FOOT closes
         self._end = 0  # of the last FOOT

@@ -42,7 +42,7 @@ def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
     Raises FormatError where no chunk is whole.
     """
     found = scan(source, salvage=True)
-    better, notes = restored(source, found)
+    better, notes = restore_chunks(source, found)
     if better is not None:  # SALV-06
         source, found = better, scan(better, salvage=True)
     if found.doubts and (owners := owners_of(source, found)):
@@ -53,7 +53,7 @@ def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
     return source, found, notes
 
 
-def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str]]:
+def restore_chunks(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str]]:
     """``source`` with the damaged chunks of which it has copies, None where nothing is to be done.
 
     ``found`` is what a salvaging scan of ``source`` has found. Also returns what was wrong with

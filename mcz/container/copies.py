@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from mcz.container import payloads
 from mcz.container.chunks import COPIED, FRAMING, SIGNATURE, Chunk, ChunkType, build_chunk
-from mcz.container.dictionary_deflate import decoded
+from mcz.container.dictionary_deflate import decode_data
 from mcz.container.directory import Directory
 from mcz.container.limits import check
 from mcz.container.parser_drivers import chunks
@@ -46,7 +46,7 @@ class Copy:
         return f"{self.type.decode()} at {self.offset}"
 
 
-def runs(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
+def group_copies(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
     """``copies``, those of one COPY at a time."""
     run: list[Copy] = []
     size = 0
@@ -60,7 +60,7 @@ def runs(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
         yield run
 
 
-def worth_it(copy: Copy, n_bytes: int) -> bool:
+def is_worth_copying(copy: Copy, n_bytes: int) -> bool:
     """Return True if a copy pays in a file of ``n_bytes``: one of a large model does not."""
     return copy.type != ChunkType.MODL or len(copy.payload) * SMALL_PART <= n_bytes
 
@@ -85,7 +85,7 @@ def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
     """
     fields = parse(payloads.Copy, payload, chunk.label)
     check(f"chunk {chunk.label}: bytes of the copies", fields.size, limit)  # LIMIT-16
-    content = decoded(fields.data, fields.flags, fields.size, chunk.label)
+    content = decode_data(fields.data, fields.flags, fields.size, chunk.label)
     copies: list[Copy] = []
     end = 0
     for stored in parse_all(payloads.CopiedChunk, content, f"chunk {chunk.label}"):
@@ -115,7 +115,7 @@ def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
     return found
 
 
-def uncopied(
+def find_uncopied(
     source: ByteSource, directory: Directory, payload_of: Callable[[Chunk], bytes]
 ) -> list[Copy]:
     """Copies of the chunks behind the last COPY of a file; of aliases the directory knows none."""

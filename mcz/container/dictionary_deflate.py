@@ -29,7 +29,7 @@ def words() -> bytes:
     return annex_bytes("words.bin")
 
 
-def smallest(data: bytes, *, short: bool, plain: bool = False) -> tuple[int, bytes]:
+def encode_smallest(data: bytes, *, short: bool, plain: bool = False) -> tuple[int, bytes]:
     """The encoding of SRCE, ATTA and META and its bytes; ``short``: also after words.
 
     ``plain``: stored.
@@ -42,7 +42,7 @@ def smallest(data: bytes, *, short: bool, plain: bool = False) -> tuple[int, byt
     return min(found, key=lambda row: len(row[1]))
 
 
-def decoded(data: bytes, flags: int, size: int, where: str) -> bytes:
+def decode_data(data: bytes, flags: int, size: int, where: str) -> bytes:
     """The ``size`` bytes that SRCE, ATTA, COPY and META hold as ``data``."""
     encoding = flags & payloads.ENCODING
     if encoding == payloads.STORED:
@@ -61,14 +61,14 @@ def plain_payload(
     ``most``: the bytes that a template may decode to. Raises FormatError.
     """
     if kind == ChunkType.SKEL:
-        return unpacked(payload, where, profile)
+        return unpack_skeleton(payload, where, profile)
     if kind != ChunkType.SRCE:
         return payload
     fields = parse(payloads.Srce, payload, where)
     check(f"{where}: bytes", fields.size, profile.text_bytes)
     if most is not None:
         check_decoded(where, fields.size, most)
-    template = decoded(fields.data, fields.flags, fields.size, where)
+    template = decode_data(fields.data, fields.flags, fields.size, where)
     if not fields.flags & payloads.ENCODING:
         return payload
     return build(replace(fields, flags=fields.flags & EXTENDED, data=template), where)
@@ -106,7 +106,7 @@ def is_packed(payload: bytes, where: str) -> bool:
     return parse(PackedSkel, payload, where).size is not None
 
 
-def unpacked(payload: bytes, where: str, profile: Profile) -> bytes:
+def unpack_skeleton(payload: bytes, where: str, profile: Profile) -> bytes:
     """The payload of a SKEL without packing; one that was never packed as it is."""
     packed = parse(PackedSkel, payload, where)
     if packed.size is None:
@@ -118,10 +118,10 @@ def unpacked(payload: bytes, where: str, profile: Profile) -> bytes:
 
 def parse_skel(payload: bytes, where: str, profile: Profile) -> payloads.Skel:
     """The fields of SKEL, packed or not."""
-    return parse(payloads.Skel, unpacked(payload, where, profile), where, profile.counts)
+    return parse(payloads.Skel, unpack_skeleton(payload, where, profile), where, profile.counts)
 
 
-def joined_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> bytes:
+def join_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> bytes:
     """The bytes of an attached file, its hash checked; ``payload_of`` reads one part."""
     parts = []
     left, digest = row.size, b""
@@ -137,7 +137,7 @@ def joined_parts(row: AttachmentRow, payload_of: Callable[[Chunk], bytes]) -> by
             raise FormatError(
                 f"more than the {row.size} bytes of the file", where=f"chunk {chunk.label}"
             )
-        parts.append(decoded(fields.data, fields.flags, fields.part_size, chunk.label))
+        parts.append(decode_data(fields.data, fields.flags, fields.part_size, chunk.label))
         left, digest = left - fields.part_size, fields.sha256  # ATTA-03
     data = b"".join(parts)
     if left or hashlib.sha256(data).digest() != digest:  # ATTA-04, ATTA-05

@@ -51,7 +51,7 @@ def thing_of(chunk: Chunk) -> str:
     raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")  # CHUNK-11
 
 
-def misplaced(thing: str, label: str, state: str) -> FormatError:
+def order_error(thing: str, label: str, state: str) -> FormatError:
     """The error of a thing that may not stand where it does."""
     if state == START:
         return FormatError(f"the first chunk is {label}, not HEAD")
@@ -64,7 +64,7 @@ def misplaced(thing: str, label: str, state: str) -> FormatError:
     return FormatError(f"{label} is outside a clip")
 
 
-def after_misplaced(thing: str, state: str) -> str:
+def state_after_misplaced(thing: str, state: str) -> str:
     """The state to go on with behind such a thing."""
     began = {"CLIP": CLIP, "INDX": INDEX, OPEN_DATA: PACKETS}.get(thing)
     return began or (BODY if state in (START, INDEX) else state)

@@ -66,7 +66,7 @@ def parse_index(data: bytes, offset: int, limit: int) -> Listed:
     chunk = Chunk(ChunkType.INDX, ChunkFlag.ANCILLARY, offset, len(data) - FRAMING)
     outer, content = _inflate(check_chunk(data, chunk), offset, limit, "INDX")
     index = parse(Index, content, "INDX")
-    return Listed(named(data, offset), outer.previous, outer.size, index)
+    return Listed(index_name(data, offset), outer.previous, outer.size, index)
 
 
 def _inflate(payload: bytes, offset: int, limit: int, where: str) -> tuple[Indx, bytes]:
@@ -80,7 +80,7 @@ def _inflate(payload: bytes, offset: int, limit: int, where: str) -> tuple[Indx,
     return outer, inflate(outer.data, outer.size, "INDX")
 
 
-def named(data: bytes, offset: int) -> PreviousIndex:
+def index_name(data: bytes, offset: int) -> PreviousIndex:
     """The name of the INDX whose bytes at ``offset`` are ``data``."""
     (crc,) = CRC.unpack(data[-CRC.size :])
     return PreviousIndex(offset=offset, length=len(data), crc=crc)
@@ -354,7 +354,7 @@ class IndexCheck:
         expected = build(due, where)
         if content[: len(expected)] != expected:  # INDX-04, INDX-05, INDX-08
             raise FormatError(_first_difference(parse(Index, content, where), due), where=where)
-        name = named(build_chunk(chunk.type, payload, chunk.flags), chunk.offset)
+        name = index_name(build_chunk(chunk.type, payload, chunk.flags), chunk.offset)
         self._found.append((place_of(name, outer.size, directory), depth))
 
 

@@ -13,7 +13,7 @@ from sys import intern
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
-from mcz.container.dictionary_deflate import decoded, smallest
+from mcz.container.dictionary_deflate import decode_data, encode_smallest
 from mcz.container.directory import ClipRow
 from mcz.container.limits import BASE, MIB, Profile, check, metadata_limit
 from mcz.errors import FormatError, OptionError
@@ -39,7 +39,7 @@ class Record:
 Placed = dict[str, list[tuple[int, Record]]]  # by name, each with where its META begins
 
 
-class Remembered:
+class MetadataCache:
     """Cache of the metadata in CLIPs, up to ``MOST_KEPT``."""
 
     def __init__(self) -> None:
@@ -58,7 +58,7 @@ class Remembered:
         return found
 
 
-def applied(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:
+def apply_records(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:
     """``pairs`` as they are after the records, in order."""
     found = dict(pairs)
     for record in records:
@@ -68,7 +68,7 @@ def applied(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, st
     return found
 
 
-def as_one(name: str, records: Iterable[Record]) -> Record:
+def merge_records(name: str, records: Iterable[Record]) -> Record:
     """A record of ``name`` that says what ``records`` say together."""
     entries: dict[str, str] = {}
     removed: dict[str, None] = {}
@@ -95,7 +95,7 @@ def build_metas(
 
 
 def _payload(content: bytes, short: bool, profile: Profile) -> bytes:
-    flags, data = smallest(content, short=short, plain=profile.is_plain)
+    flags, data = encode_smallest(content, short=short, plain=profile.is_plain)
     return build(payloads.Meta(flags=flags, size=len(content), data=data), "META")
 
 
@@ -114,7 +114,7 @@ def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
     where = f"chunk {chunk.label}"
     fields = parse(payloads.Meta, payload, where)
     check(f"{where}: bytes of the records", fields.size, metadata_limit(file_bytes))
-    content = decoded(fields.data, fields.flags, fields.size, where)
+    content = decode_data(fields.data, fields.flags, fields.size, where)
     records = []
     for stored in parse_all(payloads.MetaRecord, content, where):
         _check_keys(stored.removed, where)
@@ -124,7 +124,7 @@ def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
     return records
 
 
-def records_in(
+def read_records(
     chunks: Iterable[Chunk], payload_of: Callable[[Chunk], bytes], file_bytes: int, *, lenient: bool
 ) -> Placed:
     """Collect the META records of each name, and their offsets, in file order.
@@ -227,10 +227,10 @@ KEYS = {
 }
 SPELLINGS = {"license": "licence"}  # of keys as users may type them
 INTERPRETED = tuple(KEYS)[:3]
-SAID = tuple(KEYS)[3:]  # what users set
+SETTABLE = tuple(KEYS)[3:]  # what users set
 
 
-def check_said(key: str, value: str | None) -> None:
+def check_pair(key: str, value: str | None) -> None:
     """Raise OptionError for a key that is not to be set, or a value that it may not have.
 
     ``value`` None: it is to be removed.
@@ -238,8 +238,8 @@ def check_said(key: str, value: str | None) -> None:
     if key in INTERPRETED:
         raise OptionError(f"{key!r} belongs to the values or the source of a clip, and stays")
     if key not in KEYS and not (key.startswith(PRIVATE) and len(key) > len(PRIVATE)):
-        near = nearest(key, SAID)
-        hint = f"did you mean {near}?" if near else f"registered are {', '.join(SAID)}"
+        near = nearest(key, SETTABLE)
+        hint = f"did you mean {near}?" if near else f"registered are {', '.join(SETTABLE)}"
         raise OptionError(
             f"metadata key {key!r} is not registered; {hint}; private keys begin with {PRIVATE!r}"
         )

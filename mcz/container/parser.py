@@ -43,8 +43,8 @@ from mcz.container.grammar import (
     Fault,
     FootEvent,
     PacketEvent,
-    after_misplaced,
-    misplaced,
+    order_error,
+    state_after_misplaced,
     thing_of,
 )
 from mcz.container.limits import BASE, Search
@@ -324,12 +324,12 @@ class Parser:
     def _place(self, event: ChunkEvent) -> Event:
         """The chunk, or the Fault that it may not stand where it does."""
         rows, state = GRAMMAR[event.thing], self.state
-        self.state = rows.get(state) or after_misplaced(event.thing, state)
+        self.state = rows.get(state) or state_after_misplaced(event.thing, state)
         self._index = event.chunk if event.thing == "INDX" else None
         self._sequence, self._is_told = 0, False
         if state in rows:  # GRAM-01
             return event
-        error = misplaced(event.thing, event.chunk.label, state)
+        error = order_error(event.thing, event.chunk.label, state)
         return Fault(event.offset, error, event.chunk, event, state)
 
     def _read_foot(self, at: int) -> Event:
@@ -342,7 +342,7 @@ class Parser:
             error = FormatError(f"FOOT at {at} points to {foot}, the index is at {event.place}")
             return Fault(at, error, None, event, state)
         if state not in rows:
-            return Fault(at, misplaced(FOOT_THING, f"FOOT at {at}", state), None, event, state)
+            return Fault(at, order_error(FOOT_THING, f"FOOT at {at}", state), None, event, state)
         return event
 
     def _read_packet(self) -> Event:

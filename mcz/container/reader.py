@@ -27,9 +27,9 @@ from mcz.container.chunks import (
     read_chunk,
     read_payload,
 )
-from mcz.container.copies import Copy, copy_chunks, uncopied
+from mcz.container.copies import Copy, copy_chunks, find_uncopied
 from mcz.container.decoded_cache import DecodedCache
-from mcz.container.dictionary_deflate import chunk_id, joined_parts, plain_id, plain_payload
+from mcz.container.dictionary_deflate import chunk_id, join_parts, plain_id, plain_payload
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -40,7 +40,7 @@ from mcz.container.directory import (
 )
 from mcz.container.index_reader import directory_of, read_indexes
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
-from mcz.container.metadata import Placed, Record, Remembered, applied, records_in
+from mcz.container.metadata import MetadataCache, Placed, Record, apply_records, read_records
 from mcz.container.packets import CHECK_SIZE, FRAME, MOST_HEAD, Packet, implied_by, is_packet
 from mcz.container.scan import scan
 from mcz.container.segments import (
@@ -94,7 +94,7 @@ class Container:
         self.unverified = 0
         self.runs = DecodedCache()
         self.index: Foot | None = None
-        self._said = Remembered()
+        self._said = MetadataCache()
         self._told = 0, b""  # a segment in a packet, and its mask
         self._skeletons: dict[bytes, tuple[payloads.Skel, Skeleton]] = {}
         self.directory = directory or (self._salvage() if salvage else self._open())
@@ -177,7 +177,7 @@ class Container:
     def _records(self) -> Placed:
         """META records of each name, read once."""
         chunks = self.directory.clips.ancillary(ChunkType.META)
-        return records_in(chunks, self.payload, self.source.size, lenient=self.salvage)
+        return read_records(chunks, self.payload, self.source.size, lenient=self.salvage)
 
     def metadata_records(self, name: str) -> list[Record]:
         """META records of the clip ``name``; "": of the file as a whole."""
@@ -187,7 +187,7 @@ class Container:
 
     def metadata(self, row: ClipRow) -> dict[str, str]:
         """Metadata of a clip: those in CLIP, updated by META chunks behind it."""
-        return applied(self._said.of(row, self.payload), self.metadata_records(row.name))
+        return apply_records(self._said.of(row, self.payload), self.metadata_records(row.name))
 
     def copies(self) -> list[Chunk]:
         """The COPY chunks of the file, in order."""
@@ -195,7 +195,7 @@ class Container:
 
     def uncopied(self) -> list[Copy]:
         """Copies of the chunks that the file has behind the last COPY."""
-        return uncopied(self.source, self.directory, self.payload)
+        return find_uncopied(self.source, self.directory, self.payload)
 
     def add_shared(self, kind: bytes, payload: bytes) -> None:
         """Let a damaged file have a SKEL, MODL or SRCE that it has lost: it lies behind its end."""
@@ -286,7 +286,7 @@ class Container:
     def attachment(self, row: AttachmentRow) -> bytes:
         """The bytes of an attached file, its hash checked."""
         check_decoded(f"attachment {row.name!r}", row.size, self.max_decoded)
-        return joined_parts(row, self.payload)
+        return join_parts(row, self.payload)
 
     def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
         """The stream table of a segment, with as little read as will do."""

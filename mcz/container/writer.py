@@ -22,8 +22,8 @@ from mcz.container.chunks import (
     build_foot,
     build_header,
 )
-from mcz.container.copies import Copy, build_copies, runs, worth_it
-from mcz.container.dictionary_deflate import chunk_id, plain_id, smallest
+from mcz.container.copies import Copy, build_copies, group_copies, is_worth_copying
+from mcz.container.dictionary_deflate import chunk_id, encode_smallest, plain_id
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
@@ -120,7 +120,7 @@ class Writer:
         if (ChunkType.SRCE, id_) in self.directory.shared:
             return id_
         plain = self.profile.is_plain
-        record.flags, record.data = smallest(template, short=self.short, plain=plain)
+        record.flags, record.data = encode_smallest(template, short=self.short, plain=plain)
         return self.shared(ChunkType.SRCE, build(record, "SRCE"))
 
     def attachment(self, name: str, data: bytes) -> None:
@@ -130,7 +130,7 @@ class Writer:
         digest = hashlib.sha256(data).digest()
         parts = []
         for part, piece in enumerate(pieces):
-            flags, packed = smallest(piece, short=self.short, plain=self.profile.is_plain)
+            flags, packed = encode_smallest(piece, short=self.short, plain=self.profile.is_plain)
             record = payloads.Atta(
                 name=name,
                 part=part,
@@ -298,8 +298,8 @@ class Writer:
     def finish(self, *, index: bool = True) -> None:
         """Write the copies that are wanted, INDX, unless told otherwise, and FOOT."""
         self._between_clips("FOOT")
-        copies = (copy for copy in self._copies or () if worth_it(copy, self.offset))
-        for run in runs(copies):
+        copies = (copy for copy in self._copies or () if is_worth_copying(copy, self.offset))
+        for run in group_copies(copies):
             self.ancillary(ChunkType.COPY, build_copies(run, self.offset), safe_to_copy=False)
         start, length = 0, 0
         if index and not (self.profile.is_plain or (self.short and self.offset <= UNINDEXED)):

@@ -10,14 +10,14 @@ from pathlib import Path, PurePosixPath
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.exchange.conversion import TARGETS, converted_files, left_out
 from mcz.exchange.conversion.scenes import WRITERS, to_scene
-from mcz.files.editing.batch_report import Outcome, Report, failed
+from mcz.files.editing.batch_report import Outcome, Report, failure_outcome
 from mcz.files.editing.safe_names import Folder, PortableNames
 from mcz.files.editing.unpacking import safe_path
 from mcz.files.jobs import limited
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open, suffixes_of
-from mcz.files.reading.parallel_clips import shared_out
+from mcz.files.reading.parallel_clips import share_clips
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.tables.files import EXPORTS, table_of
 from mcz.model.motion import Motion
@@ -62,7 +62,7 @@ def export(
     with limited(jobs), open(target, **options) as file:
         chosen = file.chosen(clips, where)
         called = [clip.name for clip in chosen]
-        with shared_out(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
+        with share_clips(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
             for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
                 try:
                     for own, data, notes in converted():
@@ -73,7 +73,7 @@ def export(
                         written.add(path)
                         report.outcomes.append(Outcome(path, "written", len(data), notes=notes))
                 except (MczError, OSError) as error:
-                    report.outcomes.append(failed(name, error))
+                    report.outcomes.append(failure_outcome(name, error))
                 if progress is not None:
                     progress(done + 1, len(called), name)
     return report

@@ -12,7 +12,7 @@ from typing import Any
 
 from mcz.codecs import ENTRIES
 from mcz.container import payloads
-from mcz.container.dictionary_deflate import decoded
+from mcz.container.dictionary_deflate import decode_data
 from mcz.container.packets import FRAME, SEGMENT, Packet
 from mcz.container.segments import parse_header
 from mcz.errors import MczError
@@ -239,7 +239,7 @@ class Mutation:
             return self._payload(pieces, which)
         try:
             fields = parse(payloads.Srce, pieces[which].payload, "SRCE")
-            text = decoded(fields.data, fields.flags, fields.size, "SRCE")
+            text = decode_data(fields.data, fields.flags, fields.size, "SRCE")
             fields.data = self._bytes(text, 32)
             fields.size, fields.flags = len(fields.data), payloads.STORED
             return with_payload(pieces, which, build(fields, "SRCE"))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mcz.codecs import CODECS, bitstream_name
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, parse_header
-from mcz.container.dictionary_deflate import unpacked
+from mcz.container.dictionary_deflate import unpack_skeleton
 from mcz.container.limits import BASE
 from mcz.errors import MczError
 from mcz.model.schema import parse
@@ -39,7 +39,7 @@ def formats_of(vector: Vector) -> list[str]:
     for kind, schema in ((b"CLIP", payloads.Clip), (b"SKEL", payloads.Skel)):
         for payload in _payloads(vector.data, kind):
             try:
-                plain = unpacked(payload, "source", BASE) if kind == b"SKEL" else payload
+                plain = unpack_skeleton(payload, "source", BASE) if kind == b"SKEL" else payload
                 fields = parse(schema, plain, "source")
             except MczError:
                 continue

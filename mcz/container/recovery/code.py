@@ -95,7 +95,7 @@ def runs_of(n_recovery: int) -> int:
     return 1 << max(0, n_recovery - 1).bit_length()
 
 
-def encoded(read: Read, n_blocks: int, n_recovery: int, lanes: int) -> Ints:
+def encode_blocks(read: Read, n_blocks: int, n_recovery: int, lanes: int) -> Ints:
     """The recovery blocks (n_recovery, lanes) of ``n_blocks`` that ``read`` gives."""
     from mcz.container.recovery.kernels import to_coefficients, to_values
 
@@ -126,7 +126,7 @@ def _by_columns(transform: Callable[..., int], blocks: Ints, levels: int, offset
         pass
 
 
-def recovered(rest: Ints, lost: Sequence[int], rows: Sequence[int], n_recovery: int) -> Ints:
+def recover_blocks(rest: Ints, lost: Sequence[int], rows: Sequence[int], n_recovery: int) -> Ints:
     """The blocks ``lost``, from as many recovery blocks, the ``rows``.
 
     ``rest`` (len(rows), lanes): each of these, from which what the blocks that are there add to it

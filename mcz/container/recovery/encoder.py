@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.container.recovery.code import LANE, Ints, encoded, runs_of
+from mcz.container.recovery.code import LANE, Ints, encode_blocks, runs_of
 from mcz.container.recovery.layout import Key, Shape, build_packet, short_hash
 from mcz.errors import AccessError, reason_of
 
@@ -48,7 +48,7 @@ def table_sections(shape: Shape, hashes: bytes) -> Ints:
     whole = hashes.ljust(shape.n_sections * shape.section_size, b"\0")
     own = np.frombuffer(whole, "<i8").reshape(shape.n_sections, -1).astype(np.int64)
     lanes = own.shape[1]
-    more = encoded(lambda a, b: own[a:b], len(own), shape.n_parities, lanes)
+    more = encode_blocks(lambda a, b: own[a:b], len(own), shape.n_parities, lanes)
     return np.concatenate([own, more])
 
 
@@ -63,7 +63,7 @@ def _recovery_blocks(shape: Shape, read: READ, step: Step | None) -> Iterator[RE
         try:
             spool = BytesIO() if total <= IN_MEMORY else tempfile.TemporaryFile()  # noqa: SIM115
             stack.callback(_close, spool)
-            for lane, found in computed(shape, read, step):
+            for lane, found in compute_lanes(shape, read, step):
                 for index, part in enumerate(found):
                     spool.seek(index * shape.block_size + LANE * lane)
                     spool.write(part.tobytes())
@@ -87,14 +87,14 @@ def _close(spool: BinaryIO) -> None:
         spool.close()
 
 
-def computed(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int, Ints]]:
+def compute_lanes(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int, Ints]]:
     """Lanes of all recovery blocks, of large ones some at a time, and the first of them."""
     lanes = shape.block_size // LANE
     width = max(1, min(lanes, AT_ONCE // (runs_of(shape.n_recovery) * LANE)))
     for start in range(0, lanes, width):
         stop = min(start + width, lanes)
         rows = _lane_reader(shape, read, start, stop, step)
-        yield start, encoded(rows, shape.n_blocks, shape.n_recovery, stop - start)
+        yield start, encode_blocks(rows, shape.n_blocks, shape.n_recovery, stop - start)
 
 
 def _lane_reader(

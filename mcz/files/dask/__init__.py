@@ -13,13 +13,13 @@ from typing import TypeVar
 from mcz.errors import OptionError
 from mcz.files.dask.cluster import Cluster, connect
 from mcz.files.dask.packing import pack
-from mcz.files.jobs import using
+from mcz.files.jobs import use_engine
 from mcz.files.reading import faults
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.faults import Problem
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open
-from mcz.files.reading.parallel_clips import can_be_shared, shared_out
+from mcz.files.reading.parallel_clips import can_be_shared, share_clips
 from mcz.model.types import Target
 
 __all__ = ["map_clips", "pack", "verify"]
@@ -40,7 +40,7 @@ def verify(
     ``target`` is a path or URL that all of them can read; ``client`` is as in ``pack``. Raises as
     ``mcz.verify``, and WorkerError where machines are lost.
     """
-    with connect(client) as used, using(Cluster(used)):
+    with connect(client) as used, use_engine(Cluster(used)):
         return faults.verify(target, max_decoded=max_decoded, where=where)
 
 
@@ -61,7 +61,7 @@ def map_clips(
         if not can_be_shared(file):
             raise OptionError("no file that the machines of a cluster can open", path=file.name)
         names = [clip.name for clip in file.chosen(where=where)]
-        with using(Cluster(used)), shared_out(_mapped, file, names, function) as answers:
+        with use_engine(Cluster(used)), share_clips(_mapped, file, names, function) as answers:
             return [answer() for answer in answers]
 
 

@@ -17,7 +17,7 @@ from mcz.errors import AccessError, MczError, OptionError, SourceError
 from mcz.files.dask.cluster import Cluster, connect
 from mcz.files.editing.archive import write_in_turn
 from mcz.files.editing.batch_report import Outcome, Report
-from mcz.files.editing.coded_parts import Ask, Far, Part, ask_of, coded
+from mcz.files.editing.coded_parts import Part, PartRequest, RemotePart, encode_part, request_of
 from mcz.files.editing.folders import NO_MOTION, files_below, motion_files, size_of
 from mcz.files.editing.safe_names import notes_on
 from mcz.files.jobs import Answer
@@ -60,7 +60,7 @@ def pack(
     machines are lost again and again is reported as failed.
     """
     root = os.fspath(root)
-    found, others = listed(root, target)
+    found, others = list_files(root, target)
     taken, left = _chosen(found, keep_all)
     options = SourceOptions(
         rate=rate,
@@ -79,15 +79,17 @@ def pack(
     skeletons = [one.name for one in found if one.name.lower().endswith(".asf")]
     entries = [SourceEncoder(Path(root, one.name), one.name, options, encoding) for one in taken]
     asks = (
-        FarAsk(root, ask_of(entry, writing.profile), skeletons_beside(entry.name, skeletons))
+        RemoteFile(
+            root, request_of(entry, writing.profile), skeletons_beside(entry.name, skeletons)
+        )
         for entry in entries
     )
     with connect(client) as used, replacing(target, force=force, inputs=inputs) as stream:
         transaction = WriteTransaction(stream, writing.profile, copies=writing.copies)
-        with closing(Cluster(used).in_order(coded_there, asks, None)) as answers:
+        with closing(Cluster(used).in_order(encode_remotely, asks, None)) as answers:
             given = cast(Iterator[Answer[Part]], answers)  # none is None
             made = zip(entries, given, taken, strict=True)
-            parts = (Far(entry, answer, one.size) for entry, answer, one in made)
+            parts = (RemotePart(entry, answer, one.size) for entry, answer, one in made)
             write_in_turn(transaction, parts, len(taken), report, progress, {})
         transaction.finish()
     report.size = transaction.writer.offset
@@ -113,11 +115,11 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
-class FarAsk:
+class RemoteFile:
     """A file below ``root`` that is to be coded; ``beside``: names of the ASFs that it may need."""
 
     root: str
-    ask: Ask
+    ask: PartRequest
     beside: tuple[str, ...]
 
 
@@ -125,7 +127,7 @@ def is_url(root: str) -> bool:
     return "://" in root
 
 
-def listed(root: str, target: Target) -> tuple[list[Found], list[Outcome]]:
+def list_files(root: str, target: Target) -> tuple[list[Found], list[Outcome]]:
     """The files below ``root`` but for an earlier ``target``, in the order of an archive.
 
     Raises OptionError where it is no folder, AccessError where it cannot be listed.
@@ -173,7 +175,7 @@ def skeletons_beside(name: str, skeletons: list[str]) -> tuple[str, ...]:
     return tuple(asf for asf in skeletons if is_near(PurePosixPath(asf).parent))
 
 
-def coded_there(state: object, ask: FarAsk) -> Part:
+def encode_remotely(state: object, ask: RemoteFile) -> Part:
     """The part of a file, made by whoever can read it; raises as ``coded`` does."""
     with ExitStack() as stack:
         root = ask.root
@@ -182,7 +184,7 @@ def coded_there(state: object, ask: FarAsk) -> Part:
             root = str(Path(own, "root"))  # around it there is nothing that may be taken for an ASF
             _fetch(ask, Path(root))
         try:
-            part = coded(state, replace(ask.ask, path=Path(root, ask.ask.name)))
+            part = encode_part(state, replace(ask.ask, path=Path(root, ask.ask.name)))
         except MczError as error:
             if error.path is not None:
                 error.path = _named(error.path, root, ask.root)
@@ -203,7 +205,7 @@ def _named(text: str, copy: str, root: str) -> str:
     return text.replace(copy, root.rstrip("/"))
 
 
-def _fetch(ask: FarAsk, folder: Path) -> None:
+def _fetch(ask: RemoteFile, folder: Path) -> None:
     """Copy the file, and the skeletons that it may need, below ``folder``."""
     fs, base = _opened(ask.root)
     for name in (ask.ask.name, *ask.beside):

@@ -12,19 +12,19 @@ from pathlib import Path
 
 from mcz.container import payloads
 from mcz.container.limits import profile_named
-from mcz.container.metadata import SAID, Record
+from mcz.container.metadata import SETTABLE, Record
 from mcz.errors import MczError, OptionError, SourceError, remark_of
 from mcz.files.editing.appending import growing
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import UNPROTECTED
-from mcz.files.editing.coded_parts import Far, ahead
+from mcz.files.editing.coded_parts import RemotePart, encode_ahead
 from mcz.files.editing.folders import (
+    dropped_facts,
     files_below,
-    left_out,
+    find_sources,
     motion_files,
-    not_kept,
     size_of,
-    sources_named,
+    skipped_outcome,
     stamp,
 )
 from mcz.files.editing.merging import add_files
@@ -84,7 +84,7 @@ def pack(
     paths, others = files_below(root, target)
     if not keep_all:
         paths, left = motion_files(paths)
-        others += [left_out(path, root) for path in left]
+        others += [skipped_outcome(path, root) for path in left]
     options = SourceOptions(
         rate=rate,
         force_rate=force_rate,
@@ -108,7 +108,7 @@ def pack(
             _write_times(transaction, entries)
         transaction.finish()
     report.size = transaction.writer.offset
-    report.left_out += not_kept(root, paths, with_times=mtimes)
+    report.left_out += dropped_facts(root, paths, with_times=mtimes)
     report.note(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
@@ -190,7 +190,7 @@ def append(
     writing = WritingOptions(threads=threads, jobs=jobs)
     held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in held]
-    named, others = sources_named(files, root, target)
+    named, others = find_sources(files, root, target)
     entries = [SourceEncoder(path, name, options, encoding) for path, name in named]
     with (
         writing.in_force(),
@@ -243,7 +243,7 @@ def _write_entries(
     """Write the files; ``seen``: what the target holds already, by content."""
     report = Report()
     seen = {} if seen is None else seen
-    with ahead(entries, transaction, seen) as in_turn:
+    with encode_ahead(entries, transaction, seen) as in_turn:
         write_in_turn(transaction, in_turn, len(entries), report, progress, seen)
     return report
 
@@ -258,7 +258,7 @@ def write_in_turn(
 ) -> None:
     """Write one file after the other; ``report`` learns what becomes of each."""
     for done, entry in enumerate(entries):
-        size = entry.size if isinstance(entry, Far) else size_of(entry.path)
+        size = entry.size if isinstance(entry, RemotePart) else size_of(entry.path)
         try:
             result = _write_entry(transaction, entry, seen)
             notes = tuple(filter(None, (entry.remark, *entry.notes)))
@@ -349,4 +349,4 @@ def _find_superseded(file: File, named: Named) -> tuple[list[str], Said]:
 
 
 def _is_said(key: str) -> bool:
-    return (key in SAID and key != "mtime") or key.startswith("x-")
+    return (key in SETTABLE and key != "mtime") or key.startswith("x-")

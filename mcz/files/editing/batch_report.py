@@ -32,7 +32,7 @@ class Outcome:
     __repr__ = brief
 
 
-def failed(path: str, error: MczError | OSError) -> Outcome:
+def failure_outcome(path: str, error: MczError | OSError) -> Outcome:
     """The outcome of a file that an error has kept from being written."""
     result = "exists" if isinstance(error, ExistsError) else "failed"
     return Outcome(path, result, 0, remark_of(error, path=path))

@@ -18,7 +18,7 @@ from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
 from mcz.container.grammar import CLIP
 from mcz.container.index import segment_rows
 from mcz.container.index_reader import parse_segments
-from mcz.container.metadata import Record, as_one
+from mcz.container.metadata import Record, merge_records
 from mcz.container.parser_drivers import chunks
 from mcz.container.reader import Container
 from mcz.container.writer import Writer
@@ -200,7 +200,7 @@ def metadata_records(container: Container, names: Iterable[tuple[str, str]]) -> 
     """META records of the file, and of clips by their old and new names."""
     pairs = [("", ""), *names]
     said = ((new, container.metadata_records(old)) for old, new in pairs)
-    return [as_one(new, records) for new, records in said if records]
+    return [merge_records(new, records) for new, records in said if records]
 
 
 def _move_segment(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:

@@ -19,9 +19,9 @@ from mcz.container.limits import Profile
 from mcz.errors import MczError, WorkerError
 from mcz.files.editing.chunk_copier import Change
 from mcz.files.editing.folders import size_of
-from mcz.files.editing.rewriting import ALIAS, CLIP, SKELETON, carry, whole
+from mcz.files.editing.rewriting import ALIAS, CLIP, SKELETON, carry, plan_whole
 from mcz.files.editing.stored_files import Content
-from mcz.files.jobs import ONE, Answer, useful
+from mcz.files.jobs import ONE, Answer, useful_jobs
 from mcz.files.jobs.pool import answers
 from mcz.files.reading.file import open
 from mcz.files.reading.parallel_clips import only_own
@@ -48,7 +48,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class PartRequest:
     """A file that is to be coded, for a file of which limits."""
 
     path: Path
@@ -58,12 +58,12 @@ class Ask:
     profile: Profile
 
 
-def ask_of(entry: SourceEncoder, profile: Profile) -> Ask:
+def request_of(entry: SourceEncoder, profile: Profile) -> PartRequest:
     """The request by which ``entry`` can be joined."""
-    return Ask(entry.path, entry.name, entry.options, entry.encoding, profile)
+    return PartRequest(entry.path, entry.name, entry.options, entry.encoding, profile)
 
 
-def coded(state: object, ask: Ask) -> Part:
+def encode_part(state: object, ask: PartRequest) -> Part:
     """The part of a file; raises as ``SourceEncoder.write`` does."""
     entry, sink = SourceEncoder(ask.path, ask.name, ask.options, ask.encoding), io.BytesIO()
     transaction = WriteTransaction(sink, ask.profile)
@@ -103,7 +103,7 @@ class Joined(SourceEncoder):
         if transaction.holds(self.name, part.digest):
             return "present"
         with transaction.step():
-            join(part, transaction, name)
+            join_part(part, transaction, name)
         self.reason, self.remark, self.notes = part.reason, part.remark, part.notes
         self.inputs[:] = part.inputs
         transaction.paths[self.name] = part.digest
@@ -118,7 +118,7 @@ class Joined(SourceEncoder):
             return None
 
 
-class Far(Joined):
+class RemotePart(Joined):
     """One whose file lies where only those can read it that made the part, ``size`` bytes."""
 
     can_be_read = False
@@ -137,11 +137,11 @@ class Far(Joined):
         return self._part().digest
 
 
-def join(part: Part, transaction: WriteTransaction, clip: str) -> None:
+def join_part(part: Part, transaction: WriteTransaction, clip: str) -> None:
     """Carry the chunks of ``part`` over; its clip is called ``clip`` from now on."""
     held = transaction.writer.directory
     with open(part.data) as file:
-        plan = whole(file)
+        plan = plan_whole(file)
         for kind, name in list(plan.things):
             if kind == CLIP and name != clip:
                 plan.things[kind, name] = Change(clip)
@@ -150,9 +150,9 @@ def join(part: Part, transaction: WriteTransaction, clip: str) -> None:
         carry(file, transaction.writer, plan, lambda name: None)
 
 
-def asks(
+def request_parts(
     entries: Iterable[SourceEncoder], transaction: WriteTransaction, seen: Content
-) -> Iterator[Ask | None]:
+) -> Iterator[PartRequest | None]:
     """Yield the sources to encode ahead; None for one that may turn out to be there already."""
     sent: set[bytes] = set()
     for entry in entries:
@@ -167,23 +167,23 @@ def asks(
             yield None
             continue
         sent.add(digest)
-        yield ask_of(entry, transaction.writer.profile)
+        yield request_of(entry, transaction.writer.profile)
 
 
 @contextmanager
-def ahead(
+def encode_ahead(
     entries: Sequence[SourceEncoder], transaction: WriteTransaction, seen: Content
 ) -> Iterator[Iterator[SourceEncoder]]:
     """The entries in order, those ahead in work by other processes where that is worth it."""
-    jobs = useful(len(entries), sum(size_of(entry.path) for entry in entries))
+    jobs = useful_jobs(len(entries), sum(size_of(entry.path) for entry in entries))
     if jobs == ONE or not only_own():
         yield iter(entries)
         return
-    with answers(coded, asks(entries, transaction, seen), jobs) as found:
-        yield joined(entries, found)
+    with answers(encode_part, request_parts(entries, transaction, seen), jobs) as found:
+        yield join_parts(entries, found)
 
 
-def joined(
+def join_parts(
     entries: Iterable[SourceEncoder], found: Iterable[Answer[Part] | None]
 ) -> Iterator[SourceEncoder]:
     """The entries, with the parts that were made of them."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mcz.errors import AccessError, OptionError, reason_of, remark_of
 from mcz.files.editing.batch_report import Outcome
-from mcz.files.reading.clips import FEW, listed
+from mcz.files.reading.clips import FEW, list_some
 from mcz.hints import Hint, Remark
 from mcz.model.types import Target
 from mcz.sources import FORMATS
@@ -80,18 +80,18 @@ def _is_motion(path: Path) -> bool:
 NO_MOTION = Remark("no motion file", Hint.KEEP_ALL)
 
 
-def left_out(path: Path, root: Path) -> Outcome:
+def skipped_outcome(path: Path, root: Path) -> Outcome:
     name = path.relative_to(root).as_posix()
     return Outcome(name, "skipped", size_of(path), NO_MOTION)
 
 
-def not_kept(root: Path, packed: Sequence[Path], *, with_times: bool) -> Iterator[str]:
+def dropped_facts(root: Path, packed: Sequence[Path], *, with_times: bool) -> Iterator[str]:
     """Parts of a folder that no archive has: empty folders, modes, and times but of clips."""
 
     def some(word: str, paths: Iterable[Path]) -> Iterator[str]:
         names = [path.relative_to(root).as_posix() for path in paths]
         if names:
-            yield f"{word}: {listed(names)}" + (f" ({len(names)} in all)" if names[FEW:] else "")
+            yield f"{word}: {list_some(names)}" + (f" ({len(names)} in all)" if names[FEW:] else "")
 
     walk = os.walk(root)
     yield from some(
@@ -116,7 +116,7 @@ def size_of(path: Path) -> int:
     return 0
 
 
-def sources_named(
+def find_sources(
     sources: Sequence[str | os.PathLike[str]], root: str | os.PathLike[str] | None, target: Target
 ) -> tuple[list[tuple[Path, str]], list[Outcome]]:
     """The files that ``sources`` name, each with its name in an archive; and what is left out.
@@ -132,7 +132,7 @@ def sources_named(
             continue
         paths, others = files_below(source, target)
         paths, left = motion_files(paths)
-        skipped += [*others, *(left_out(path, source) for path in left)]
+        skipped += [*others, *(skipped_outcome(path, source) for path in left)]
         base = source if root is None else root
         found += [(path, _relative(path, base)) for path in paths]
     return found, skipped

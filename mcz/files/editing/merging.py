@@ -29,12 +29,12 @@ from mcz.files.editing.rewriting import (
     Thing,
     carry,
     path_of,
+    plan_whole,
     steps,
     things_in,
-    whole,
     writer_like,
 )
-from mcz.files.reading.clips import listed
+from mcz.files.reading.clips import list_some
 from mcz.files.reading.file import File, open
 from mcz.files.writing.atomic import replacing_file
 from mcz.files.writing.write_transaction import WriteTransaction
@@ -141,14 +141,14 @@ class Merging:
             found = [(file, self._plan_file(file, double)) for file in files]
             if double:
                 raise OptionError(
-                    f"{listed(double)}: {counted(len(double), 'name')} in more than one file; "
+                    f"{list_some(double)}: {counted(len(double), 'name')} in more than one file; "
                     "rename the later ones, or skip those of identical content"
                 )
             yield found
 
     def _plan_file(self, file: File, double: list[str]) -> Plan:
         """Plan the parts of ``file`` that are carried over; ``double`` learns refused ones."""
-        plan = whole(file)
+        plan = plan_whole(file)
         for thing in list(plan.things):
             kind, name = thing
             there = self.things.get(thing)

@@ -16,8 +16,8 @@ from mcz.container.metadata import (
     PRIVATE,
     SPELLINGS,
     Record,
-    applied,
-    check_said,
+    apply_records,
+    check_pair,
 )
 from mcz.container.writer import Writer
 from mcz.errors import ChecksumError, OptionError, reason_of
@@ -25,9 +25,9 @@ from mcz.files.editing.appending import growing
 from mcz.files.editing.batch_report import Outcome, Report
 from mcz.files.editing.chunk_copier import Change
 from mcz.files.editing.protecting import redundancy_of, still_protect
-from mcz.files.editing.rewriting import CLIP, rewriting, steps, whole
+from mcz.files.editing.rewriting import CLIP, plan_whole, rewriting, steps
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.clips import listed, names_of
+from mcz.files.reading.clips import list_some, names_of
 from mcz.files.reading.fidelity import states_rate
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open
@@ -59,7 +59,7 @@ def set_metadata(
     changes = {name: _respell(said) for name, said in changes.items()}
     for said in changes.values():
         for key, value in said.items():
-            check_said(key, value)
+            check_pair(key, value)
     report = Report()
     with growing(Path(target), salvage=False, force=force) as growth:
         file = File(growth.container)
@@ -89,7 +89,7 @@ def set_metadata(
 def _purge(target: str | os.PathLike[str], progress: Progress | None) -> list[str]:
     """Rewrite a file so that its metadata stand in CLIP; return what was left out."""
     with rewriting(target) as job:
-        report, plan = Report(), whole(job.file)
+        report, plan = Report(), plan_whole(job.file)
         plan.purges = True  # META-09
         for clip in job.file:
             plan.things[CLIP, clip.name] = Change(metadata=clip.metadata)
@@ -117,7 +117,7 @@ def _changes_record(file: File, name: str, said: Said) -> Record:
     entries = {k: v for k, v in said.items() if v is not None and before.get(k) != v}
     removed = tuple(key for key, value in said.items() if value is None and key in before)
     record = Record(clip.name if clip is not None else "", entries, removed)
-    return record if applied(before, [record]) != before else Record(record.name)
+    return record if apply_records(before, [record]) != before else Record(record.name)
 
 
 def set_rate(
@@ -144,7 +144,7 @@ def set_rate(
         file = job.file
         named = names is not None or where is not None
         clips = file.chosen(names, where) if named else [c for c in file if c.frame_rate is None]
-        report, plan = Report(), whole(file)
+        report, plan = Report(), plan_whole(file)
         for clip in clips:
             _check_rate(clip, exact, force)
             plan.things[CLIP, clip.name] = Change(rate=exact)
@@ -215,7 +215,7 @@ def from_table(
         found = known.get(name, ())
         if len(found) > 1:
             raise OptionError(
-                f"row {number}: {name!r} may be {listed(sorted(found))}; write one of "
+                f"row {number}: {name!r} may be {list_some(sorted(found))}; write one of "
                 "these, or make it of more columns with match, such as {folder}/{trial}",
                 path=path,
             )
@@ -229,7 +229,7 @@ def from_table(
         said[clip] = {key: text for key, text in cells.items() if text}
     if unknown and not skip_unknown:
         raise OptionError(
-            f"no clip for {len(unknown)} of {len(rows)} rows: {listed(unknown)}", path=path
+            f"no clip for {len(unknown)} of {len(rows)} rows: {list_some(unknown)}", path=path
         )
     return said, unknown
 

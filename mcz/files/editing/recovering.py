@@ -14,8 +14,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.container.recovery.code import LANE, encoded, recovered
-from mcz.container.recovery.encoder import Step, computed, encode_packets
+from mcz.container.recovery.code import LANE, encode_blocks, recover_blocks
+from mcz.container.recovery.encoder import Step, compute_lanes, encode_packets
 from mcz.container.recovery.layout import (
     BODY_AT,
     HASH,
@@ -191,10 +191,10 @@ def _read_table(one: _RecoverySet) -> bytes | None:
         if index in one.sections:
             own[index] = np.frombuffer(one.sections[index], "<i8")
     if lost:
-        rest = encoded(lambda a, b: own[a:b], n, shape.n_parities, size // LANE)[rows]
+        rest = encode_blocks(lambda a, b: own[a:b], n, shape.n_parities, size // LANE)[rows]
         for at, row in enumerate(rows):
             rest[at] ^= np.frombuffer(one.sections[n + row], "<i8")
-        own[lost] = recovered(rest, lost, rows, shape.n_parities)
+        own[lost] = recover_blocks(rest, lost, rows, shape.n_parities)
     return own.astype("<i8").tobytes()
 
 
@@ -234,12 +234,12 @@ class Restorer:
             data = _read(self.source, shape.pieces(block), there[block]) if block in there else b""
             return (data or b"").ljust(shape.block_size, b"\0")
 
-        for start, whole in computed(shape, read, self.step) if lost else ():
+        for start, whole in compute_lanes(shape, read, self.step) if lost else ():
             rest = whole[rows]
             for at, row in enumerate(rows):
                 place = one.blocks[row] + LANE * start
                 rest[at] ^= np.frombuffer(self.source.read(place, rest[at].nbytes), "<i8")
-            found = recovered(rest, lost, rows, shape.n_recovery).astype("<i8")
+            found = recover_blocks(rest, lost, rows, shape.n_recovery).astype("<i8")
             for at, block in enumerate(lost):
                 self._write(shape, block, found[at].tobytes(), LANE * start)
 
@@ -296,7 +296,7 @@ def _bytes_behind(source: ByteSource, last: Examined) -> int:
     return max(0, source.size - last.set.shape.stop - last.shift)
 
 
-def checked(target: Target) -> Recovery | None:
+def check_recovery(target: Target) -> Recovery | None:
     """Check a file by its recovery data; None for a file without any.
 
     Raises AccessError where it cannot be read.

@@ -27,17 +27,17 @@ from mcz.files.editing.rewriting import (
     Rewriting,
     Thing,
     path_of,
+    plan_whole,
     rewriting,
     steps,
     things_in,
     used_by,
     used_by_skeleton,
-    whole,
 )
 from mcz.files.editing.safe_names import PortableNames
 from mcz.files.queries import Value
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.clips import clips_meant, listed
+from mcz.files.reading.clips import list_some, matching_clips
 from mcz.files.reading.fields import Where, getter_of
 from mcz.files.reading.file import File, open
 from mcz.files.writing.write_transaction import check_name
@@ -79,7 +79,7 @@ def delete_clips(
         missed = [alias for _, alias in others if (ALIAS, alias) not in gone]
         if missed and not aliases:
             raise OptionError(
-                f"{listed(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
+                f"{list_some(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
                 "under another name, which would go, too; name it, or say aliases",
                 path=file.name,
             )
@@ -98,11 +98,11 @@ def _find_thing(file: File, name: str) -> Thing:
     for kind, table in zip(KINDS, tables, strict=True):
         if name in table:
             return kind, name
-    clips = clips_meant(file.clips, name)
+    clips = matching_clips(file.clips, name)
     if len(clips) == 1:
         return CLIP, clips[0]
     if clips:
-        raise OptionError(f"{name!r} may be {listed(clips)}; choose one", path=file.name)
+        raise OptionError(f"{name!r} may be {list_some(clips)}; choose one", path=file.name)
     near = nearest(name, [other for _, other in things_in(file)])
     said = f"; did you mean {near}?" if near else ""
     raise OptionError(f"nothing is called {name!r}{said}", path=file.name)
@@ -110,7 +110,7 @@ def _find_thing(file: File, name: str) -> Thing:
 
 def _plan_without(file: File, gone: Collection[Thing]) -> Plan:
     """Plan a file without ``gone`` and without anything that only these need."""
-    plan = whole(file)
+    plan = plan_whole(file)
     plan.things = {thing: SAME for thing in plan.things if thing not in gone}
     needed = used_by(file, plan.of(CLIP))
     lost = used_by(file, [name for kind, name in gone if kind == CLIP])
@@ -150,7 +150,7 @@ def rename_clips(
     """
     with rewriting(target, output, force=force) as job:
         file, report = job.file, Report()
-        plan = whole(file)
+        plan = plan_whole(file)
         for old, new in names.items():
             thing = _find_thing(file, old)
             check_name(new)
@@ -205,7 +205,7 @@ def reorder_clips(
         file = job.file
         rest = list(file) if by is None else in_order(file, list(file), by)
         clips = dict.fromkeys((CLIP, clip.name) for clip in (*file.clips_called(names), *rest))
-        plan = whole(file)
+        plan = plan_whole(file)
         plan.things = dict.fromkeys([*clips, *plan.things], SAME)
         report = Report([Outcome(name, "moved") for _, name in clips])
         return _finish(job, plan, report, progress)

@@ -23,7 +23,7 @@ from mcz.files.editing.cutting import ClipCut, SignalCut, Unchanged, cut_segment
 from mcz.files.editing.extraction import Copier, Copying
 from mcz.files.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.files.editing.reencode import check_anew, settings_of
-from mcz.files.editing.rewriting import disk_path, hold
+from mcz.files.editing.rewriting import disk_path, lock_file
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.files.reading.stored_clip import with_indices
@@ -97,7 +97,7 @@ def replace(
         if target is None:
             target, force, inputs = disk_path(source), True, []
             if os.name == "posix":  # elsewhere nothing can be renamed to what is open
-                hold(target, stack)
+                lock_file(target, stack)
         stream = stack.enter_context(replacing_file(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)

@@ -87,7 +87,7 @@ class Plan:
         return {name: change for (its, name), change in self.things.items() if its == kind}
 
 
-def whole(file: File) -> Plan:
+def plan_whole(file: File) -> Plan:
     """All of a file, as it is."""
     return Plan(dict.fromkeys(things_in(file), SAME), list(file.container.directory.shared))
 
@@ -212,7 +212,7 @@ def rewriting(
     """
     with ExitStack() as stack:
         if output is None:
-            hold(disk_path(target), stack)
+            lock_file(disk_path(target), stack)
         yield Rewriting(target, output, force, stack.enter_context(open(target)))
 
 
@@ -225,7 +225,7 @@ def disk_path(target: Target) -> Path:
     return Path(target).resolve()
 
 
-def hold(path: Path, stack: ExitStack) -> None:
+def lock_file(path: Path, stack: ExitStack) -> None:
     """Keep others from appending to a file until ``stack`` ends; raises AccessError."""
     try:
         stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
@@ -269,7 +269,7 @@ def _protected_anew(
         if redundancy_of(job.file.container) is None:
             return None
         with replacing_file(disk_path(target), force=True) as stream:
-            left_out = job.written(stream, whole(job.file), lambda name: None)
+            left_out = job.written(stream, plan_whole(job.file), lambda name: None)
             if lost := [text for text in left_out if text != UNPROTECTED]:
                 raise FormatError(f"rewriting it would lose {lost[0]}", path=job.file.name)
             return protection_of(protect_written(stream, redundancy, progress))

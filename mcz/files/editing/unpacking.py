@@ -11,17 +11,17 @@ from pathlib import Path, PurePosixPath
 
 from mcz.container.strict import check_path
 from mcz.errors import FormatError, MczError, OptionError
-from mcz.files.editing.batch_report import Outcome, Report, failed
+from mcz.files.editing.batch_report import Outcome, Report, failure_outcome
 from mcz.files.editing.folders import set_time
 from mcz.files.editing.rewriting import ALIAS, ATTACHMENT, CLIP, SKELETON, Thing
 from mcz.files.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
 from mcz.files.jobs import limited
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.clips import listed
+from mcz.files.reading.clips import list_some
 from mcz.files.reading.fidelity import RESTORED, fidelity_of, text_notes
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open
-from mcz.files.reading.parallel_clips import shared_out
+from mcz.files.reading.parallel_clips import share_clips
 from mcz.model.types import Progress, Settings, Target
 
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
@@ -69,7 +69,7 @@ def unpack(
         wanted, whole = file.chosen(clips, where), clips is None and where is None
         stored = list(files_of(file, None if whole else wanted))
         writing = _Writing(target, folder, force, names, [one.path for one in stored])
-        with shared_out(_restore, file, stored) as restoring:
+        with share_clips(_restore, file, stored) as restoring:
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
                 if outcome.result == RESTORED:
@@ -85,7 +85,7 @@ def unpack(
                 if progress is not None:
                     progress(done + 1, len(stored), one.path)
         if timeless:
-            report.left_out.append(f"times of files that are no clips: {listed(timeless)}")
+            report.left_out.append(f"times of files that are no clips: {list_some(timeless)}")
         report.outcomes += _fileless_outcomes(wanted)
     return report
 
@@ -178,7 +178,7 @@ class _Writing:
             size, as_path = self._write(path, restore)
         except (MczError, OSError) as error:
             self.is_damaged |= isinstance(error, FormatError)
-            return failed(path, error)
+            return failure_outcome(path, error)
         return Outcome(path, RESTORED, size, "" if as_path == path else f"as {as_path}")
 
     def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:

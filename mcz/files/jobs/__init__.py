@@ -65,7 +65,7 @@ def engine() -> Engine | None:
 
 
 @contextmanager
-def using(engine: Engine) -> Iterator[None]:
+def use_engine(engine: Engine) -> Iterator[None]:
     """Let ``engine`` do what is called meanwhile, however little it is."""
     token = _ENGINE.set(engine)
     try:
@@ -74,7 +74,7 @@ def using(engine: Engine) -> Iterator[None]:
         _ENGINE.reset(token)
 
 
-def useful(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
+def useful_jobs(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
     """Number of processes that pay for so many files of so many bytes in all.
 
     ``stored``: they are clips of an MCZ file of that size.

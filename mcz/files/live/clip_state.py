@@ -43,7 +43,7 @@ class LiveClip:
     codec: str
 
 
-def needs(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
+def needed_chunks(fields: payloads.Clip) -> Iterator[tuple[bytes, bytes]]:
     """Kind and id of the chunks that a clip with these ``fields`` cannot be read without."""
     yield ChunkType.SKEL, bytes(fields.skeleton)
     if fields.source is not None:
@@ -63,7 +63,9 @@ def row_of(fields: payloads.Clip, chunk: Chunk) -> ClipRow:
     return ClipRow.of(fields, chunk)
 
 
-def begin(head: bytes, shared: Shared, row: ClipRow, fields: payloads.Clip) -> ClipState | None:
+def begin_clip(
+    head: bytes, shared: Shared, row: ClipRow, fields: payloads.Clip
+) -> ClipState | None:
     """Return a decoder of the clip that begins; None for a codec that needs all frames.
 
     ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError where the clip needs
@@ -87,7 +89,7 @@ def begin(head: bytes, shared: Shared, row: ClipRow, fields: payloads.Clip) -> C
 
 def opening(head: bytes, shared: Shared, fields: payloads.Clip) -> bytes:
     """A file as far as the clip with these ``fields``: what it needs, and no more."""
-    needed = [shared[key] for key in needs(fields) if key in shared]
+    needed = [shared[key] for key in needed_chunks(fields) if key in shared]
     return b"".join([SIGNATURE, head, *needed])
 
 

@@ -29,7 +29,7 @@ from mcz.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from mcz.files.live.clip_state import ClipState, LiveClip, Shared, begin, row_of
+from mcz.files.live.clip_state import ClipState, LiveClip, Shared, begin_clip, row_of
 from mcz.files.live.concealment import Concealer, LiveFrame, Lost
 from mcz.model.schema import MAX_COUNT, parse
 from mcz.model.text_format import brief
@@ -179,7 +179,7 @@ class FramesWithLosses:
         yield from self._leave("another clip began")
         try:
             fields = parse(payloads.Clip, event.payload, "CLIP")
-            followed = begin(self._head, self._shared, row_of(fields, event.chunk), fields)
+            followed = begin_clip(self._head, self._shared, row_of(fields, event.chunk), fields)
         except (UnsupportedError, LimitError):
             raise
         except FormatError as error:

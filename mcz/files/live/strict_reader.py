@@ -24,7 +24,7 @@ from mcz.container.scanner import Scanner
 from mcz.container.segments import FRESH
 from mcz.container.source import ByteSource
 from mcz.errors import FormatError, OptionError
-from mcz.files.live.clip_state import ClipState, LiveClip, Shared, begin, opening
+from mcz.files.live.clip_state import ClipState, LiveClip, Shared, begin_clip, opening
 from mcz.files.live.concealment import LiveFrame
 from mcz.files.live.reader_with_losses import StreamSummary
 from mcz.files.reading.clip import Clip
@@ -83,7 +83,9 @@ class StrictFrames:
                 assert row is not None
                 fields = parse(payloads.Clip, event.payload, row.clip.label)
                 before = opening(head, shared, fields)
-                clip = begin(head, shared, row, fields) or _WholeClip(before + event.data, row.name)
+                clip = begin_clip(head, shared, row, fields) or _WholeClip(
+                    before + event.data, row.name
+                )
             elif isinstance(clip, ClipState):
                 if kind == ChunkType.CEND:
                     clip.check_hash(parse(payloads.Cend, event.payload, "CEND"))  # PACK-19

@@ -29,9 +29,9 @@ from mcz.files.writing.clip_writer import begin_open_clip
 from mcz.files.writing.planning import (
     Prepared,
     StoredSkeleton,
-    asked,
+    find_targets,
     plan_open_clip,
-    read_with,
+    stored_with_base,
     under_its_path,
     wants_positions,
 )
@@ -131,7 +131,7 @@ class LiveWriter:
         check_metadata(metadata, name)
         self.skeleton, self._n_channels = skeleton, skeleton.n_channels
         self._positions = wants_positions(self.codec, self.options, skeleton)
-        skeletons = read_with(skeleton, None if base is None else under_its_path(base))
+        skeletons = stored_with_base(skeleton, None if base is None else under_its_path(base))
         coded = skeleton
         if self._positions:
             self._placed = FramePositions(skeleton, virtual_markers=self._virtual)
@@ -338,8 +338,10 @@ def _open_coders(
 ) -> tuple[LiveEncoder, LiveDecoder]:
     if codec.live is None or codec.follow is None:
         raise OptionError(f"codec {codec.name} does not code frame by frame")
-    if asked(options):
-        raise OptionError(f"{', '.join(asked(options))}: needs all frames, and none is known yet")
+    if find_targets(options):
+        raise OptionError(
+            f"{', '.join(find_targets(options))}: needs all frames, and none is known yet"
+        )
     layout = MemorySource(motion, 0, codec, writer.profile.segment_bytes).layout
     if len(layout.groups) != 1:
         raise MotionError(f"codec {codec.name}: {len(layout.groups)} groups, live there is one")

@@ -47,7 +47,7 @@ def as_number(text: str) -> int | float | None:
     return number if isfinite(number) else None
 
 
-def compared(left: Value, sign: str, right: Value) -> bool | None:
+def compare(left: Value, sign: str, right: Value) -> bool | None:
     """Compare ``left`` and ``right`` by a sign of ``COMPARISONS``; None: unknown.
 
     >>> compared("05", "==", 5), compared("05", "==", "5"), compared("a", "<", 5)
@@ -107,7 +107,7 @@ def _value_of(operand: Operand) -> Callable[[Lookup], Value]:
 def _comparison(
     left: Callable[[Lookup], Value], sign: str, right: Callable[[Lookup], Value]
 ) -> Test:
-    return lambda lookup: compared(left(lookup), sign, right(lookup))
+    return lambda lookup: compare(left(lookup), sign, right(lookup))
 
 
 def _likeness(value: Callable[[Lookup], Value], pattern: str) -> Test:

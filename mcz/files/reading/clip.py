@@ -25,8 +25,8 @@ from mcz.files.reading.views import (
     FrameValues,
     Masked,
     Preview,
-    decimated,
-    decimated_rows,
+    decimate_motion,
+    decimate_rows,
     preview,
 )
 from mcz.hints import Hint
@@ -124,7 +124,7 @@ class Clip(StoredClip):
         if not decimate:
             return values
         per_frame = self.signals[signal].layout.samples_per_frame
-        return decimated_rows(values, per_frame, 2**resolution)
+        return decimate_rows(values, per_frame, 2**resolution)
 
     def read_masked(
         self,
@@ -246,7 +246,7 @@ class Clip(StoredClip):
             first_time=self.first_time,
         )
         step = 2**resolution if decimate else 1
-        motion = decimated(motion, step) if step > 1 else motion
+        motion = decimate_motion(motion, step) if step > 1 else motion
         motion = replace(motion, source=self._source(start, stop, resolution, step))
         if step == 1 and (not start or self.first_time is None):
             return motion

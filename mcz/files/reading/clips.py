@@ -23,18 +23,18 @@ Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
 KEPT = 64
 
 
-def clip_called(clips: Clips, name: str) -> str:
+def find_clip_name(clips: Clips, name: str) -> str:
     """The name of the clip that ``name`` means; see ``File.only_clip``. Raises OptionError."""
-    found = clips_meant(clips, name)
+    found = matching_clips(clips, name)
     if len(found) == 1:
         return found[0]
     if found:
-        raise OptionError(f"{name!r} may be {listed(found)}; choose one")
+        raise OptionError(f"{name!r} may be {list_some(found)}; choose one")
     raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
 
 
 def names_of(clips: Clips) -> dict[str, set[str]]:
-    """The names that clips may have, as ``clips_meant`` finds it, for who asks for many."""
+    """The names that clips may have, as ``matching_clips`` finds it, for who asks for many."""
     known: dict[str, set[str]] = {name: {name} for name in clips}
     for names in _naming_ways(clips):
         found: dict[str, set[str]] = {}
@@ -44,7 +44,7 @@ def names_of(clips: Clips) -> dict[str, set[str]]:
     return known
 
 
-def clips_meant(clips: Clips, name: str) -> list[str]:
+def matching_clips(clips: Clips, name: str) -> list[str]:
     """The names of the clips that ``name`` may mean, sorted."""
     if name in clips.rows:
         return [name]
@@ -85,10 +85,10 @@ def _last_parts(names: Named) -> Named:
 
 def _suggestion(clips: Iterable[str], name: str) -> str:
     near = nearest(name, [*clips, *(clip.rpartition("/")[2] for clip in clips)])
-    return f"did you mean {near}?" if near else f"there are: {listed(clips) or 'none'}"
+    return f"did you mean {near}?" if near else f"there are: {list_some(clips) or 'none'}"
 
 
-def listed(names: Iterable[str]) -> str:
+def list_some(names: Iterable[str]) -> str:
     """Some names, few of many."""
     known = list(names)
     return ", ".join(known[:FEW]) + (" ..." if len(known) > FEW else "")
@@ -117,7 +117,7 @@ class Clips(Mapping[str, Clip]):
             raise UnknownNameError(f"{name!r} is not the name of a clip", path=self.file_name)
         if name not in self.rows:
             try:
-                name = clip_called(self, name)
+                name = find_clip_name(self, name)
             except OptionError as error:
                 raise UnknownNameError(error.message, path=self.file_name) from None
         found = self._alive.get(name)
@@ -128,7 +128,7 @@ class Clips(Mapping[str, Clip]):
         return found
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and len(clips_meant(self, name)) == 1
+        return isinstance(name, str) and len(matching_clips(self, name)) == 1
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.rows)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from mcz.container.checksums import Checked, check_checksums
+from mcz.container.checksums import ChecksumReport, check_checksums
 from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.reader import Container
 from mcz.container.recovery.encoder import encode_packets
@@ -25,7 +25,7 @@ from mcz.files.jobs import limited
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open, open_bytes
-from mcz.files.reading.parallel_clips import shared_out
+from mcz.files.reading.parallel_clips import share_clips
 from mcz.files.reading.signal_info import read_segments
 from mcz.model.text_format import brief
 from mcz.model.types import Target
@@ -58,7 +58,7 @@ def heading(source: ByteSource, offset: int) -> str:
 
 def quick_check(
     target: Target, progress: Callable[[int, int], object] | None = None
-) -> tuple[Checked, list[Problem]]:
+) -> tuple[ChecksumReport, list[Problem]]:
     """Check every checksum of a file and its index; what was seen, and the faults.
 
     While another process appends to the file, this is of the file up to its last end.
@@ -80,7 +80,7 @@ def quick_check(
 
 def _check_quickly(
     source: ByteSource, progress: Callable[[int, int], object] | None
-) -> tuple[Checked, list[Problem]]:
+) -> tuple[ChecksumReport, list[Problem]]:
     seen = check_checksums(source, progress)
     return seen, [Problem(at, heading(source, at), text) for at, text in seen.faults]
 
@@ -147,7 +147,7 @@ def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[R
     items += [("attachment", name) for name in (file.attachments if clips is None else ())]
     items += [("recovery data", "")] if clips is None else []
     names = None if clips is None else [clip.name for clip in clips]
-    with shared_out(_problems_of, file, items, names) as answers:
+    with share_clips(_problems_of, file, items, names) as answers:
         for answer in answers:
             yield from answer()
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from mcz.codecs import codec_by_id
 from mcz.container.chunks import FRAMING, HEADER, ChunkType
 from mcz.container.directory import ClipRow, SegmentRow
-from mcz.container.metadata import SAID, SPELLINGS, Record
+from mcz.container.metadata import SETTABLE, SPELLINGS, Record
 from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.errors import OptionError, UnsupportedError
 from mcz.files.reading.clip import Clip
@@ -88,7 +88,7 @@ def _find_getter(name: str, clips: Collection[Clip]) -> Getter | None:
         return FIELDS[name]
     key = name.removeprefix(METADATA)
     key = SPELLINGS.get(key, key)
-    is_key = key in SAID or any(_last_record(key, clip) for clip in clips)
+    is_key = key in SETTABLE or any(_last_record(key, clip) for clip in clips)
     is_key = is_key or any(key in clip.metadata for clip in clips)
     if is_key:
         return partial(_metadata, key)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, ChunkType
 from mcz.container.directory import AttachmentRow
-from mcz.container.metadata import applied
+from mcz.container.metadata import apply_records
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource, open_source, path_of
 from mcz.errors import (
@@ -29,7 +29,7 @@ from mcz.errors import (
     reason_of,
 )
 from mcz.files.reading.clip import Clip
-from mcz.files.reading.clips import Clips, listed
+from mcz.files.reading.clips import Clips, list_some
 from mcz.files.reading.fields import Where, filter_clips
 from mcz.files.reading.lost_skeletons import restore_skeletons
 from mcz.files.reading.source_info import sourced_skeleton
@@ -174,7 +174,7 @@ class File:
     @property
     def metadata(self) -> Mapping[str, str]:
         """Metadata of the file as a whole, see ``Clip.metadata``."""
-        return applied({}, self.container.metadata_records(""))
+        return apply_records({}, self.container.metadata_records(""))
 
     @property
     def damage(self) -> list[str]:
@@ -234,7 +234,7 @@ class File:
         if name is not None:
             return self.clips[name]
         if len(self.clips) != 1:
-            names = listed(self.clips)
+            names = list_some(self.clips)
             raise OptionError(
                 f"it has {len(self.clips)} clips, choose one: {names}", path=self.name
             )

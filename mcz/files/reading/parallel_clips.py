@@ -14,7 +14,7 @@ from typing import Any, TypeVar, cast
 
 from mcz.codecs import CODECS, ENTRIES
 from mcz.errors import FormatError
-from mcz.files.jobs import ONE, Answer, useful
+from mcz.files.jobs import ONE, Answer, useful_jobs
 from mcz.files.jobs.pool import answers
 from mcz.files.reading.file import File
 from mcz.sources import FORMATS
@@ -26,7 +26,7 @@ PACKAGE = "mcz."
 
 
 @contextmanager
-def shared_out(
+def share_clips(
     function: Callable[[Shared, Item], Result],
     file: File,
     items: Sequence[Item],
@@ -37,7 +37,7 @@ def shared_out(
     Processes of ``mcz.files.jobs`` do it where they can open the file and are worth their start;
     otherwise each call runs here when its answer is asked for.
     """
-    jobs = useful(len(items), file.size, stored=True) if can_be_shared(file) else ONE
+    jobs = useful_jobs(len(items), file.size, stored=True) if can_be_shared(file) else ONE
     if jobs == ONE:
         yield (partial(function, (file, said), item) for item in items)
         return

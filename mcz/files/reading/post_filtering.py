@@ -19,7 +19,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.source_files import SourceOptions
 from mcz.files.reading.source_info import stating_rate
-from mcz.files.reading.views import decimated_rows
+from mcz.files.reading.views import decimate_rows
 from mcz.hints import Hint
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import SEPARATOR
@@ -137,8 +137,8 @@ def _with_places(
     motion = clip.motion(frames, resolution, decimate=decimate)
     first, step = motion.signals[0], 2**resolution if decimate else 1
     if step > 1:
-        values = decimated_rows(values, first.samples_per_frame, step)
-        mask = None if mask is None else decimated_rows(mask, first.samples_per_frame, step)
+        values = decimate_rows(values, first.samples_per_frame, step)
+        mask = None if mask is None else decimate_rows(mask, first.samples_per_frame, step)
     if rate is not None:
         motion = replace(motion, frame_rate=rate / step, frame_rate_exact=True)
     grids = first.grids if first.values.dtype == np.float64 else ()

@@ -66,7 +66,7 @@ def read(
         source_format, data = load(path)
         if source_format.is_skeleton:
             raise OptionError("a skeleton without motion (mcz.read_skeleton reads it)", path=path)
-        taken = take(path, skeleton, data=data)
+        taken = read_motion(path, skeleton, data=data)
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
         motion = taken.motion
@@ -75,7 +75,7 @@ def read(
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class SkeletonChoice:
     """A skeleton for a motion file: ``how`` it was found, and what is to be said of it, or "".
 
     ``path`` is that of its file, where it has one that was read here.
@@ -88,11 +88,11 @@ class Chosen:
 
 
 @dataclass(frozen=True, slots=True)
-class Taken:
+class ReadMotion:
     """A motion as read from its file, and the skeleton that was chosen for it."""
 
     motion: Motion
-    chosen: Chosen | None
+    chosen: SkeletonChoice | None
 
     @property
     def skeleton(self) -> Skeleton | None:
@@ -104,14 +104,14 @@ class Taken:
         return self.chosen.remark if self.chosen is not None else ""
 
 
-def take(
+def read_motion(
     path: Path,
     given: Given = None,
     unit: str | None = None,
     data: bytes | None = None,
     *,
     flat: bool = False,
-) -> Taken:
+) -> ReadMotion:
     """Read the motion file ``path``, whose bytes are ``data`` if they were read already.
 
     ``given`` is the skeleton of a format that wants one: an object, the path of a file, "none" for
@@ -121,22 +121,22 @@ def take(
     """
     source_format, data = load(path) if data is None else (format_of(path, data), data)
     if not source_format.wants_skeleton:
-        return Taken(read_source(path, source_format, None, data), None)
+        return ReadMotion(read_source(path, source_format, None, data), None)
     try:
-        chosen = choose(path, source_format, data, given)
+        chosen = choose_skeleton(path, source_format, data, given)
     except AmbiguousError as error:
         if not flat:
             raise
         motion = read_source(path, source_format, None, data)
-        return Taken(with_note(motion, f"kept without a skeleton: {error.reason}"), None)
+        return ReadMotion(with_note(motion, f"kept without a skeleton: {error.reason}"), None)
     if chosen is not None:
         chosen = replace(chosen, skeleton=in_unit(chosen.skeleton, unit))
     if chosen is None:
-        return Taken(read_source(path, source_format, None, data), None)
+        return ReadMotion(read_source(path, source_format, None, data), None)
     motion = read_source(path, source_format, chosen.skeleton, data)
     if motion.skeleton is not chosen.skeleton:  # bones may come later than in the first frame
         chosen = _with_misfits(path, source_format, data, chosen, asked=given is not None)
-    return Taken(with_note(motion, chosen.how), chosen)
+    return ReadMotion(with_note(motion, chosen.how), chosen)
 
 
 def with_note(motion: Motion, how: str) -> Motion:
@@ -145,7 +145,9 @@ def with_note(motion: Motion, how: str) -> Motion:
     return replace(motion, metadata=dict(motion.metadata) | {NOTE: notes})
 
 
-def choose(path: Path, source_format: Format, data: bytes, given: Given) -> Chosen | None:
+def choose_skeleton(
+    path: Path, source_format: Format, data: bytes, given: Given
+) -> SkeletonChoice | None:
     """The skeleton for the file ``path`` with the bytes ``data``, None where there is none."""
     assert source_format.bones is not None
     counts = source_format.bones(data)
@@ -159,9 +161,9 @@ def choose(path: Path, source_format: Format, data: bytes, given: Given) -> Chos
     return _choose_candidate(path, skeletons_around(path), counts) if counts else None
 
 
-def _check_asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> Chosen:
+def _check_asked(path: Path, skeleton: Skeleton, label: str, counts: Counts) -> SkeletonChoice:
     check_own(str(path), skeleton, label, counts)
-    return Chosen(skeleton, how_given(skeleton))
+    return SkeletonChoice(skeleton, how_given(skeleton))
 
 
 def how_given(skeleton: Skeleton) -> str:
@@ -207,7 +209,9 @@ class _Tried:
         return f"{path} (whose bones fit)"
 
 
-def _choose_candidate(path: Path, around: Sequence[Candidate], counts: Counts) -> Chosen | None:
+def _choose_candidate(
+    path: Path, around: Sequence[Candidate], counts: Counts
+) -> SkeletonChoice | None:
     """The one of the candidates that can be taken; None where there are none."""
     named = [_try(candidate, counts) for candidate in around if candidate.name_of]
     for grade in (2, 1):
@@ -237,7 +241,7 @@ def _try(candidate: Candidate, counts: Counts) -> _Tried:
     return _Tried(candidate, skeleton, match_bones(skeleton, counts))
 
 
-def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> Chosen:
+def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> SkeletonChoice:
     first = fitting[0]
     if len(fitting) > 1:
         if first.candidate.name_of:
@@ -252,12 +256,12 @@ def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> Chosen:
     if first.match.differing:
         remark = remark or f"its skeleton is {asf}"
         remark += f"; the dofs of {_listed(first.match.differing)} are not those of the file"
-    return Chosen(first.skeleton, how, remark, asf)
+    return SkeletonChoice(first.skeleton, how, remark, asf)
 
 
 def _with_misfits(
-    path: Path, source_format: Format, data: bytes, chosen: Chosen, *, asked: bool
-) -> Chosen:
+    path: Path, source_format: Format, data: bytes, chosen: SkeletonChoice, *, asked: bool
+) -> SkeletonChoice:
     """``chosen`` with a remark on the bones of the whole file that it does not fit."""
     assert source_format.bones is not None
     match = match_bones(chosen.skeleton, source_format.bones(data, whole=True))

@@ -20,7 +20,7 @@ from mcz.errors import FormatError, SkeletonWarning, UnsupportedError
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File
-from mcz.files.reading.read import take
+from mcz.files.reading.read import read_motion
 from mcz.files.reading.signal_info import SignalInfo
 from mcz.files.reading.sizes import (
     Sizes,
@@ -254,7 +254,7 @@ def source_info(
     document: JsonObject = {"format": source_format.name, "file_bytes": len(data)}
     if source_format.is_skeleton:
         return document | {"skeletons": [_skeleton_facts(read_skeleton(path))], "clips": []}
-    taken = take(path, skeleton, data=data)
+    taken = read_motion(path, skeleton, data=data)
     if taken.remark:
         warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
     motion = taken.motion

@@ -122,7 +122,7 @@ class SourceOptions:
 
     def __post_init__(self) -> None:
         if self.rate is not None:
-            checked_rate(self.rate)
+            parse_rate(self.rate)
         if self.unit is not None:
             unit_cm_of(self.unit)
         facing(Skeleton(()), *self.axes)
@@ -143,7 +143,7 @@ class SourceOptions:
 
             motion = with_model(motion, self.model)
         if self.rate is not None and (self.force_rate or motion.frame_rate is None):
-            rate = checked_rate(self.rate)
+            rate = parse_rate(self.rate)
             motion = motion.at_rate(rate)
         if self.unit is not None:
             motion = replace(motion, skeleton=in_unit(motion.skeleton, self.unit))
@@ -165,7 +165,7 @@ class SourceOptions:
         return unknown.applied_to(motion)
 
 
-def checked_rate(rate: Fraction | float) -> Fraction:
+def parse_rate(rate: Fraction | float) -> Fraction:
     """``rate`` as a Fraction; raises OptionError where it is no positive number."""
     try:
         exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))

@@ -15,7 +15,7 @@ from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.errors import FormatError, UnsupportedError
 from mcz.files.reading.signal_info import SignalInfo
-from mcz.files.reading.views import picked_notes
+from mcz.files.reading.views import pick_notes
 from mcz.model.clock import SAME_RATE, usual_step
 from mcz.model.motion import FrameNotes, Motion, Skeleton, Source
 from mcz.model.numbers.scaling import Scaling
@@ -114,7 +114,7 @@ def _frame_notes(
     if frames == whole:
         return notes
     picked = range(frames.start - base, frames.stop - base, frames.step)
-    return picked_notes(source_format.join_notes, notes, picked)
+    return pick_notes(source_format.join_notes, notes, picked)
 
 
 def sourced_skeleton(container: Container, id_: bytes) -> Skeleton:

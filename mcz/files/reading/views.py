@@ -156,7 +156,7 @@ Item = TypeVar("Item", bound=np.generic)
 JoinNotes = Callable[[Sequence[tuple[int, int, bytes]]], FrameNotes]
 
 
-def decimated_rows(values: NDArray[Item], samples_per_frame: int, step: int) -> NDArray[Item]:
+def decimate_rows(values: NDArray[Item], samples_per_frame: int, step: int) -> NDArray[Item]:
     """The rows of frames 0, step, 2 * step, ...; ``values`` has samples_per_frame rows a frame."""
     if samples_per_frame == 1:
         return values[::step]
@@ -165,7 +165,7 @@ def decimated_rows(values: NDArray[Item], samples_per_frame: int, step: int) -> 
     return frames.reshape(-1, values.shape[1])
 
 
-def decimated(motion: Motion, step: int) -> Motion:
+def decimate_motion(motion: Motion, step: int) -> Motion:
     """Frames 0, step, 2 * step, ... of ``motion``, with their numbers, at 1 / step of its rate.
 
     Its source is left out.
@@ -193,7 +193,7 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
             changes[frame * per_frame, channel] = grid
 
     def thin(values: NDArray[Item]) -> NDArray[Item]:
-        return decimated_rows(values, per_frame, step)
+        return decimate_rows(values, per_frame, step)
 
     return replace(
         signal,
@@ -210,7 +210,7 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
     )
 
 
-def picked_notes(join_notes: JoinNotes, notes: FrameNotes, frames: range) -> FrameNotes:
+def pick_notes(join_notes: JoinNotes, notes: FrameNotes, frames: range) -> FrameNotes:
     """The notes of some frames alone, numbered from 0."""
     if frames.step == 1:
         return notes.part(frames.start, frames.stop)

@@ -69,7 +69,7 @@ class Written:
     __repr__ = brief
 
 
-def written(
+def summarize(
     directory: Directory,
     size: int,
     quality: Mapping[str, str] | None = None,
@@ -132,7 +132,7 @@ def write(
         writer = Writer(stream, profile=profile_named(profile), copies=copies)
         quality = write_motion(writer, prepared, found, params, progress)
         writer.finish()
-    return written(writer.directory, writer.offset, quality)
+    return summarize(writer.directory, writer.offset, quality)
 
 
 def encode(
@@ -192,7 +192,7 @@ def encode(
     if entry.remark:
         warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
     directory, size = transaction.writer.directory, transaction.writer.offset
-    found = written(directory, size, entry.quality, entry.notes, entry.source_bytes)
+    found = summarize(directory, size, entry.quality, entry.notes, entry.source_bytes)
     return replace(found, inputs=tuple(map(str, entry.inputs)))
 
 

@@ -74,7 +74,7 @@ def prepare(
     return Prepared(made, (*skeletons, StoredSkeleton(made.skeleton, derives=True)))
 
 
-def read_with(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[StoredSkeleton, ...]:
+def stored_with_base(skeleton: Skeleton, base: StoredSkeleton | None) -> tuple[StoredSkeleton, ...]:
     """The stored skeletons of one that was read with ``base``, whose file stays as it is."""
     if base is None:
         return (StoredSkeleton(skeleton),)
@@ -219,8 +219,10 @@ def plan_clip(prepared: Prepared, codec: Codec, params: Params, profile: Profile
     that the codec cannot hold, LimitError for what the profile does not allow.
     """
     options = codec.options(params, inner=True)
-    if codec.dial and asked(options) and options[codec.dial.parameter] is None:
-        raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
+    if codec.dial and find_targets(options) and options[codec.dial.parameter] is None:
+        raise OptionError(
+            f"{', '.join(find_targets(options))}: {codec.dial.parameter} is not yet found"
+        )
     counted = prepared.motion.counted_by_ones()
     motion = as_stored(with_source_hash(counted, lossless=codec.lossless))
     for signal in motion.signals:
@@ -242,7 +244,7 @@ def plan_open_clip(
     return ClipPlan(prepared, options, models, (SignalPlan(source, codec, encoded),))
 
 
-def asked(options: Params) -> JsonObject:
+def find_targets(options: Params) -> JsonObject:
     """The targets among the options of a codec."""
     return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
 

@@ -15,17 +15,17 @@ from mcz.container.limits import BASE, LARGE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError, remark_of
 from mcz.files import jobs
-from mcz.files.reading.read import NONE, NOTE, Given, Taken, take
+from mcz.files.reading.read import NONE, NOTE, Given, ReadMotion, read_motion
 from mcz.files.reading.source_files import (
     SourceOptions,
-    checked_rate,
     content_note,
+    parse_rate,
     read_bytes,
     read_skeleton,
 )
 from mcz.files.reading.source_info import stating_rate
 from mcz.files.writing.clip_writer import write_skeletons
-from mcz.files.writing.planning import StoredSkeleton, prepare, read_with
+from mcz.files.writing.planning import StoredSkeleton, prepare, stored_with_base
 from mcz.files.writing.tuning import write_motion
 from mcz.files.writing.write_transaction import WriteTransaction, check_name, clip_name
 from mcz.hints import Hint, Remark
@@ -147,7 +147,7 @@ class SourceEncoder:
             write_skeletons(writer, (StoredSkeleton(skeleton, path=self.name),))
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
-        taken = take(self.path, given, self.options.unit, data, flat=self.options.flat)
+        taken = read_motion(self.path, given, self.options.unit, data, flat=self.options.flat)
         self._keep_notes(taken)
         motion = self.options.applied_to(taken.motion)
         notes = rate_notes(taken.motion.frame_rate, self.options)
@@ -159,11 +159,11 @@ class SourceEncoder:
         if not codec.lossless:  # the file does not come back: what comes states its rate
             motion = stating_rate(motion)
         base = None if taken.skeleton is None else self._store_skeleton(taken.skeleton)
-        prepared = prepare(motion, codec, params, read_with(motion.skeleton, base))
+        prepared = prepare(motion, codec, params, stored_with_base(motion.skeleton, base))
         self.quality = write_motion(writer, prepared, codec, params, progress)
         return "parsed"
 
-    def _keep_notes(self, taken: Taken) -> None:
+    def _keep_notes(self, taken: ReadMotion) -> None:
         self.remark = taken.remark
         keys = ("source-note", *(() if taken.skeleton is not None else (NOTE,)))
         found = (taken.motion.metadata.get(key, "") for key in keys)
@@ -183,7 +183,7 @@ def rate_notes(stated: Fraction | None, options: SourceOptions) -> Iterator[str]
     """A note where the frame rate that a file states is not the one that was asked for."""
     if stated is None or options.rate is None:
         return
-    asked = float(checked_rate(options.rate))
+    asked = float(parse_rate(options.rate))
     if abs(float(stated) / asked - 1) <= SAME_RATE:
         return
     if options.force_rate:

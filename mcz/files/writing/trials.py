@@ -1,7 +1,8 @@
 """Trials of parameters: the clip is written to memory, and measured as a reader has it.
 
-Nothing is trusted that the public reader did not give. ``bounded`` meets a greatest error by finer
-steps where it is missed, ``weighted`` the mean errors of joints by what each of them weighs.
+Nothing is trusted that the public reader did not give. ``meet_bound`` meets a greatest error by
+finer steps where it is missed, ``weigh_joints`` the mean errors of joints by what each of them
+weighs.
 """
 
 from __future__ import annotations
@@ -178,7 +179,7 @@ def _error(target: Target, comparison: Comparison) -> float:
     return float(value)
 
 
-def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
+def meet_bound(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
     """A step and the refinement of frames that meet the bound, and what the record says of it.
 
     Raises OptionError where none that was tried does.
@@ -216,7 +217,7 @@ def _first_step(dial: Dial, target: Target, trial: Trials) -> float:
     return step
 
 
-def averaged(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
+def meet_mean(dial: Dial, target: Target, trial: Trials) -> tuple[JsonObject, dict[str, str]]:
     """The coarsest step that keeps a mean error of channels, whose steps are quarters of octaves.
 
     Raises OptionError where none that was tried does.
@@ -250,7 +251,7 @@ def _refine(octaves: NDArray[np.int64], ratios: Floats) -> NDArray[np.int64]:
     return np.minimum(octaves + added, MOST_OCTAVES)
 
 
-def weighted(
+def weigh_joints(
     dial: Dial, trial: Trials, limits: Limits, found: Params
 ) -> tuple[JsonObject, dict[str, str]]:
     """Weights with which the joints keep their ``limits``, with the parameters ``found``.

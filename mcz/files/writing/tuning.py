@@ -19,7 +19,7 @@ from mcz.container.limits import Profile
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.files.writing.clip_writer import Amend, write_plan
-from mcz.files.writing.planning import Prepared, asked, check_bones, plan_clip
+from mcz.files.writing.planning import Prepared, check_bones, find_targets, plan_clip
 from mcz.files.writing.signal_bounds import (
     MAX_ERROR,
     MEAN_ERROR,
@@ -34,9 +34,9 @@ from mcz.files.writing.trials import (
     Limits,
     Target,
     Trials,
-    averaged,
-    bounded,
-    weighted,
+    meet_bound,
+    meet_mean,
+    weigh_joints,
 )
 from mcz.hints import Hint
 from mcz.kinematics import positions_of
@@ -72,16 +72,16 @@ def write_motion(
     none. Raises OptionError where a target cannot be met or has no meaning for this clip.
     """
     motion, bounded_signals = with_bounds(prepared.motion, codec, params)
-    found, remarks = tuned(motion, codec, of_codec(params), writer.profile)
+    found, remarks = tune(motion, codec, of_codec(params), writer.profile)
     plan = plan_clip(replace(prepared, motion=motion), codec, found, writer.profile)
     remarks |= bounded_signals
     return write_plan(writer, plan, progress, remarks=remarks, amend=amend)
 
 
-def tuned(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Found:
+def tune(motion: Motion, codec: Codec, params: Params, profile: Profile) -> Found:
     """``params`` with a setting of the dial that meets the targets among them, on trial files."""
     options = codec.options(params)
-    targets = asked(options)
+    targets = find_targets(options)
     _check_preset(codec, params, options, targets)
     promise = codec.promise if motion.signals[0].n_channels else None
     if not targets and promise and codec.dial and options[codec.dial.parameter] is None:
@@ -126,7 +126,7 @@ def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Li
     weights: JsonObject = {}
     for _ in range(MOST_TURNS):
         found, remarks = _meet_target(codec, target, trial.given(weights))
-        weights, kept = weighted(codec.dial, trial, limits, {**found, **weights})
+        weights, kept = weigh_joints(codec.dial, trial, limits, {**found, **weights})
         both = {**found, **weights}
         if target is None or trial.figure(target, both) <= target.limit:
             return both, {**remarks, **kept}
@@ -141,9 +141,9 @@ def _meet_target(codec: Codec, target: Target | None, trial: Trials) -> Found:
     if target.name.startswith("max_error") and codec.has(REFINEMENT):
         if target.weights is None:
             _check_places(trial.motion, codec.dial, target)
-        return bounded(codec.dial, target, trial)
+        return meet_bound(codec.dial, target, trial)
     if target.weights is not None and codec.has(LIMITS):
-        return averaged(codec.dial, target, trial)
+        return meet_mean(codec.dial, target, trial)
     return _search_dial(codec.dial, target, trial)
 
 

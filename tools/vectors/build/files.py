@@ -30,7 +30,7 @@ from mcz.container.chunks import (
 )
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
 from mcz.container.index import index_record
-from mcz.container.index_reader import named, place_of
+from mcz.container.index_reader import index_name, place_of
 from mcz.container.limits import BASE, FORMAT_NAME, Profile
 from mcz.container.packets import (
     CHECK_SIZE,
@@ -303,7 +303,7 @@ class Crafter(Writer):
             chunk = self.edited("INDX_frame", self._index_chunk())
             start, length = self.offset, len(chunk)
             if self.continued:
-                self.directory.indexes += (place_of(named(chunk, start), 0, self.directory),)
+                self.directory.indexes += (place_of(index_name(chunk, start), 0, self.directory),)
             self._write(chunk)
         self._write(self.edited("FOOT", build_foot(start, length)))
 

@@ -14,7 +14,7 @@ from mcz.codecs.spatial.lsdt_frame import FrameHeader
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.codecs.wavelet.wavelet import WaveletHeader
 from mcz.container import index_records, payloads, segments
-from mcz.container.dictionary_deflate import decoded, words
+from mcz.container.dictionary_deflate import decode_data, words
 from mcz.container.index_records import Index
 from mcz.model.schema import (
     Record,
@@ -63,7 +63,7 @@ class View:
 
 def _content(payload: bytes) -> bytes:
     fields = parse(payloads.Srce, payload, "SRCE")
-    return decoded(fields.data, fields.flags, fields.size, "SRCE")
+    return decode_data(fields.data, fields.flags, fields.size, "SRCE")
 
 
 def _with_content(payload: bytes, content: bytes) -> bytes:
@@ -80,7 +80,7 @@ def _with_content(payload: bytes, content: bytes) -> bytes:
 def _copied(payload: bytes) -> bytes:
     """The content of a COPY or META: flags, size, data."""
     size, at = read_varint(payload, 1)
-    return decoded(payload[at:], payload[0], size, "COPY")
+    return decode_data(payload[at:], payload[0], size, "COPY")
 
 
 def _with_copied(payload: bytes, content: bytes) -> bytes:
