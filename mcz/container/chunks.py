@@ -106,12 +106,9 @@ class Foot:
     index_length: int
 
 
-def _header_check(kind: bytes, flags: int, length: int) -> int:
-    return zlib.crc32(kind + bytes((flags, 0)) + struct.pack("<Q", length)) & 0xFFFF
-
-
 def build_header(kind: bytes, flags: int, length: int) -> bytes:
-    return HEADER.pack(kind, flags, 0, _header_check(kind, flags, length), length)
+    check = zlib.crc32(kind + bytes((flags, 0)) + struct.pack("<Q", length)) & 0xFFFF
+    return HEADER.pack(kind, flags, 0, check, length)
 
 
 def build_chunk(kind: bytes, payload: bytes, flags: int = 0) -> bytes:
@@ -210,9 +207,8 @@ def check_crc(chunk: Chunk, computed: int, crc: bytes) -> None:
 
 
 def build_foot(index_offset: int, index_length: int) -> bytes:
-    flags = 0
     rest = struct.pack("<QQ", index_offset, index_length) + END_MAGIC
-    return struct.pack("<II", flags, zlib.crc32(struct.pack("<I", flags) + rest)) + rest
+    return struct.pack("<II", 0, zlib.crc32(bytes(4) + rest)) + rest  # no flags
 
 
 def parse_foot(data: bytes, offset: int) -> Foot | None:

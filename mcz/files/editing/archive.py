@@ -343,10 +343,9 @@ def _find_superseded(file: File, named: Named) -> tuple[list[str], Said]:
         clip = clips.get(name)
         old.append(name if clip is None else clip.name)
         if clip is not None:
-            words = {key: value for key, value in clip.metadata.items() if _is_said(key)}
-            said[name] = words
+            said[name] = {
+                key: value
+                for key, value in clip.metadata.items()
+                if (key in SETTABLE and key != "mtime") or key.startswith("x-")
+            }
     return old, said
-
-
-def _is_said(key: str) -> bool:
-    return (key in SETTABLE and key != "mtime") or key.startswith("x-")

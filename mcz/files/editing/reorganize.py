@@ -252,7 +252,9 @@ def split(
         groups = _group_clips(file, by, rest)
         portable = PortableNames()
         outputs = {v: folder / portable(f"{v.replace('/', '_')}.mcz") for v in groups}
-        _check_outputs(outputs.values(), force)
+        for path in () if force else outputs.values():
+            if os.path.lexists(path):
+                raise ExistsError("it exists", path=path, hint=Hint.FORCE)
         folder.mkdir(parents=True, exist_ok=True)
         step = steps(progress, len(file.clips))
         for value, names in groups.items():
@@ -292,12 +294,6 @@ def _folder(clip: Clip) -> Value:
 
 def _text(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _check_outputs(outputs: Iterable[Path], force: bool) -> None:
-    for path in outputs:
-        if not force and os.path.lexists(path):
-            raise ExistsError("it exists", path=path, hint=Hint.FORCE)
 
 
 def _plan_part(file: File, names: Sequence[str], *, with_rest: bool) -> Plan:

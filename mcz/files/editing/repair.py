@@ -220,7 +220,8 @@ def _clip_at(repairer: Repairer, offset: int) -> str:
 def _lost_things(container: Container) -> Iterator[str]:
     """Lost things, by the names that an index has for them."""
     last = max(container.feet, default=0)
-    indices = {_index_offset(container, foot) for foot in container.feet}
+    feet = (parse_foot(container.source.read(at, FOOT.size), at) for at in container.feet)
+    indices = {foot.index_offset for foot in feet if foot}
     names = _indexed_names(container)
     for at, chunk in container.broken:
         if chunk is None and at < last and at not in indices and not _is_foot(container, at):
@@ -229,11 +230,6 @@ def _lost_things(container: Container) -> Iterator[str]:
                 yield name
         elif chunk is not None and chunk.type not in TOLD:
             yield names.get(at, f"chunk {chunk.label}")
-
-
-def _index_offset(container: Container, foot: int) -> int:
-    found = parse_foot(container.source.read(foot, FOOT.size), foot)
-    return found.index_offset if found else 0
 
 
 def _is_foot(container: Container, at: int) -> bool:

@@ -96,7 +96,9 @@ class Pool:
                 if not went_well:
                     raise value
                 return cast(Result, value)
-            self._buried(worker)
+            worker.end()
+            with self._lock:
+                self._workers.discard(worker)
             self._free.put(None)
         raise WorkerError(
             f"the process that worked on it ended unexpectedly ({worker.code}), {TRIES} times; "
@@ -111,11 +113,6 @@ class Pool:
             worker = Worker(self._first)
             self._workers.add(worker)
             return worker
-
-    def _buried(self, worker: Worker) -> None:
-        worker.end()
-        with self._lock:
-            self._workers.discard(worker)
 
 
 def _answer(future: Future[Result] | None) -> Answer[Result] | None:

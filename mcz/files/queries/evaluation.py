@@ -83,7 +83,7 @@ def truth_of(node: Node) -> Test:
             return _comparison(_value_of(left), sign, _value_of(right))
         case In(operand, literals):
             value = _value_of(operand)
-            return _any_of([_comparison(value, "==", _value_of(each)) for each in literals])
+            return _until(True, [_comparison(value, "==", _value_of(each)) for each in literals])
         case Like(operand, pattern):
             return _likeness(_value_of(operand), pattern)
         case Missing(Name(name)):
@@ -91,9 +91,9 @@ def truth_of(node: Node) -> Test:
         case Not(part):
             return _opposite(truth_of(part))
         case And(parts):
-            return _all_of([truth_of(part) for part in parts])
+            return _until(False, [truth_of(part) for part in parts])
         case Or(parts):
-            return _any_of([truth_of(part) for part in parts])
+            return _until(True, [truth_of(part) for part in parts])
 
 
 def _value_of(operand: Operand) -> Callable[[Lookup], Value]:
@@ -126,14 +126,6 @@ def _opposite(part: Test) -> Test:
         return None if found is None else not found
 
     return test
-
-
-def _all_of(parts: Sequence[Test]) -> Test:
-    return _until(False, parts)
-
-
-def _any_of(parts: Sequence[Test]) -> Test:
-    return _until(True, parts)
 
 
 def _until(decisive: bool, parts: Sequence[Test]) -> Test:

@@ -73,18 +73,16 @@ class _Parser:
         return found
 
     def disjunction(self) -> Node:
-        parts = self.parts("or", self.conjunction)
-        return parts[0] if len(parts) == 1 else Or(parts)
+        return self.operation("or", Or, self.conjunction)
 
     def conjunction(self) -> Node:
-        parts = self.parts("and", self.part)
-        return parts[0] if len(parts) == 1 else And(parts)
+        return self.operation("and", And, self.part)
 
-    def parts(self, word: str, part: Callable[[], Node]) -> tuple[Node, ...]:
-        found = [part()]
+    def operation(self, word: str, kind: type[And | Or], part: Callable[[], Node]) -> Node:
+        parts = [part()]
         while self.skip(word):
-            found.append(part())
-        return tuple(found)
+            parts.append(part())
+        return parts[0] if len(parts) == 1 else kind(tuple(parts))
 
     def part(self) -> Node:
         if self.token.raw not in ("not", "("):

@@ -189,7 +189,11 @@ def _facts_beside_values(clip: Clip) -> tuple[JsonObject, list[str]]:
     """Facts in source and signals, each None where its bytes are at fault; and these faults."""
     found: JsonObject = {"times": None, "recording": None, "arrays": None}
     unread = []
-    for key, read in (("times", _times), ("recording", _recording), ("arrays", _arrays)):
+    for key, read in (
+        ("times", _times),
+        ("recording", _recording),
+        ("arrays", _arrays),
+    ):
         try:
             found[key] = read(clip)
         except FormatError as error:
@@ -232,13 +236,10 @@ def exceptions_info(container: Container, clip: Clip) -> JsonObject:
             ]
             if wanted:
                 _, streams = container.streams(row, signal.counts, wanted)
-                n_exceptions += sum(_count_exceptions(streams[i]) for i in wanted)
+                notes = (parse(GroupNotes, streams[i], "group notes") for i in wanted)
+                n_exceptions += sum(len(one.exceptions) for one in notes)
     share = n_exceptions / n_tokens if n_tokens else 0.0
     return {"n_exceptions": n_exceptions, "exceptions_share": share}
-
-
-def _count_exceptions(notes: bytes) -> int:
-    return len(parse(GroupNotes, notes, "group notes").exceptions)
 
 
 def source_info(

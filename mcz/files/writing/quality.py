@@ -174,7 +174,7 @@ class RunningFigures:
                 "max_position_error_frame": frame,
                 "max_position_error_point": point_names(self.skeleton)[point],
             }
-        return {key: value for key, value in found.items() if not _is_absurd(value)}
+        return {k: v for k, v in found.items() if not isinstance(v, float) or np.isfinite(v)}
 
 
 def _add_valid(total: float, count: int, more: Floats) -> tuple[float, int]:
@@ -184,7 +184,3 @@ def _add_valid(total: float, count: int, more: Floats) -> tuple[float, int]:
         return total + found, count + more.size
     valid = ~np.isnan(more)
     return total + float(more[valid].sum()), count + int(np.count_nonzero(valid))
-
-
-def _is_absurd(value: object) -> bool:
-    return isinstance(value, float) and not np.isfinite(value)

@@ -220,11 +220,12 @@ def search(
     if ended:
         return *meets, True
     for _ in range(MOST_TRIALS):
-        if meets[1] >= GOAL * target.limit or _is_neighbor(dial, meets[0], misses[0]):
+        low, high = sorted((meets[0], misses[0]))
+        is_next = high / low < CLOSE or (dial.whole and high - low <= 1)
+        if meets[1] >= GOAL * target.limit or is_next:
             break
         setting = _between(meets, misses, target.limit)
         if dial.whole:  # strictly between the two
-            low, high = sorted((meets[0], misses[0]))
             setting = min(max(round(setting), low + 1), high - 1)
         found = setting, _measure_figure(dial, measured, target, setting)
         if found[1] <= target.limit:
@@ -302,14 +303,6 @@ def _measure_figure(
 
 def _fit_range(dial: Dial, setting: float) -> float:
     return min(max(round(setting) if dial.whole else setting, dial.low), dial.high)
-
-
-def _is_neighbor(dial: Dial, a: float, b: float) -> bool:
-    return _ratio(a, b) < CLOSE or (dial.whole and abs(a - b) <= 1)
-
-
-def _ratio(a: float, b: float) -> float:
-    return max(a, b) / min(a, b)
 
 
 def _between(meets: Point, misses: Point, limit: float) -> float:
