@@ -62,8 +62,6 @@ def check_checksums(source: ByteSource, progress: Report | None = None) -> Check
 
 
 class _Check:
-    """The state of the pass."""
-
     def __init__(self, source: ByteSource) -> None:
         self._source = source
         self.parser = Parser(source.size, want=lambda chunk: ALL * (chunk.type in KEPT))

@@ -24,8 +24,6 @@ OPEN_LENGTH = 2**64 - 1
 
 
 class ChunkFlag(IntFlag):
-    """The flags of a chunk."""
-
     ANCILLARY = 1  # a reader that does not know the type skips the chunk
     SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
 
@@ -112,7 +110,6 @@ def build_header(kind: bytes, flags: int, length: int) -> bytes:
 
 
 def build_chunk(kind: bytes, payload: bytes, flags: int = 0) -> bytes:
-    """The whole chunk: header, payload, crc."""
     header = build_header(kind, flags, len(payload))
     return header + payload + CRC.pack(zlib.crc32(payload, zlib.crc32(header)))
 

@@ -109,18 +109,18 @@ def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
     """The COPY chunks of a file that belong to a clip; without clips all, up to a fault."""
     if directory.clips:
         return directory.clips.ancillary(ChunkType.COPY)
-    found: list[Chunk] = []
+    copies: list[Chunk] = []
     with suppress(FormatError):
-        found.extend(chunk for chunk, _ in chunks(source) if chunk.type == ChunkType.COPY)
-    return found
+        copies.extend(chunk for chunk, _ in chunks(source) if chunk.type == ChunkType.COPY)
+    return copies
 
 
 def find_uncopied(
     source: ByteSource, directory: Directory, payload_of: Callable[[Chunk], bytes]
 ) -> list[Copy]:
     """Copies of the chunks behind the last COPY of a file; of aliases the directory knows none."""
-    held = copy_chunks(source, directory)
-    last = held[-1].offset if held else 0
+    copies = copy_chunks(source, directory)
+    last = copies[-1].offset if copies else 0
     later = [
         Chunk(ChunkType.HEAD, 0, len(SIGNATURE), len(directory.head)),
         *directory.shared.values(),

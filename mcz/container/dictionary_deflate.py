@@ -36,10 +36,10 @@ def encode_smallest(data: bytes, *, short: bool, plain: bool = False) -> tuple[i
     """
     if plain:
         return payloads.STORED, data
-    found = [(payloads.STORED, data), (payloads.DEFLATED, deflate(data))]
+    encodings = [(payloads.STORED, data), (payloads.DEFLATED, deflate(data))]
     if short:
-        found.append((payloads.AFTER_WORDS, deflate(data, words=words())))
-    return min(found, key=lambda row: len(row[1]))
+        encodings.append((payloads.AFTER_WORDS, deflate(data, words=words())))
+    return min(encodings, key=lambda row: len(row[1]))
 
 
 def decode_data(data: bytes, flags: int, size: int, where: str) -> bytes:
@@ -102,7 +102,6 @@ def pack_skeleton(payload: bytes) -> bytes:
 
 
 def is_packed(payload: bytes, where: str) -> bool:
-    """True where the fields of a SKEL are packed."""
     return parse(PackedSkel, payload, where).size is not None
 
 

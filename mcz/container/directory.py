@@ -114,11 +114,11 @@ class ClipRow:
 
     def frames_found(self, stops: Sequence[int]) -> int:
         """The frames that it shows without CEND: up to the last segment of each signal."""
-        found = 0
+        n_frames = 0
         for stop, row in zip(stops, self.signals, strict=True):
             most = self.n_frames if row.skip or row.spare else stop  # those after are spare
-            found = max(found, min(stop - row.skip, most))
-        return found
+            n_frames = max(n_frames, min(stop - row.skip, most))
+        return n_frames
 
 
 class PackedClipRow(ClipRow):

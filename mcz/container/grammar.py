@@ -126,7 +126,6 @@ class PacketEvent:
 
     @property
     def payload(self) -> bytes:
-        """Its body."""
         return self.packet.body
 
     @property

@@ -47,7 +47,6 @@ def build_index(directory: Directory) -> bytes:
 
 
 def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
-    """The INDX chunk of this content."""
     record = index_records.Indx(size=len(content), data=deflate(content))
     if since is not None:
         record.flags, record.previous = index_records.CONTINUES, since.chunk

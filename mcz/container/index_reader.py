@@ -227,7 +227,6 @@ class ClipTables:
         return [known[row] for row in rows]
 
     def row(self, number: int) -> ClipRow:
-        """The row of a clip."""
         name, skeleton, n_frames, numerator, denominator, *places = self._fields[number]
         at, length, end, cend_length, first, stop, first_segment, stop_segment, more = places
         row = PackedClipRow(
@@ -255,7 +254,6 @@ class ClipTables:
         ]
 
     def places(self) -> Iterator[Place]:
-        """The places of all clips."""
         size, cend_size = (self.clips.numbers(n) + FRAMING for n in ("length", "cend_length"))
         columns = self.offsets, size, self.ends - cend_size, cend_size
         return zip(*(column.tolist() for column in columns), strict=True)
@@ -284,14 +282,12 @@ class _Clips:
         self.names += tables.names
 
     def row(self, number: int) -> ClipRow:
-        """The row of a clip."""
         first, tables = next(pair for pair in reversed(self._tables) if pair[0] <= number)
         row = tables.row(number - first)
         row.ancillary += self._behind.get(number, ())
         return row
 
     def places(self) -> list[Place]:
-        """The places of all clips."""
         return [place for _, tables in self._tables for place in tables.places()]
 
     def having(self, kind: bytes) -> set[int]:
@@ -302,7 +298,6 @@ class _Clips:
 
 
 def parse_segments(clip: ClipRow, rows: Packed) -> list[SegmentRow]:
-    """The segments of a clip."""
     segments: list[SegmentRow] = []
     told: SegmentRow | None = None  # whose mask packets of kind 2 have
     first, where = [0] * len(clip.signals), f"INDX: clip {clip.name!r}"

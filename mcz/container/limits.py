@@ -83,7 +83,6 @@ def profile_named(name: str) -> Profile:
 
 
 def check(what: str, value: int, limit: int) -> None:
-    """Raise LimitError where ``value`` exceeds ``limit``."""
     if value > limit:  # LIMIT-02
         raise LimitError(f"{what}: {value} is over the limit of {limit}", value=value)
 

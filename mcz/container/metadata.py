@@ -48,24 +48,24 @@ class MetadataCache:
 
     def of(self, row: ClipRow, payload: Callable[[Chunk], bytes]) -> Mapping[str, str]:
         """Return the metadata in the CLIP of ``row``, whose payload is read unless cached."""
-        found = self._pairs.get(row.name)
-        if found is None:
+        pairs = self._pairs.get(row.name)
+        if pairs is None:
             clip = parse_until(payloads.Clip, payload(row.clip), row.clip.label, "source")
-            found = {intern(pair.key): pair.value for pair in clip.metadata}
-            self._size += PAIR + sum(PAIR + len(key) + len(found[key]) for key in found)
+            pairs = {intern(pair.key): pair.value for pair in clip.metadata}
+            self._size += PAIR + sum(PAIR + len(key) + len(pairs[key]) for key in pairs)
             if self._size <= MOST_KEPT:
-                self._pairs[row.name] = found
-        return found
+                self._pairs[row.name] = pairs
+        return pairs
 
 
 def apply_records(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:
     """``pairs`` as they are after the records, in order."""
-    found = dict(pairs)
+    updated = dict(pairs)
     for record in records:
         for key in record.removed:
-            found.pop(key, None)
-        found |= record.entries
-    return found
+            updated.pop(key, None)
+        updated |= record.entries
+    return updated
 
 
 def merge_records(name: str, records: Iterable[Record]) -> Record:
@@ -100,7 +100,6 @@ def _payload(content: bytes, short: bool, profile: Profile) -> bytes:
 
 
 def record_bytes(record: Record) -> bytes:
-    """A record as META has it."""
     entries = payloads.metadata_records(record.entries)
     stored = payloads.MetaRecord(clip=record.name, removed=list(record.removed), entries=entries)
     return build(stored, "META")
@@ -131,7 +130,7 @@ def read_records(
 
     ``lenient``: of one that is damaged nothing is taken, and nothing raised.
     """
-    found: Placed = {}
+    placed: Placed = {}
     for chunk in chunks:
         try:
             records = parse_meta(payload_of(chunk), chunk, file_bytes)
@@ -140,8 +139,8 @@ def read_records(
                 raise
             continue
         for record in records:
-            found.setdefault(record.name, []).append((chunk.offset, record))
-    return found
+            placed.setdefault(record.name, []).append((chunk.offset, record))
+    return placed
 
 
 def _check_keys(keys: Sequence[str], where: str) -> None:

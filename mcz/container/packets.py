@@ -37,7 +37,6 @@ def implied_by(number: int, mask: bytes) -> bytes:
 
 
 def packet_check(head: bytes, body: bytes, implied: bytes = b"") -> bytes:
-    """The check of a packet."""
     return struct.pack("<I", zlib.crc32(body, zlib.crc32(implied, zlib.crc32(head))))
 
 
@@ -46,7 +45,6 @@ def _head(kind: int, fresh: bool, sequence: int, length: int) -> bytes:
 
 
 def build_packet(packet: Packet) -> bytes:
-    """The bytes of a packet."""
     head = _head(packet.kind, packet.fresh, packet.sequence, len(packet.body))
     return head + packet.body + packet_check(head, packet.body, packet.implied)
 

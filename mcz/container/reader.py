@@ -167,7 +167,6 @@ class Container:
         return directory_of(read_indexes(fetch, foot.index_offset, foot.index_length, limit))
 
     def payload(self, chunk: Chunk) -> bytes:
-        """The checked payload of ``chunk``."""
         assert chunk.length is not None
         # CHUNK-04, LIMIT-07
         check(f"chunk {chunk.label}: bytes", chunk.length, self.profile.chunk_bytes)

@@ -56,7 +56,6 @@ def _bits(vector: tuple[float, ...]) -> tuple[str, ...]:
 
 
 def channel_records(channels: tuple[Channel, ...]) -> list[payloads.Channel]:
-    """The channels as CLIP and SKEL have them."""
     return [
         payloads.Channel(
             flags=bool(c.name) * payloads.HAS_NAME | bool(c.unit) * payloads.HAS_UNIT,

@@ -8,7 +8,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from threading import Lock
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 from mcz.container.locks import is_locked
 from mcz.errors import AccessError, MczError, OptionError, TruncatedError, reason_of
@@ -117,12 +117,10 @@ class ByteSource:
         if self._positioned:
             return os.pread(self._stream.fileno(), size, offset)
         if self._reads_at is not None:
-            part: bytes = self._reads_at(offset, size)
-            return part
+            return cast(bytes, self._reads_at(offset, size))
         with self._lock:
             self._stream.seek(offset)
-            data: bytes = self._stream.read(size)
-            return data
+            return self._stream.read(size)
 
     def _forked(self) -> None:
         """Let this process have what a fork would share: a connection, and a lock perhaps held.

@@ -94,7 +94,6 @@ class Writer:
         self.offset += len(data)
 
     def chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
-        """Write one closed chunk and return where it lies."""
         check(f"chunk {kind.decode()}: bytes", len(payload), self.profile.chunk_bytes)
         if self.profile.is_plain:
             check_plain(kind, payload, kind.decode())
@@ -167,7 +166,6 @@ class Writer:
             last.ancillary.append(chunk)
 
     def begin_clip(self, record: payloads.Clip) -> None:
-        """Write CLIP."""
         self._between_clips("CLIP")
         name = record.name
         if not name:
@@ -290,7 +288,6 @@ class Writer:
         self._write(data)
 
     def end_carried(self) -> None:
-        """End the clip that is carried over."""
         row = self._in_clip("CEND")
         self.directory.clips[row.name] = row
         self._clip = None

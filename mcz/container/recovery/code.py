@@ -55,7 +55,6 @@ def times(a: int, b: int) -> int:
 
 
 def over(a: int, b: int) -> int:
-    """``a / b``, where ``b`` is not 0."""
     if not a:
         return 0
     exp, log = logarithms()

@@ -52,7 +52,6 @@ class Shape:
 
     @property
     def size(self) -> int:
-        """Bytes of the stream."""
         return self.a_size + self.t_size
 
     @property
@@ -198,7 +197,6 @@ def short_hash(data: bytes | memoryview) -> bytes:
 
 
 def build_packet(key: Key, kind: int, index: int, body: bytes) -> bytes:
-    """The bytes of a packet."""
     s = key.shape
     packet = RecvPacket(
         kind=kind,

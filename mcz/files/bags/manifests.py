@@ -119,7 +119,6 @@ class BagCheck:
 
 
 def is_bag(folder: str | os.PathLike[str]) -> bool:
-    """Return True if ``folder`` declares itself a bag."""
     return (Path(folder) / DECLARATION).is_file()
 
 

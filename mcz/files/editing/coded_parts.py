@@ -59,7 +59,6 @@ class PartRequest:
 
 
 def request_of(entry: SourceEncoder, profile: Profile) -> PartRequest:
-    """The request by which ``entry`` can be joined."""
     return PartRequest(entry.path, entry.name, entry.options, entry.encoding, profile)
 
 

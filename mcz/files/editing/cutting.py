@@ -81,7 +81,6 @@ class ClipCut:
 
     @property
     def is_whole(self) -> bool:
-        """True if nothing is cut."""
         return self.has_all_frames and self.joints is None and not self.resolution
 
     @property
@@ -143,7 +142,6 @@ def _find_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
 
 
 def joint_of_column(skeleton: Skeleton) -> list[int]:
-    """The joint of every channel."""
     return [index for index, joint in enumerate(skeleton.joints) for _ in joint.channels]
 
 

@@ -197,11 +197,9 @@ class Copier(ChunkCopier):
             self.attachment(name)
 
     def is_same(self, cut: ClipCut) -> bool:
-        """Return True if the clip is unchanged."""
         return cut.is_whole and not cut.anew
 
     def write(self, cut: ClipCut) -> None:
-        """Write one clip from its stored bytes."""
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         record = self.record_of(cut)
         skeleton = self.skeleton(clip.skeleton_id)
@@ -267,11 +265,9 @@ class Copier(ChunkCopier):
         return record or {}
 
     def record_of(self, cut: ClipCut) -> payloads.Clip:
-        """The CLIP that is cut."""
         return self.container.clip(self.container.directory.clips[cut.clip.name])
 
     def name_of(self, cut: ClipCut) -> str:
-        """New name of the clip."""
         return cut.clip.name
 
     def finish_record(self, cut: ClipCut, new: payloads.Clip) -> tuple[bytes, list[bytes]]:
@@ -360,7 +356,6 @@ class Copier(ChunkCopier):
         return cut_quality(cut, old or {})
 
     def note(self, cut: ClipCut) -> None:
-        """Keep what was written."""
         written = self.writer.directory.clips[self.name_of(cut)].segments
         before = [row for info in cut.clip.signals for row in info.rows]
         stored = cut.n_frames

@@ -303,10 +303,10 @@ def check_recovery(target: Target) -> Recovery | None:
     """
     source = open_bytes(target)
     try:
-        found, sets = examine(source)
+        recovery, sets = examine(source)
     finally:
         source.close()
-    return found if sets else None
+    return recovery if sets else None
 
 
 def recover(

@@ -132,8 +132,6 @@ class _Sizes:
 
 
 class _Editor(Copier):
-    """Copies a file, one joint of one clip replaced."""
-
     joint: int
     anew = False
 
@@ -147,7 +145,6 @@ class _Editor(Copier):
         return cut.clip.name != self.edited.name
 
     def replacement(self) -> Replacement:
-        """The report of the replacement."""
         addresses = self.edited.skeleton.addresses()
         return Replacement(
             clip=self.edited.name,
@@ -205,8 +202,6 @@ class _StreamEditor(_Editor):
 
 
 class _SegmentEdit(Unchanged):
-    """The streams of the joint in one segment."""
-
     def __init__(self, editor: _StreamEditor, row: SegmentRow, number: int) -> None:
         self._editor, self._number = editor, number
         notes, masks = editor.recoded.beside(row.header.first, row.header.stop)

@@ -48,7 +48,6 @@ Step = Callable[[str], None]  # is told the name of each clip that was carried o
 
 
 def steps(progress: Progress | None, total: int) -> Step:
-    """A step that counts for ``progress``."""
     numbers = count(1)
 
     def step(name: str) -> None:

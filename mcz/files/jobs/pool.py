@@ -63,7 +63,6 @@ class Pool:
 
     @property
     def pids(self) -> list[int]:
-        """Ids of the processes that have started."""
         with self._lock:
             return [worker.process.pid for worker in self._workers]
 
@@ -137,7 +136,6 @@ class Worker:
 
     @property
     def code(self) -> str:
-        """Describe the exit code."""
         code = self.process.poll()
         if code is None:
             return "without a word"

@@ -145,7 +145,6 @@ class ClipState:
         return streams[table.codec(0, 0)], mask
 
     def digest(self, values: Floats, mask: NDArray[np.bool_] | None) -> None:
-        """Take a frame that is shown into the hash."""
         self._digest.update(values[None], None if mask is None else mask[None])
 
     def check_hash(self, fields: payloads.Cend) -> None:

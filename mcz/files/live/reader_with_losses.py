@@ -87,7 +87,6 @@ class FramesWithLosses:
 
     @property
     def size(self) -> int:
-        """The bytes that came."""
         return self._stream.size
 
     def frames(self) -> Iterator[LiveFrame]:
@@ -244,7 +243,6 @@ class FramesWithLosses:
             yield from course.frames.reach(min(due, MAX_COUNT))
 
     def _segment(self, course: _ClipCourse, payload: bytes) -> Iterator[LiveFrame]:
-        """The frame of a closed DATA."""
         try:
             header, _ = parse_header(payload)
         except FormatError as error:

@@ -61,7 +61,6 @@ class StrictFrames:
 
     @property
     def size(self) -> int:
-        """The bytes that came."""
         return self._stream.size
 
     def frames(self) -> Iterator[LiveFrame]:

@@ -17,19 +17,17 @@ from mcz.model import text_format
 from mcz.model.text_format import nearest
 
 FEW = 8  # names that a message lists
-Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
-
-
 KEPT = 64
+Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
 
 
 def find_clip_name(clips: Clips, name: str) -> str:
     """The name of the clip that ``name`` means; see ``File.only_clip``. Raises OptionError."""
-    found = matching_clips(clips, name)
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise OptionError(f"{name!r} may be {list_some(found)}; choose one")
+    matches = matching_clips(clips, name)
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        raise OptionError(f"{name!r} may be {list_some(matches)}; choose one")
     raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
 
 
@@ -37,10 +35,10 @@ def names_of(clips: Clips) -> dict[str, set[str]]:
     """The names that clips may have, as ``matching_clips`` finds it, for who asks for many."""
     known: dict[str, set[str]] = {name: {name} for name in clips}
     for names in _naming_ways(clips):
-        found: dict[str, set[str]] = {}
+        clips_of: dict[str, set[str]] = {}
         for called, clip in names:
-            found.setdefault(called, set()).add(clip)
-        known = found | known
+            clips_of.setdefault(called, set()).add(clip)
+        known = clips_of | known
     return known
 
 
@@ -49,9 +47,8 @@ def matching_clips(clips: Clips, name: str) -> list[str]:
     if name in clips.rows:
         return [name]
     for names in _naming_ways(clips):
-        found = sorted({clip for known, clip in names if known == name})
-        if found:
-            return found
+        if matches := sorted({clip for known, clip in names if known == name}):
+            return matches
     return []
 
 
@@ -89,7 +86,6 @@ def _suggestion(clips: Iterable[str], name: str) -> str:
 
 
 def list_some(names: Iterable[str]) -> str:
-    """Some names, few of many."""
     known = list(names)
     return ", ".join(known[:FEW]) + (" ..." if len(known) > FEW else "")
 
@@ -120,12 +116,12 @@ class Clips(Mapping[str, Clip]):
                 name = find_clip_name(self, name)
             except OptionError as error:
                 raise UnknownNameError(error.message, path=self.file_name) from None
-        found = self._alive.get(name)
-        if found is None:
-            made = Clip(self._container, self.rows[name])
-            found = self._alive.setdefault(name, made)  # another thread may have made it, too
-            self._last.append(found)
-        return found
+        clip = self._alive.get(name)
+        if clip is None:
+            new = Clip(self._container, self.rows[name])
+            clip = self._alive.setdefault(name, new)  # another thread may have made it, too
+            self._last.append(clip)
+        return clip
 
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and len(matching_clips(self, name)) == 1

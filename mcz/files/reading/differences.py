@@ -39,7 +39,6 @@ class Difference:
 
 
 def document_of(a: Motion, b: Motion) -> list[JsonObject]:
-    """The differences as JSON has them."""
     return [asdict(each) for each in differences(a, b)]
 
 

@@ -242,8 +242,7 @@ class File:
 
     def clips_called(self, names: Iterable[str]) -> list[Clip]:
         """The clips of these names, each once, in this order; raises as ``only_clip`` does."""
-        found = {clip.name: clip for clip in map(self.only_clip, names)}
-        return list(found.values())
+        return list({clip.name: clip for clip in map(self.only_clip, names)}.values())
 
     def find(self, where: Where) -> list[Clip]:
         """The clips that ``where`` takes, in file order, which may be none.

@@ -75,7 +75,6 @@ class SignalInfo:
 
     @property
     def spans(self) -> list[Span]:
-        """Spans of the segments, as codecs take them."""
         headers = [row.header for row in self.rows]
         return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
 

@@ -298,7 +298,6 @@ class SignalReader:
         self.container.damage.append(f"clip {self.name!r}, frames {start}:{stop}: {reason}")
 
     def fetch(self, segment: int, resolution: int, group: int) -> bytes:
-        """One stream of the codec."""
         table, streams = self._cache.get(segment) or self._streams(segment)
         index = table.codec(resolution, group)
         if index not in streams:  # a group that another depends upon

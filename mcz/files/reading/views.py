@@ -103,7 +103,6 @@ class Preview:
         return bool((np.diff(self.frames) == self.step).all())
 
     def masked(self) -> Values:
-        """The values, NaN where invalid."""
         return self.values if self.mask is None else np.where(self.mask, self.values, np.nan)
 
 

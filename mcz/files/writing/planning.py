@@ -207,7 +207,6 @@ class ClipPlan:
 
     @property
     def codec(self) -> Codec:
-        """The codec of the motion."""
         return self.signals[0].codec
 
 
@@ -245,7 +244,6 @@ def plan_open_clip(
 
 
 def find_targets(options: Params) -> JsonObject:
-    """The targets among the options of a codec."""
     return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
 
 

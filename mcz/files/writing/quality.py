@@ -69,7 +69,6 @@ def _greatest_error(original: Motion, decoded: Signal) -> JsonObject:
 
 
 def quality_payload(entries: Mapping[str, str]) -> bytes:
-    """The payload of QUAL that says this."""
     stored = {key: value for key, value in entries.items() if key not in NOT_STORED}
     return build(payloads.Qual(entries=payloads.metadata_records(stored)), "quality record")
 

@@ -115,7 +115,6 @@ class Column:
         return found if self.kept.any() <= _can_hold(self.grid, grid) else None
 
     def size(self) -> int:
-        """The bytes that it takes alone."""
         return channel_bytes(self.grid.ordinals(self.numbers)[0], self.grid)
 
 

@@ -220,17 +220,12 @@ def _with_strays(signal: Signal, stray: NDArray[np.bool_]) -> Exceptions:
             )
     old = signal.exceptions
     texts = [repr(float(v)).encode() for v in signal.values[rows, channels]]
-    merged = sorted(
-        [
-            *zip(old.rows.tolist(), old.channels.tolist(), old.texts, strict=True),
-            *zip(rows, channels, texts, strict=True),
-        ]
-    )
-    return Exceptions(
-        np.array([m[0] for m in merged], np.int64),
-        np.array([m[1] for m in merged], np.int64),
-        tuple(m[2] for m in merged),
-    )
+    merged = [
+        *zip(old.rows.tolist(), old.channels.tolist(), old.texts, strict=True),
+        *zip(rows, channels, texts, strict=True),
+    ]
+    rows, channels, texts = map(list, zip(*sorted(merged), strict=True))
+    return Exceptions(np.array(rows, np.int64), np.array(channels, np.int64), tuple(texts))
 
 
 def group_kind(signal: Signal, grouping: str) -> int:

@@ -53,7 +53,6 @@ class EncodingOptions:
 
     @property
     def found(self) -> Codec:
-        """The codec of that name."""
         return codec_by_name(self.codec)
 
 
@@ -101,7 +100,6 @@ class SourceEncoder:
         self.quality: dict[str, str] | None = None  # of a lossy clip what its record says
 
     def digest(self) -> bytes:
-        """The SHA-256 of the file."""
         return hashlib.sha256(read_bytes(self.path)).digest()
 
     @property

@@ -90,7 +90,6 @@ class Trials:
         return self.figure(target, {self.codec.dial.parameter: setting})
 
     def figure(self, target: Target, found: Params) -> float:
-        """The figure of ``target`` with these parameters."""
         figure = self._measure(self.alone, target, found)
         if len(self.motion.signals) > 1 and target.falls:
             if not self.others:
