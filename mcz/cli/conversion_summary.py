@@ -118,7 +118,7 @@ def _fit_line(fit: Fit) -> str:
 
 def rate_notes(clip: Clip, part: ClipSelection, wanted: DecodeOptions) -> tuple[str, ...]:
     """Notes on text files whose stated times differ from those of the clip."""
-    from mcz.files.reading.fidelity import text_notes
+    from mcz.files.reading.rate_notes import text_notes
 
     if wanted.decimate:
         return ()

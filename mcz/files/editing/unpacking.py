@@ -18,10 +18,11 @@ from mcz.files.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on
 from mcz.files.jobs import limited
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.clips import list_some
-from mcz.files.reading.fidelity import RESTORED, fidelity_of, text_notes
+from mcz.files.reading.fidelity import RESTORED, fidelity_of
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, open
 from mcz.files.reading.parallel_clips import share_clips
+from mcz.files.reading.rate_notes import text_notes
 from mcz.model.types import Progress, Settings, Target
 
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
