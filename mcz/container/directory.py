@@ -71,6 +71,11 @@ class SignalRow:
         return self.skip + n_frames + self.spare
 
 
+def signal_rows(clip: payloads.Clip, where: str) -> tuple[SignalRow, ...]:
+    """The rows of the signals of CLIP; raises FormatError."""
+    return tuple(SignalRow.of(signal, clip, where) for signal in clip.signals)
+
+
 # The segments of an indexed clip, each the fields of an IndexedSegment in their order.
 Packed = Sequence[tuple[int, ...]]
 Place = tuple[int, int, int, int]  # offset and bytes of CLIP, and those of CEND
@@ -96,7 +101,7 @@ class ClipRow:
     def of(cls, fields: payloads.Clip, chunk: Chunk) -> ClipRow:
         """The row of a clip of which nothing but its CLIP is known; raises FormatError."""
         rate = fields.rate_numerator, fields.rate_denominator
-        signals = tuple(SignalRow.of(signal, fields, chunk.label) for signal in fields.signals)
+        signals = signal_rows(fields, chunk.label)
         return cls(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
 
     @property

@@ -5,8 +5,8 @@ SPEC.md, "INDX", is normative; ``index_reader.py`` has the way back.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, fields
 from itertools import chain, islice
 from operator import attrgetter
 
@@ -47,6 +47,7 @@ def build_index(directory: Directory) -> bytes:
 
 
 def index_chunk(content: bytes, since: IndexPlace | None = None) -> bytes:
+    """The INDX chunk of this content."""
     record = index_records.Indx(size=len(content), data=deflate(content))
     if since is not None:
         record.flags, record.previous = index_records.CONTINUES, since.chunk
@@ -61,7 +62,7 @@ def index_content(directory: Directory, since: IndexPlace | None = None) -> byte
 def index_record(directory: Directory, since: IndexPlace | None = None) -> Index:
     """The same as a record."""
     if since is None:
-        return _list_directory(directory)
+        return Listing(directory).record()
     new = Directory(
         head=directory.head,
         shared=dict(islice(directory.shared.items(), since.n_shared, None)),
@@ -74,53 +75,62 @@ def index_record(directory: Directory, since: IndexPlace | None = None) -> Index
     if since.n_clips:
         last = directory.clips[next(islice(directory.clips, since.n_clips - 1, None))]
         behind = [chunk for chunk in last.ancillary if chunk.offset >= since.chunk.stop]
-    return _list_directory(new, since.chunk.stop, behind)
+    return Listing(new, since.chunk.stop, behind).record()
 
 
-def _list_directory(new: Directory, start: int = 0, behind: Sequence[Chunk] = ()) -> Index:
-    """The content of INDX: all of ``new``, which lies behind ``start``.
+@dataclass(slots=True)
+class Listing:
+    """The content of an index: all of ``new``, which lies behind ``start``.
 
-    ``behind``: new ancillary chunks of the clip before. Raises FormatError for a clip without CEND.
+    ``behind``: new ancillary chunks of the clip before.
     """
-    clips = list(new.clips.values())
-    segments = [segment_rows(clip) for clip in clips]
-    skeletons = {id_: n for n, id_ in enumerate(dict.fromkeys(c.skeleton for c in clips))}
-    shared = zip(new.shared, _places(new.shared.values(), start), strict=True)
-    parts = [part for row in new.attachments.values() for part in row.parts]
-    ancillary = [*_places(behind, start)]
-    rows: list[tuple[str | int, ...]] = []
-    end = start
-    for clip, packed in zip(clips, segments, strict=True):
-        cend = clip.cend
-        if cend is None:
-            raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
-        rows.append(
-            (
-                *(clip.name, skeletons[clip.skeleton], clip.n_frames),
-                *(clip.rate_numerator, clip.rate_denominator, len(clip.signals)),
-                *(clip.clip.offset - end, clip.clip.size - FRAMING, len(packed)),
-                *(cend.offset - end_of(clip, packed), cend.size - FRAMING),
-                len(clip.ancillary),
+
+    new: Directory
+    start: int = 0
+    behind: list[Chunk] = field(default_factory=list)
+
+    def record(self) -> Index:
+        """The content of INDX; raises FormatError for a clip without CEND."""
+        new, start = self.new, self.start
+        clips = list(new.clips.values())
+        segments = [segment_rows(clip) for clip in clips]
+        skeletons = {id_: n for n, id_ in enumerate(dict.fromkeys(c.skeleton for c in clips))}
+        shared = zip(new.shared, _places(new.shared.values(), start), strict=True)
+        parts = [part for row in new.attachments.values() for part in row.parts]
+        ancillary = [*_places(self.behind, start)]
+        rows: list[tuple[str | int, ...]] = []
+        end = start
+        for clip, packed in zip(clips, segments, strict=True):
+            cend = clip.cend
+            if cend is None:
+                raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
+            rows.append(
+                (
+                    *(clip.name, skeletons[clip.skeleton], clip.n_frames),
+                    *(clip.rate_numerator, clip.rate_denominator, len(clip.signals)),
+                    *(clip.clip.offset - end, clip.clip.size - FRAMING, len(packed)),
+                    *(cend.offset - end_of(clip, packed), cend.size - FRAMING),
+                    len(clip.ancillary),
+                )
             )
+            end = cend.stop
+            ancillary += _places(clip.ancillary, end)
+        return Index(
+            head=new.head,
+            shared=Table.of(IndexedChunk, [(kind, id_, *at) for (_, id_), (kind, *at) in shared]),
+            attachments=Table.of(
+                IndexedAttachment,
+                [(row.name, row.size, len(row.parts)) for row in new.attachments.values()],
+            ),
+            parts=Table.of(IndexedPlace, list(_places(parts, start))),
+            aliases=Table.of(IndexedAlias, [(name, *row) for name, row in new.aliases.items()]),
+            skeletons=list(skeletons),
+            clips=Table.of(IndexedClip, rows),
+            signals=Table.of(IndexedSignal, [SIGNAL_ROW(s) for c in clips for s in c.signals]),
+            segments=Table.of(IndexedSegment, list(chain.from_iterable(segments))),
+            n_behind=len(self.behind),
+            ancillary=Table.of(IndexedPlace, ancillary),
         )
-        end = cend.stop
-        ancillary += _places(clip.ancillary, end)
-    return Index(
-        head=new.head,
-        shared=Table.of(IndexedChunk, [(kind, id_, *at) for (_, id_), (kind, *at) in shared]),
-        attachments=Table.of(
-            IndexedAttachment,
-            [(row.name, row.size, len(row.parts)) for row in new.attachments.values()],
-        ),
-        parts=Table.of(IndexedPlace, list(_places(parts, start))),
-        aliases=Table.of(IndexedAlias, [(name, *row) for name, row in new.aliases.items()]),
-        skeletons=list(skeletons),
-        clips=Table.of(IndexedClip, rows),
-        signals=Table.of(IndexedSignal, [SIGNAL_ROW(s) for c in clips for s in c.signals]),
-        segments=Table.of(IndexedSegment, list(chain.from_iterable(segments))),
-        n_behind=len(behind),
-        ancillary=Table.of(IndexedPlace, ancillary),
-    )
 
 
 def _places(chunks: Iterable[Chunk], end: int) -> Iterator[tuple[bytes, int, int]]:
