@@ -9,6 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import mcz.model.notebook as _notebook
 from mcz import version as _version
 
 if TYPE_CHECKING:
@@ -31,8 +32,7 @@ if TYPE_CHECKING:
         UnsupportedError,
         WorkerError,
     )
-    from mcz.exchange.adapters.c3d import from_c3d, to_c3d
-    from mcz.exchange.adapters.ezc3d import from_ezc3d, to_ezc3d
+    from mcz.exchange.adapters.c3d import from_c3d, from_ezc3d, to_c3d, to_ezc3d
     from mcz.exchange.adapters.movement import from_movement, to_movement
     from mcz.exchange.adapters.pybvh import from_pybvh, to_pybvh
     from mcz.exchange.conversion import Fit, convert, from_positions, left_out
@@ -94,15 +94,13 @@ if TYPE_CHECKING:
     from mcz.show.rerun import to_rerun
     from mcz.show.viewing.view import View, view
     from mcz.sources.arrays.body_models import offsets_from_positions, offsets_of_model
-    from mcz.sources.arrays.body_trees import body_skeleton
-    from mcz.sources.c3d.events import Event
-    from mcz.sources.c3d.recording import ForcePlatform, Recording
+    from mcz.sources.arrays.skeletons import body_skeleton
+    from mcz.sources.c3d.recording import Event, ForcePlatform, Recording
 
 __version__ = _version.VERSION
 
 _HOMES = {
-    "mcz.exchange.adapters.c3d": ("from_c3d", "to_c3d"),
-    "mcz.exchange.adapters.ezc3d": ("from_ezc3d", "to_ezc3d"),
+    "mcz.exchange.adapters.c3d": ("from_c3d", "from_ezc3d", "to_c3d", "to_ezc3d"),
     "mcz.exchange.adapters.movement": ("from_movement", "to_movement"),
     "mcz.exchange.adapters.pybvh": ("from_pybvh", "to_pybvh"),
     "mcz.show.rerun": ("to_rerun",),
@@ -182,9 +180,8 @@ _HOMES = {
     "mcz.files.reading.source_files": ("read_skeleton",),
     "mcz.kinematics.rest_pose": ("rest_positions",),
     "mcz.sources.arrays.body_models": ("offsets_from_positions", "offsets_of_model"),
-    "mcz.sources.arrays.body_trees": ("body_skeleton",),
-    "mcz.sources.c3d.events": ("Event",),
-    "mcz.sources.c3d.recording": ("ForcePlatform", "Recording"),
+    "mcz.sources.arrays.skeletons": ("body_skeleton",),
+    "mcz.sources.c3d.recording": ("Event", "ForcePlatform", "Recording"),
     "mcz.kinematics.retargeting.joint_maps": ("joint_map",),
     "mcz.kinematics.retargeting.mirroring": ("mirror",),
     "mcz.kinematics.retargeting.offsets": ("with_offsets",),
@@ -335,6 +332,14 @@ if not TYPE_CHECKING:  # a type checker shall find a name that is not there
         value = getattr(import_module(_HOME_OF[name]), name)
         globals()[name] = value
         return value
+
+
+def _play(motion: Any) -> str:
+    html: str = import_module("mcz.show.viewing.player").player(motion)
+    return html
+
+
+_notebook.register_player(_play)
 
 
 def __dir__() -> list[str]:

@@ -32,10 +32,10 @@ def main(program: str, *arguments: str) -> int:
         runpy.run_path(program, run_name="__main__")
         return 0
     from mcz.cli.common import run
-    from mcz.cli.info import command
+    from mcz.cli.info import info_command
     from mcz.cli.main import cli
 
-    return run(cli if program == "mcz" else command, program, arguments)
+    return run(cli if program == "mcz" else info_command, program, arguments)
 
 
 if __name__ == "__main__":

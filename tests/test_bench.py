@@ -17,11 +17,11 @@ from scipy.interpolate import PchipInterpolator
 
 import mcz
 from mcz import Motion, OptionError
-from mcz.bench import bjontegaard, cache, ladder, peers, plots, tasks
+from mcz.bench import bjontegaard, ladder, peers, report, tasks
 from mcz.bench.bjontegaard import bd_rate, bd_sqnr
 from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants_of
 from mcz.bench.measure import cpu_seconds, peak_bytes, point, speeds
-from mcz.bench.run import bench
+from mcz.bench.report import bench
 from mcz.bench.tables import Table
 from mcz.bench.tasks import KINDS, Runner, Task, perform
 from mcz.cli.common import run as run_command
@@ -189,7 +189,7 @@ def test_speeds_of_a_file_of_mcz(samples: Path, tmp_path: Path) -> None:
 def test_a_second_run_comes_from_the_cache(
     case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = cache.Cache(tmp_path / "cache")
+    kept = tasks.Cache(tmp_path / "cache")
     task = Task("point", case, preset_of("mrdwt", "khan2016"), (("T_g", 3.0),))
     first = Runner(1, kept).run([task, task])
     monkeypatch.setattr(tasks, "perform", lambda *given: pytest.fail("measured again"))
@@ -215,10 +215,10 @@ def test_keys_tell_apart_what_matters(case: Case, samples: Path) -> None:
 
 def test_a_cache_that_cannot_be_written_is_none(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    kept = cache.Cache(tmp_path / "file")
+    kept = tasks.Cache(tmp_path / "file")
     kept.put("a", 1)
     assert kept.get("a") is None
-    assert cache.Cache(None).get("a") is None
+    assert tasks.Cache(None).get("a") is None
 
 
 def test_what_a_codec_refuses_is_told(case: Case) -> None:
@@ -237,13 +237,13 @@ def test_peers_say_what_they_code(case: Case) -> None:
 def test_whole_run_with_report(
     case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
-    from mcz.cli.bench import command
+    from mcz.cli.bench import bench_command
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(cache, "default_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(tasks, "default_folder", lambda: tmp_path / "cache")
     out = tmp_path / "out"
     arguments = [case.path, "--codecs", "fast,mrdwt", "--no-speeds", "--jobs", "1"]
-    assert run_command(command, "bench", [*arguments, "--out", str(out)]) == 0
+    assert run_command(bench_command, "bench", [*arguments, "--out", str(out)]) == 0
     shown = capsys.readouterr().out
     assert "walk: points" in shown
     assert "Bjontegaard delta rate" in shown
@@ -254,16 +254,16 @@ def test_whole_run_with_report(
     assert len(sizes) >= 8
     assert sizes == sorted(sizes, reverse=True)
     assert len(clip["codecs"][0]["points"]) == 1
-    report = (out / "report.md").read_text()
-    assert "| codec | setting |" in report
-    if plots.can_draw():
+    markdown = (out / "report.md").read_text()
+    assert "| codec | setting |" in markdown
+    if report.can_draw():
         assert {path.name for path in out.glob("*.png")} == {"walk.png", "walk_mrdwt.png"}
-        assert "![walk.png](walk.png)" in report
+        assert "![walk.png](walk.png)" in markdown
     page = (out / "index.html").read_text("utf-8")
     for table in results["tables"]:
         assert f">{table['title']}</h2>" in page
     assert page.count("<img") == page.count('src="data:image/png;base64,')
-    assert page.count("<img") == (2 if plots.can_draw() else 0)
+    assert page.count("<img") == (2 if report.can_draw() else 0)
     assert page.count('prefers-color-scheme: dark)" srcset') == page.count("<img")
     pictures = re.findall(r'(?:src|srcset)="(data:[^"]*)"', page)
     assert len(set(pictures)) == 2 * page.count("<img")  # dark ones are others
@@ -271,22 +271,22 @@ def test_whole_run_with_report(
     assert page.count("default-src 'none'") == 1
     assert "<script" not in page
     # Without matplotlib: everything else, and a plain word about it.
-    monkeypatch.setattr(plots, "can_draw", lambda: False)
-    assert run_command(command, "bench", [*arguments, "--out", str(tmp_path / "bare")]) == 0
+    monkeypatch.setattr(report, "can_draw", lambda: False)
+    assert run_command(bench_command, "bench", [*arguments, "--out", str(tmp_path / "bare")]) == 0
     assert "matplotlib is not installed" in capsys.readouterr().err
     assert not list((tmp_path / "bare").glob("*.png"))
     assert (tmp_path / "bare" / "index.html").exists()
-    assert run_command(command, "bench", [*arguments, "--json"]) == 0
+    assert run_command(bench_command, "bench", [*arguments, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["clips"] == results["clips"]
 
 
 def test_errors_are_one_line(samples: Path, tmp_path: Path, capsys: Any) -> None:
-    from mcz.cli.bench import command
+    from mcz.cli.bench import bench_command
 
     walk = str(samples / "walk.amc")
-    assert run_command(command, "bench", [str(tmp_path / "no.amc")]) == 1
-    assert run_command(command, "bench", [walk, "--codecs", "nonsense"]) == 2
-    assert run_command(command, "bench", [walk, "--tables", "khan2014"]) == 2
+    assert run_command(bench_command, "bench", [str(tmp_path / "no.amc")]) == 1
+    assert run_command(bench_command, "bench", [walk, "--codecs", "nonsense"]) == 2
+    assert run_command(bench_command, "bench", [walk, "--tables", "khan2014"]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 3
     assert "python -m tools.papers khan2014" in lines[2]
@@ -303,7 +303,7 @@ def test_tables_escape_and_leave_out() -> None:
 def test_a_clip_without_unit_has_length_units(samples: Path, tmp_path: Path) -> None:
     outcome = bench(
         [str(samples / "walk.bvh")],
-        Runner(1, cache.Cache(None)),
+        Runner(1, tasks.Cache(None)),
         codecs=["mrdwt:khan2016"],
         speeds=False,
     )
@@ -314,8 +314,8 @@ def test_a_clip_without_unit_has_length_units(samples: Path, tmp_path: Path) -> 
         "mean_position_error",
     )
     assert any("length units" in table.caption for table in outcome.tables)
-    if plots.can_draw():
-        assert [path.name for path in plots.draw(outcome.clips, tmp_path)] == [
+    if report.can_draw():
+        assert [path.name for path in report.draw(outcome.clips, tmp_path)] == [
             *("walk.png", "walk_mrdwt.png")
         ]
 
@@ -329,9 +329,9 @@ def test_a_clip_of_markers(samples: Path) -> None:
 
 
 def test_without_clips_it_takes_a_walk_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
-    from mcz.cli.bench import command
+    from mcz.cli.bench import bench_command
 
     options = ["--codecs", "qbc:khan2014", "--no-speeds", "--no-cache", "--jobs", "1", "--json"]
-    assert run_command(command, "bench", options) == 0
+    assert run_command(bench_command, "bench", options) == 0
     (clip,) = json.loads(capsys.readouterr().out)["clips"]
     assert clip["name"] == "walk" and clip["codecs"][0]["points"]

@@ -20,7 +20,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 import mcz
 from mcz.exchange.datasets.caches import FolderCache, MemoryCache, to_size
 from mcz.exchange.datasets.fields import FIELDS
-from mcz.exchange.datasets.splitting import split
+from mcz.exchange.datasets.samplers import split
 from tests.motions import smooth
 
 LENGTHS = (300, 90, 40, 513)

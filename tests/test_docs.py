@@ -25,7 +25,7 @@ import pytest
 
 import mcz
 from mcz.cli.common import Exit, run
-from mcz.cli.info import command as info_command
+from mcz.cli.info import info_command
 from mcz.cli.main import COMMANDS, cli
 from mcz.codecs import CODECS
 from mcz.codecs.parameters import TARGETS

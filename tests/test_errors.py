@@ -201,6 +201,6 @@ def test_the_library_names_no_option_of_the_command_line() -> None:
 
 
 NO_LIBRARY = {
-    "show/pictures/chart_pages.py",  # variables of CSS
-    "show/viewing/page_build.py",  # options of npm
+    "show/pictures/charts.py",  # variables of CSS
+    "show/viewing/page.py",  # options of npm
 }

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.show.pictures.libraries import EXTRAS
+from mcz.show.pictures.canvases import EXTRAS
 from tests.installed import PYPROJECT, required
 
 ROOT = PYPROJECT.parent

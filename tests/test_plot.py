@@ -24,8 +24,7 @@ from mcz.files.reading.report import info
 from mcz.files.reading.sizes import byte_shares, layout
 from mcz.kinematics.metrics.joint_errors import joint_errors
 from mcz.show.pictures.channel_charts import density
-from mcz.show.pictures.chart_pages import STYLE, ChartPage, Sheet
-from mcz.show.pictures.charts import MOST_POINTS, number, thinned
+from mcz.show.pictures.charts import MOST_POINTS, STYLE, ChartPage, Sheet, number, thinned
 from mcz.show.pictures.error_charts import errors_between
 from mcz.show.pictures.plotting import KINDS
 from tests.commands import run

@@ -13,10 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.cli import previews
 from mcz.cli.common import run
-from mcz.cli.info import command
-from mcz.cli.previews import LEVELS, PLAIN_LEVELS, bar, bars_of, sparkline
+from mcz.cli.info import info_command
+from mcz.cli.info_lines import LEVELS, PLAIN_LEVELS, bar, bars_of, sparkline
 from mcz.errors import FormatError
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.model.motion import Motion
@@ -29,7 +28,7 @@ Call = Any
 @pytest.fixture
 def call(capsys: pytest.CaptureFixture[str]) -> Call:
     def call(*words: object) -> tuple[int, str, str]:
-        return int(run(command, "mcz-info", list(map(str, words)))), *capsys.readouterr()
+        return int(run(info_command, "mcz-info", list(map(str, words)))), *capsys.readouterr()
 
     return call
 
@@ -142,7 +141,7 @@ def test_what_is_damaged_is_shown_without(
     def fails(*_: Any) -> Any:
         raise FormatError("damaged")
 
-    monkeypatch.setattr(previews, "preview_of", fails)
+    monkeypatch.setattr("mcz.cli.info.preview_of", fails)
     assert call(walk, "--preview")[:2] == call(walk)[:2]
 
 

@@ -17,7 +17,7 @@ import mcz
 import mcz.sources.restore as restore_module
 from mcz import Signal
 from mcz.cli.figures import figure_lines
-from mcz.cli.skeleton_lines import _tree
+from mcz.cli.info_lines import _tree
 from mcz.codecs import codec_by_name
 from mcz.codecs.transforms import dwt
 from mcz.container import strict
@@ -28,8 +28,8 @@ from mcz.files.writing.clip_writer import write_clip
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS
 from mcz.sources.c3d import c3d
+from mcz.sources.restore import Cells
 from mcz.sources.sample import marker_walk, write_samples
-from mcz.sources.tables.cells import Cells
 from mcz.sources.text.hierarchy import write_hierarchy
 from mcz.sources.text.layout import MAX_RUNS, Layout, Pattern, Run
 from tests.clocked_files import bvh

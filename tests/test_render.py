@@ -18,13 +18,13 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, Joint, MczError, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.model import extras
-from mcz.show.pictures import libraries, tracks
+from mcz.show.pictures import canvases, tracks
 from mcz.show.pictures.bodies import MIDDLE, body_of, fitted
 from mcz.show.pictures.cameras import VIEWS, Viewport
+from mcz.show.pictures.canvases import THEMES, rgb
 from mcz.show.pictures.capsules import Shapes, capsules
 from mcz.show.pictures.rendering import drawn_frames
 from mcz.show.pictures.stages import stage_of
-from mcz.show.pictures.themes import THEMES, rgb
 from tests.commands import run
 from tests.motions import motions, smooth
 
@@ -328,7 +328,7 @@ def test_what_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         with pytest.raises(OptionError, match=rf"mcz\[{extra}\]"):
             mcz.render(smooth(8), tmp_path / name)
     with pytest.raises(OptionError, match=r"av \(PyAV\).*mcz\[render\]"):
-        libraries.library("av")
+        canvases.library("av")
 
 
 def test_capsules_hold_their_circles() -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import mcz
-from mcz.sources.arrays.body_trees import tree
+from mcz.sources.arrays.skeletons import tree
 
 RATE = 120.0  # of CMU's recordings
 SIDES = {"left": "l", "right": "r"}

@@ -51,7 +51,7 @@ MODULES = (
     "mcz.sources.tables.layout",
     "mcz.sources.arrays.layout",
     "mcz.sources.text.notes",
-    "mcz.sources.tables.notes",
+    "mcz.sources.tables.source",
     "mcz.sources.c3d.layout",
     "mcz.container.recovery.layout",
     "mcz.model.numbers",

@@ -60,10 +60,7 @@ def sweep(case: Case, variant: Variant, n_points: int = N_POINTS) -> list[Record
 
 
 def ladder(
-    size: Callable[[float], float],
-    settings: Settings,
-    window: tuple[float, float],
-    n_points: int,
+    size: Callable[[float], float], settings: Settings, window: tuple[float, float], n_points: int
 ) -> list[float]:
     """About ``n_points`` settings whose sizes are evenly spaced in logarithms, fine to coarse.
 

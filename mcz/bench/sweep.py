@@ -124,7 +124,8 @@ def measured(
     timed = {}
     for task in tasks if speeds else ():
         if isinstance(swept[task], list):
-            params = _middle(swept[task])["params"]
+            points = swept[task]
+            params = points[len(points) // 2]["params"]
             timed[task] = Task("speeds", task.case, task.variant, tuple(params.items()))
     asked = {case: Task("peers", case, arguments=peers) for case in cases.values() if peers}
     found = runner.run([*timed.values(), *asked.values()])
@@ -143,10 +144,6 @@ def measured(
         rest = (tuple(curves), tuple(others) if isinstance(others, list) else ())
         results.append(ClipResult(name, case, *facts, unit, *rest))
     return results
-
-
-def _middle(points: Sequence[Record]) -> Record:
-    return points[len(points) // 2]
 
 
 def _curve(variant: Variant, swept: Any, speeds: Any) -> Curve:

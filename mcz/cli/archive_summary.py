@@ -34,16 +34,12 @@ def _table(report: Report) -> Iterator[str]:
         yield f"  {kind:<8} {len(outcomes):>7,} {size:>15,}  {results}"
 
 
-def _damage(report: Report) -> dict[str, list[str]]:
-    return {"damage": report.damage} if report.damage else {}
-
-
 def _summary(report: Report) -> str:
     """Counts of results, and the bytes of the sources and of the MCZ file."""
     counts = Counter(outcome.result for outcome in report.outcomes)
     shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
-    held = [outcome for outcome in report.outcomes if outcome.result in HELD]
-    size = sum(outcome.size for outcome in held)
+    kept = [outcome for outcome in report.outcomes if outcome.result in HELD]
+    size = sum(outcome.size for outcome in kept)
     files = plural(len(report.outcomes), "file") + (f" ({shown})" if shown else "")
     if report.size is None:
         return f"{files}, {size:,} bytes"
@@ -64,19 +60,19 @@ def _say_left_out(report: Report, target: str) -> None:
 
 def _say_notes(report: Report) -> None:
     """Print to standard error why files were left out, and the notes on the others."""
-    said: Counter[tuple[str, str, str]] = Counter()
+    messages: Counter[tuple[str, str, str]] = Counter()
     noted: Counter[tuple[str, str]] = Counter()
     for outcome in report.outcomes:
         kind = PurePosixPath(outcome.path).suffix.lower()
         if outcome.message and outcome not in report.failures:
-            said[outcome.result, kind, outcome.message] += 1
-            if said[outcome.result, kind, outcome.message] <= MANY:
+            messages[outcome.result, kind, outcome.message] += 1
+            if messages[outcome.result, kind, outcome.message] <= MANY:
                 say(f"{outcome.path}: {outcome.result}: {in_options(outcome.message)}")
         for note in outcome.notes:
             noted[kind, note] += 1
             if noted[kind, note] <= MANY:
                 say(f"{outcome.path}: {in_options(note)}")
-    for (result, kind, message), count in said.items():
+    for (result, kind, message), count in messages.items():
         if count > MANY:
             files = plural(count - MANY, f"more {kind} file".replace("  ", " "))
             say(f"{files} {result}: {in_options(message)} (--json names them)")
@@ -101,7 +97,8 @@ def print_file_results(report: Report, target: str, as_json: bool) -> Exit:
         ]
         counts = Counter(outcome.result for outcome in report.outcomes)
         document = {"target": target, "bytes": report.size, "counts": counts, "files": rows}
-        print_json(document | _damage(report) | {"left_out": report.left_out})
+        damage = {"damage": report.damage} if report.damage else {}
+        print_json(document | damage | {"left_out": report.left_out})
     else:
         echo(f"{target}: {_summary(report)}", *_table(report))
     _say_left_out(report, target)

@@ -15,11 +15,11 @@ import click
 from mcz.cli.common import Exit, Failure, about, echo, existing, print_json, say, table
 from mcz.cli.hints import in_options
 from mcz.cli.options import json_option, unit_option
-from mcz.cli.progress import Progress
+from mcz.cli.terminal import Progress
 from mcz.errors import reason_of
 
 if TYPE_CHECKING:
-    from mcz.bench.run import Outcome
+    from mcz.bench.report import Outcome
 
 PAPERS = "python -m tools.papers"
 
@@ -29,10 +29,8 @@ PAPERS = "python -m tools.papers"
 @click.option(
     "--codecs",
     metavar="A,B",
-    help=(
-        "Compare these codecs, each with its presets; qbc:khan2014 or qbc:delta=40 "
-        "is that alone. Default: all."
-    ),
+    help="Compare these codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is that "
+    "alone. Default: all.",
 )
 @click.option("--tables", "paper", hidden=True)  # where the papers' tables are is said
 @click.option("--peers", is_flag=True, help="Add the general compressors that are installed.")
@@ -52,7 +50,7 @@ PAPERS = "python -m tools.papers"
 )
 @click.option("--cache/--no-cache", default=True, help="Reuse earlier results (default).")
 @json_option
-def command(
+def bench_command(
     clips: tuple[str, ...],
     codecs: str | None,
     paper: str | None,
@@ -73,9 +71,8 @@ def command(
     Results are kept in the user's cache folder, by what they depend on; speeds are measured one at
     a time.
     """
-    from mcz.bench.cache import Cache, default_folder
-    from mcz.bench.run import bench
-    from mcz.bench.tasks import Runner
+    from mcz.bench.report import bench
+    from mcz.bench.tasks import Cache, Runner, default_folder
 
     if paper is not None:
         raise Failure(f"the papers' tables are in the source tree: {PAPERS} {paper}", Exit.USAGE)
@@ -122,30 +119,30 @@ def _sample(folder: str) -> str:
 
 
 def _lines(outcome: Outcome) -> Iterator[str]:
-    for found in outcome.tables:
-        yield found.title
-        yield from (f"  {line}" for line in table(found.cells(), found.right).split("\n"))
-        yield f"  {found.caption}"
+    for report in outcome.tables:
+        yield report.title
+        yield from (f"  {line}" for line in table(report.cells(), report.right))
+        yield f"  {report.caption}"
         yield ""
 
 
 def _write(outcome: Outcome, folder: Path) -> list[str]:
     """Write the files of a report; return their paths."""
-    from mcz.bench import plots
+    from mcz.bench.report import MISSING, can_draw, draw_all
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
         drawn: list[Path] = []
-        if plots.can_draw():
-            drawn = plots.drawn(outcome.figures, folder, "light")
+        if can_draw():
+            drawn = draw_all(outcome.figures, folder, "light")
         elif outcome.figures:
-            outcome.notes.append(plots.MISSING)
+            outcome.notes.append(MISSING)
         text = "\n".join(outcome.markdown([path.name for path in drawn]))
         report, results = folder / "report.md", folder / "results.json"
         page = folder / "index.html"
         report.write_text(text, "utf-8")
         with TemporaryDirectory() as other:
-            dark = plots.drawn(outcome.figures, Path(other), "dark") if drawn else []
+            dark = draw_all(outcome.figures, Path(other), "dark") if drawn else []
             page.write_bytes(outcome.page(list(zip(drawn, dark, strict=True))))
         document = json.dumps(outcome.document(), indent=1, ensure_ascii=False, allow_nan=False)
         results.write_text(document + "\n", "utf-8")

@@ -152,16 +152,16 @@ class PreviewSelection(ClipSelection):
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
         from mcz.files.tables.files import Table
 
-        found = self.clip.previewed(joints)
-        numbers, rate = self.clip.frame_numbers[found.frames], self.clip.frame_rate
+        preview = self.clip.previewed(joints)
+        numbers, rate = self.clip.frame_numbers[preview.frames], self.clip.frame_rate
         timeline = self._timeline()
         return Table(
             names,
-            _floats(found.values),
-            np.ones(found.values.shape, np.bool_) if found.mask is None else found.mask,
-            _repeated(numbers, len(found.values)),
-            rate / found.step if rate is not None and found.is_regular else None,
-            times=None if timeline is None else timeline.times[found.frames],
+            _floats(preview.values),
+            np.ones(preview.values.shape, np.bool_) if preview.mask is None else preview.mask,
+            _repeated(numbers, len(preview.values)),
+            rate / preview.step if rate is not None and preview.is_regular else None,
+            times=None if timeline is None else timeline.times[preview.frames],
         )
 
 
@@ -173,30 +173,30 @@ def preview_motion(clip: Clip) -> Motion:
     from mcz.model.clock import Timeline
     from mcz.model.motion import Motion, Signal
 
-    found = clip.previewed()
-    gaps = np.diff(found.frames)
-    n_frames = len(found.frames) - int(len(gaps) > 0 and gaps[-1] != found.step)
+    preview = clip.previewed()
+    gaps = np.diff(preview.frames)
+    n_frames = len(preview.frames) - int(len(gaps) > 0 and gaps[-1] != preview.step)
     info, rate = clip.signals[0], clip.frame_rate
     n_rows = n_frames * info.layout.samples_per_frame
     signal = Signal(
-        values=found.values[:n_rows],
+        values=preview.values[:n_rows],
         grids=info.grids,
         name=info.name,
         samples_per_frame=info.layout.samples_per_frame,
-        mask=None if found.mask is None else found.mask[:n_rows],
+        mask=None if preview.mask is None else preview.mask[:n_rows],
         channels=info.channels,
         role=info.role if info.of is None else "",
     )
-    frames, timeline = found.frames[:n_frames], clip.timeline
+    frames, timeline = preview.frames[:n_frames], clip.timeline
     motion = Motion(
         skeleton=clip.skeleton,
         signals=(signal,),
-        frame_rate=None if rate is None else rate / found.step,
+        frame_rate=None if rate is None else rate / preview.step,
         frame_rate_exact=clip.frame_rate_exact,
         name=clip.name,
         metadata=clip.metadata,
         frame_numbers=clip.frame_numbers[frames],
-        number_step=found.step,
+        number_step=preview.step,
     )
     if timeline is not None:
         timeline = Timeline(timeline.times[frames], motion.frame_rate, timeline.rounding)

@@ -3,15 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import Exit, echo, print_json, table
-from mcz.cli.options import json_option
+from mcz.cli.common import (
+    Exit,
+    about,
+    check_new,
+    echo,
+    existing,
+    plural,
+    print_json,
+    table,
+    write_output,
+)
+from mcz.cli.options import force_option, json_option, unit_option
+from mcz.cli.terminal import Progress
+from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
     from mcz.codecs.contract import Codec
+    from mcz.model.motion import Motion
+
 
 WIDEST = 44  # characters of a line of the meaning
 
@@ -19,7 +35,7 @@ WIDEST = 44  # characters of a line of the meaning
 @click.command(short_help="List codecs and their parameters.")
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @json_option
-def command(names: tuple[str, ...], as_json: bool) -> Exit:
+def codecs_command(names: tuple[str, ...], as_json: bool) -> Exit:
     """List the codecs, or of each NAME its parameters: default, range and meaning.
 
     mcz encode --codec NAME --param KEY=VALUE sets one.
@@ -33,7 +49,7 @@ def command(names: tuple[str, ...], as_json: bool) -> Exit:
         return Exit.FINE
     if names:
         for number, codec in enumerate(codecs):
-            echo(*([""] if number else []), *_lines(codec))
+            echo(*([""] if number else []), *_codec_lines(codec))
     else:
         echo(*_overview(codecs, DEFAULT))
     return Exit.FINE
@@ -47,11 +63,11 @@ def _overview(codecs: list[Codec], default: str) -> Iterator[str]:
         codes += ", live" if codec.live else ""
         name = f"{codec.name} (default)" if codec.name == default else codec.name
         rows.append([name, str(codec.id), keeps, codes, codec.dial.parameter if codec.dial else ""])
-    yield from table(rows, "lrlll").split("\n")
+    yield from table(rows, "lrlll")
     yield "mcz codecs NAME lists the parameters of one."
 
 
-def _lines(codec: Codec) -> Iterator[str]:
+def _codec_lines(codec: Codec) -> Iterator[str]:
     from mcz.codecs.listing import parameter_document, parameters_of
 
     kind = "lossless" if codec.lossless else "lossy"
@@ -63,7 +79,7 @@ def _lines(codec: Codec) -> Iterator[str]:
         first, *rest = _wrapped(facts["meaning"])
         rows.append([facts["name"], default, facts["range"], first])
         rows += [["", "", "", line] for line in rest]
-    yield from (f"  {line}" for line in table(rows).split("\n"))
+    yield from (f"  {line}" for line in table(rows))
 
 
 def text_of(value: object) -> str:
@@ -78,3 +94,127 @@ def _wrapped(text: str) -> list[str]:
     from textwrap import wrap
 
     return wrap(text, WIDEST) or [""]
+
+
+AXES = "xyz"
+
+
+@click.command(short_help="Learn the bases of a transform from clips.")
+@click.argument("clips", metavar="CLIPS...", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the bases to a file, for --param basis=OUT of mcz encode.",
+)
+@click.option(
+    "--P",
+    "sparsity",
+    metavar="N",
+    type=click.IntRange(1),
+    default=8,
+    help="Keep so many coefficients of each frame while learning. Default: 8.",
+)
+@click.option(
+    "--iterations",
+    metavar="N",
+    type=click.IntRange(0, 100_000),
+    default=300,
+    help="Iterate at most so often, less if nothing is gained. Default: 300.",
+)
+@click.option(
+    "--growth",
+    metavar="N",
+    type=click.IntRange(0, 10_000),
+    default=40,
+    help="Iterate so often with each smaller P before; 0 is the published algorithm. Default: 40.",
+)
+@click.option(
+    "--start",
+    type=click.Choice(("dct", "haar")),
+    default="dct",
+    help="Set the first basis. Default: dct.",
+)
+@click.option(
+    "--of",
+    "kind",
+    type=click.Choice(("frames", "steps", "windows")),
+    default="steps",
+    help="Make sparse: steps between frames, frames themselves as published, or DCT coefficients "
+    "of windows. Default: steps.",
+)
+@click.option(
+    "--mirror/--no-mirror", default=False, help="Add mirror images, left points for right ones."
+)
+@click.option(
+    "--headings",
+    metavar="N",
+    type=click.IntRange(1, 360),
+    default=1,
+    help="Add copies turned about the up axis, 180 / N degrees apart. Default: 1, none.",
+)
+@click.option(
+    "--every", metavar="N", type=click.IntRange(1), default=1, help="Take every N-th frame alone."
+)
+@unit_option("Length unit of files that say none.")
+@force_option
+@json_option
+def train_command(
+    clips: tuple[str, ...],
+    output: Path,
+    unit: str | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> Exit:
+    """Learn one orthogonal basis a coordinate from the positions of CLIPS (.amc, .bvh, .c3d, .mcz).
+
+    All clips must have the same points. A basis is learned by turns: the largest coefficients of
+    each frame stay, then comes the basis nearest to what has stayed. OUT holds the bases in
+    integers, as SPEC.md, "Bases", has them.
+    """
+    from mcz.codecs.training import Recipe, train
+    from mcz.files.writing.atomic import refuse_inputs
+
+    refuse_inputs(output, clips)
+    check_new(output, force)
+    for path in clips:
+        existing(path)
+    with about(clips[0]), Progress() as progress:
+        trained = train(_motions(clips, unit, progress), Recipe(**options), progress)
+    write_output(output, trained.data, force)
+    document = {"output": str(output), **trained.document()}
+    if as_json:
+        print_json(document)
+    else:
+        for line in _training_lines(document):
+            echo(line)
+    return Exit.FINE
+
+
+def _motions(paths: tuple[str, ...], unit: str | None, progress: Progress) -> Iterator[Motion]:
+    import mcz
+
+    for number, path in enumerate(paths):
+        progress(number, len(paths), f"reading {path}")
+        with about(path):
+            motion = mcz.read(path, unit=unit)
+        yield replace(motion, name=path)  # errors name the file
+
+
+def _training_lines(document: JsonObject) -> Iterator[str]:
+    yield (
+        f"{document['output']}: {plural(document['n_points'], 'point')}, "
+        f"{document['bytes']:,} bytes, from {plural(document['n_vectors'], 'vector')} of "
+        f"{plural(document['n_frames'], 'frame')} in {plural(document['n_clips'], 'clip')}"
+    )
+    if document["n_filled"]:
+        yield f"  points were missing, and filled, in {plural(document['n_filled'], 'frame')}"
+    head = ("coordinate", "iterations", f"at the start, {document['unit']}", "at the end")
+    rows = [
+        (axis, str(stage["iterations"]), f"{stage['start']:.5g}", f"{stage['end']:.5g}")
+        for axis, stage in zip(AXES, document["coordinates"], strict=True)
+    ]
+    yield from (f"  {line}" for line in table([head, *rows], "lrrr"))

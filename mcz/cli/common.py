@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.damage_hint import hinted
-from mcz.cli.hints import OPTION_HINTS
+from mcz.cli.hints import OPTION_HINTS, hinted
 from mcz.cli.terminal import binary_output as binary_output
 from mcz.cli.terminal import echo as echo
 from mcz.cli.terminal import print_json as print_json
@@ -338,14 +337,13 @@ def plural(count: int, word: str) -> str:
     return f"{count:,} {word}" if count == 1 else f"{count:,} {word}s"
 
 
-def table(rows: Sequence[Sequence[str]], right: str = "") -> str:
-    """Rows as aligned columns, the first row a heading; ``right`` marks right-aligned ones by "r".
+def table(rows: Sequence[Sequence[str]], right: str = "") -> list[str]:
+    """Rows as lines of aligned columns, the first a heading; an "r" in ``right`` aligns right.
 
     A cell of more than ``WIDEST_CELL`` characters shifts the rest of its own row alone.
 
-    >>> print(table([["name", "n"], ["walk", "240"]], "lr"))
-    name    n
-    walk  240
+    >>> table([["name", "n"], ["walk", "240"]], "lr")
+    ['name    n', 'walk  240']
     """
     rows = [[printable(cell) for cell in row] for row in rows]
     widths = [
@@ -353,14 +351,13 @@ def table(rows: Sequence[Sequence[str]], right: str = "") -> str:
         for column in zip(*rows, strict=True)
     ]
     sides = right.ljust(len(widths), "l")
-    lines = (
+    return [
         "  ".join(
             cell.rjust(width) if side == "r" else cell.ljust(width)
             for cell, width, side in zip(row, widths, sides, strict=True)
         ).rstrip()
         for row in rows
-    )
-    return "\n".join(lines)
+    ]
 
 
 def to_frames(

@@ -1,57 +1,61 @@
-"""``mcz decode``: the original file out of an .mcz file, or its numbers."""
+"""``mcz decode`` and ``mcz convert``: the original file, its numbers, or another format."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.clip_selection import ClipSelection, FilteredSelection, PreviewSelection
-from mcz.cli.common import (
-    Exit,
-    Failure,
-    JsonRefused,
-    damage_of,
-    plural,
-    say,
-)
-from mcz.cli.conversion_summary import (
+from mcz.cli.clip_outputs import (
     ConversionSummary,
-    rate_change_notes,
-    rate_notes,
+    clip_outputs,
+    skeleton_output,
     summary_facts,
     summary_lines,
 )
-from mcz.cli.decode_input import SOURCE_GIVEN, Input
-from mcz.cli.decode_options import EVENTS, DecodeOptions, check_options, check_signal, refuse
-from mcz.cli.decode_output import Output, check_count, deliver
+from mcz.cli.common import Exit, Failure, JsonRefused, damage_of, plural, say
+from mcz.cli.decode_options import (
+    SOURCE_GIVEN,
+    DecodeOptions,
+    Input,
+    check_options,
+    check_signal,
+    refuse,
+)
 from mcz.cli.options import (
+    ITS_RATE_HELP,
+    arrays_option,
     decoded_option,
     force_option,
     frames_option,
     json_option,
     key_error_option,
+    model_option,
     rate_option,
     salvage_option,
+    skeleton_option,
     threads_option,
     unit_option,
     up_option,
     where_option,
 )
-from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of, target_of_clip
-from mcz.files.reading.fidelity import CONVERTED, RESTORED
-from mcz.model.types import JsonObject
+from mcz.cli.outputs import (
+    TARGETS,
+    Output,
+    check_count,
+    check_kept,
+    deliver,
+    suffix_of,
+    target_of,
+    target_of_clip,
+)
+from mcz.files.reading.fidelity import RESTORED
+from mcz.model.types import JsonObject, Settings
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
-    from mcz.exchange.conversion import Fit
-    from mcz.exchange.conversion.scenes import SceneFile
     from mcz.files.reading.clip import Clip
     from mcz.files.reading.file import File
-    from mcz.model.motion import Motion
 
 
 @click.command(short_help="Restore the original file, or write its numbers.")
@@ -60,10 +64,8 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     metavar="OUT",
-    help=(
-        "Write to a file, whose suffix sets the format, a folder, or - for standard "
-        "output. Default: the source's name, beside FILE.mcz."
-    ),
+    help="Write to a file, whose suffix sets the format, a folder, or - for standard output. "
+    "Default: the source's name, beside FILE.mcz.",
 )
 @click.option(
     "--clip",
@@ -103,15 +105,13 @@ if TYPE_CHECKING:
     "--to",
     "target",
     type=click.Choice(TARGETS),
-    help=(
-        "Write numbers, or the motion in another format, instead of the source "
-        "file. Default: by the suffix of OUT."
-    ),
+    help="Write numbers, or the motion in another format, instead of the source file. Default: by "
+    "the suffix of OUT.",
 )
 @click.option(
     "--signal",
     metavar="NAME",
-    help=("Write another signal, such as analog or outputs, or the events (with --to csv or npz)."),
+    help="Write another signal, such as analog or outputs, or the events (with --to csv or npz).",
 )
 @click.option("--stored", is_flag=True, help="Write words as stored, not in units (with --signal).")
 @up_option("Axis that points up, where the clip does not know it (with --to c3d, glb or usda).")
@@ -135,7 +135,7 @@ if TYPE_CHECKING:
 @force_option
 @threads_option
 @json_option
-def command(
+def decode_command(
     file: str,
     output: str | None,
     names: tuple[str, ...],
@@ -145,22 +145,22 @@ def command(
     max_decoded: int | None,
     force: bool,
     as_json: bool,
-    **options: Any,
+    **settings: Any,
 ) -> Exit:
     """Write the original file of a clip, byte for byte, or its numbers, or another format.
 
     A file without clips gives its skeleton's ASF or its attachment. A source file in place of
     FILE.mcz is converted at once, as by mcz convert.
     """
-    wanted = DecodeOptions(**options)
+    options = DecodeOptions(**settings)
     refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     given = Input(file, salvage=salvage, unverified=unverified, max_decoded=max_decoded)
-    return decode(given, wanted, output, names=names, where=where, force=force, as_json=as_json)
+    return decode(given, options, output, names=names, where=where, force=force, as_json=as_json)
 
 
 def decode(
     given: Input,
-    wanted: DecodeOptions,
+    options: DecodeOptions,
     output: str | None,
     *,
     names: tuple[str, ...],
@@ -170,27 +170,28 @@ def decode(
 ) -> Exit:
     """Write what is wanted of an input, and say what became of it."""
     file, salvage = given.file, given.salvage
-    if output == "-" and (as_json or wanted.with_skeleton):
+    if output == "-" and (as_json or options.with_skeleton):
         raise JsonRefused("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
     if given.is_source:
-        given, wanted = given.with_facts(wanted)
-        refuse(output is None and wanted.target is None, f"{file}: {SOURCE_GIVEN}")
+        given, options = given.with_facts(options)
+        refuse(output is None and options.target is None, f"{file}: {SOURCE_GIVEN}")
     if target_of(suffix_of(output)) is None:
-        check_options(wanted, salvage)
-        check_signal(wanted)
+        check_options(options, salvage)
+        check_signal(options)
     outputs: list[Output] = []
     summaries: dict[str, ConversionSummary] = {}
-    with given.opened() as (held, inputs):
-        for clip in _chosen(held, output, names, where):
-            found, summaries[clip.name] = _of_clip(
-                held, clip, _as_named(clip, output, wanted, salvage)
-            )
-            outputs += [part for part in found if part not in outputs]  # an ASF that clips share
-        if not held.clips:
-            _check_plain(file, wanted)
-            outputs = [_other(held, names)]
+    with given.opened() as (opened, inputs):
+        for clip in _select_clips(opened, output, names, where):
+            clip_options = _with_target(clip, output, options, salvage)
+            parts, summaries[clip.name] = clip_outputs(opened, clip, clip_options)
+            outputs += [part for part in parts if part not in outputs]  # an ASF that clips share
+        if not opened.clips:
+            if options.target is not None or options.frames is not None or options.filtered:
+                text = "it has no clips, so --to, --frames and --post-filter do not apply"
+                raise Failure(text, Exit.USAGE, path=file)
+            outputs = [_output_without_clips(opened, names)]
             check_kept(output, outputs[0].name, is_skeleton=outputs[0].kind == "skeleton")
-        facts: JsonObject = {"damage": held.damage, "unverified_segments": held.unverified}
+        facts: JsonObject = {"damage": opened.damage, "unverified_segments": opened.unverified}
     deliver(inputs, output, outputs, force, as_json, facts | summary_facts(summaries))
     if facts["unverified_segments"]:
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
@@ -199,214 +200,111 @@ def decode(
     return damage_of(file, facts["damage"])
 
 
-def _chosen(
-    held: File, output: str | None, names: tuple[str, ...], where: str | None
+def _select_clips(
+    file: File, output: str | None, names: tuple[str, ...], where: str | None
 ) -> list[Clip]:
     """The clips that are asked for, or the only one; none where the file has none."""
     if where is not None:
-        clips = held.chosen(names or None, where)
-    elif not held.clips:
+        clips = file.chosen(names or None, where)
+    elif not file.clips:
         return []
     else:
-        clips = held.clips_called(names) if names else [held.only_clip(None)]
+        clips = file.clips_called(names) if names else [file.only_clip(None)]
     check_count(output, len(clips))
     return clips
 
 
-def _as_named(
-    clip: Clip, output: str | None, wanted: DecodeOptions, salvage: bool
+def _with_target(
+    clip: Clip, output: str | None, options: DecodeOptions, salvage: bool
 ) -> DecodeOptions:
-    """``wanted`` as the suffix of the output says, unless ``--to`` does."""
-    if wanted.target is None:
-        plain = not (wanted.solve or wanted.preview)
-        wanted = wanted._replace(target=target_of_clip(clip, output, plain=plain))
-    check_options(wanted, salvage)
-    check_signal(wanted)
-    return wanted
+    """``options`` with the target of the output's suffix, unless ``--to`` sets one."""
+    if options.target is None:
+        plain = not (options.solve or options.preview)
+        options = options._replace(target=target_of_clip(clip, output, plain=plain))
+    check_options(options, salvage)
+    check_signal(options)
+    return options
 
 
-def _check_plain(file: str, wanted: DecodeOptions) -> None:
-    """Raise Failure for options of clips, where the file has none."""
-    if wanted.target is not None or wanted.frames is not None or wanted.filtered:
-        raise Failure(
-            "it has no clips, so --to, --frames and --post-filter do not apply",
-            Exit.USAGE,
-            path=file,
-        )
-
-
-def _of_clip(
-    held: File, clip: Clip, wanted: DecodeOptions
-) -> tuple[list[Output], ConversionSummary]:
-    """The outputs of a clip, and their summary."""
-    target, summary = wanted.target, ConversionSummary()
-    part = _part(clip, wanted)
-    if target is None:
-        outputs = [_source(clip, part)]
-        summary.notes = rate_notes(clip, part, wanted)
-    elif wanted.is_converted:
-        from mcz.exchange.conversion import left_out
-        from mcz.files.reading.source_files import SourceOptions
-
-        motion = part.motion()
-        if wanted.solve:
-            motion, summary.fit = _solved(clip, motion)
-        elif target in ("amc", "bvh"):
-            _check_moves(clip)
-        unit = wanted.unit if motion.skeleton.unit_cm is None else None
-        motion = SourceOptions(unit=unit, up=wanted.up).applied_to(motion)
-        rate = None if wanted.filtered else wanted.rate
-        summary.notes = rate_change_notes(clip, rate)
-        if wanted.is_scene:
-            summary.scene = _scene(motion, target, rate, wanted)
-            outputs = [Output(target, f"{_stem(motion)}.{target}", summary.scene.data, CONVERTED)]
-        else:
-            outputs = _converted(motion, target, rate, wanted.with_skeleton)
-        summary.left_out = left_out(motion, target)
-    else:
-        outputs = [_export(clip, target, part, wanted)]
-        summary.left_out = _beside(clip, wanted)
-    if wanted.with_skeleton and target != "amc":
-        outputs.append(_skeleton(held, _sourced(held, clip)))
-    return outputs, summary
-
-
-def _part(clip: Clip, wanted: DecodeOptions) -> ClipSelection:
-    frames = wanted.frames
-    if frames is not None:
-        start, stop = frames
-        frames = start, clip.n_frames if stop is None else stop
-    what = (
-        FilteredSelection
-        if wanted.filtered
-        else PreviewSelection
-        if wanted.preview
-        else ClipSelection
-    )
-    return what(clip, frames, wanted.resolution, wanted.decimate, wanted.rate)
-
-
-def _source(clip: Clip, part: ClipSelection) -> Output:
-    path = clip.source.path if clip.source else ""
-    data = part.source_bytes()
-    name = PurePosixPath(path).name or f"{_stem(clip)}.out"
-    return Output("source", name, data, part.fidelity(data))
-
-
-def _check_moves(clip: Clip) -> None:
-    """Raise Failure for positions of a skeleton that is here, too: it can be fitted to them."""
-    from mcz.kinematics import point_set
-
-    if clip.skeleton.base and point_set(clip.skeleton) == "markers":
-        held = f"{clip.container.source.name}: clip {clip.name!r} holds positions"
-        raise Failure(f"{held}; --solve-ik fits its skeleton to them", Exit.USAGE)
-
-
-def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
-    """The motion of the clip's base skeleton whose points lie where those of ``motion`` do."""
-    from mcz.exchange.conversion import from_positions
-
-    base = clip.base_skeleton
-    if base is None:
-        raise Failure(
-            f"{clip.container.source.name}: clip {clip.name!r} names no skeleton that --solve-ik "
-            "could fit to its positions",
-            Exit.USAGE,
-        )
-    return from_positions(motion, base)
-
-
-def _scene(motion: Motion, target: str, rate: Fraction | None, wanted: DecodeOptions) -> SceneFile:
-    """The motion as a file of animated nodes."""
-    from mcz.exchange.conversion.scenes import to_scene
-
-    return to_scene(motion, target, key_error_mm=wanted.key_error, rate=rate, unit=wanted.unit)
-
-
-def _converted(
-    motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
-) -> list[Output]:
-    """The motion as a plain file of another format, with its ASF where an AMC is to have one."""
-    from mcz.exchange.conversion import converted_files
-
-    files = converted_files(motion, target, rate, with_skeleton)
-    kinds = {"asf": "skeleton"}
-    return [
-        Output(kinds.get(s, s), f"{_stem(motion)}.{s}", data, CONVERTED)
-        for s, data in files.items()
-    ]
-
-
-def _export(clip: Clip, target: str, part: ClipSelection, wanted: DecodeOptions) -> Output:
-    from mcz.files.tables.files import EVENT_EXPORTS, EXPORTS, channel_names, channel_units
-
-    joints = wanted.joints
-    chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
-    if wanted.signal == EVENTS and all(each.name != EVENTS for each in clip.signals):
-        events = () if clip.recording is None else clip.recording.events
-        data = EVENT_EXPORTS[target](part.events(events))
-        return Output(target, f"{_stem(clip)}.{target}", data, CONVERTED)
-    signal = 0 if wanted.signal is None else clip.find_signal(wanted.signal)
-    channels = clip.signals[signal].channels
-    names = channel_names(clip.skeleton, channels)
-    if wanted.signal is not None:
-        units = channel_units(clip.skeleton, channels)
-        table = part.of_signal(signal, wanted.stored, names, units)
-        return Output(target, f"{_stem(clip)}.{target}", EXPORTS[target](table), CONVERTED)
-    if chosen is not None and channels is None:  # else the table says why there are no joints
-        skeleton = clip.skeleton
-        names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
-    table = part.table(chosen, names)
-    if target == "npz" and chosen is None and channels is None and not wanted.preview:
-        table = replace(table, motion=part.motion())
-    return Output(target, f"{_stem(clip)}.{target}", EXPORTS[target](table), CONVERTED)
-
-
-def _beside(clip: Clip, wanted: DecodeOptions) -> tuple[str, ...]:
-    """The signals that a table does not have, and --signal would write."""
-    from mcz.exchange.conversion.losses import of_recording, of_text
-
-    if wanted.signal is not None or wanted.joints is not None:
-        return ()
-    others = [signal.name for signal in clip.signals[1:]]
-    signals = [f"left out: signal {', '.join(others)} (--signal)"] if others else []
-    events = " (--signal events)" if clip.recording is not None and clip.recording.events else ""
-    told = (f"{text}{events}" for text in of_recording(clip.recording))
-    return (*signals, *of_text(clip.metadata), *told)
-
-
-def _stem(clip: Clip | Motion) -> str:
-    """The clip's name without folders, which must not lead out of the output's folder."""
-    return PurePosixPath(clip.name).name.strip(".") or "clip"
-
-
-def _sourced(held: File, clip: Clip) -> bytes:
-    """The skeleton of the clip, or its base where that alone has a file of its own."""
-    base = clip.base_skeleton
-    own = held.skeleton(clip.skeleton_id, with_source=True).source
-    has_file = own is None and base is not None and base.source is not None
-    return clip.skeleton.base if has_file and clip.skeleton.base else clip.skeleton_id
-
-
-def _skeleton(held: File, wanted: bytes) -> Output:
-    """The skeleton's own file; its name is that of the alias that refers to it."""
-    names = [name for name, (_, target) in held.aliases.items() if target == wanted]
-    name = PurePosixPath(names[0]).name if names else "skeleton.asf"
-    return Output("skeleton", name, held.skeleton_bytes(wanted), RESTORED)
-
-
-def _other(held: File, wanted: tuple[str, ...]) -> Output:
-    """The attachment of the name that is wanted, or the only thing in a file without clips."""
-    names = list(held.attachments)
-    if len(wanted) > 1:
+def _output_without_clips(file: File, names: tuple[str, ...]) -> Output:
+    """The attachment of this name, or the only attachment or skeleton of a file without clips."""
+    attachments = list(file.attachments)
+    if len(names) > 1:
         raise Failure("no clips; of attachments one is decoded, mcz unpack writes all", Exit.USAGE)
-    name = wanted[0] if wanted else None
-    if name is None and len(held.skeletons) == 1 and not names:
-        return _skeleton(held, held.skeletons[0][0])
-    if name is None and len(names) == 1:
-        name = names[0]
-    if name is None or name not in held.attachments:
-        shown = ", ".join(names) or "nothing"
+    if not names and not attachments and len(file.skeletons) == 1:
+        return skeleton_output(file, file.skeletons[0][0])
+    name = next(iter(names or attachments), "")
+    if name not in file.attachments or (not names and len(attachments) > 1):
+        shown = ", ".join(attachments) or "nothing"
         raise Failure(f"no clips; choose with --clip among {shown}", Exit.USAGE)
-    data = held.attachments[name].read()
+    data = file.attachments[name].read()
     return Output("attachment", PurePosixPath(name).name, data, RESTORED)
+
+
+OF_SOURCES = ("skeleton", "arrays", "model")
+
+
+@click.command(short_help="Convert a motion file to another format, in one step.")
+@click.argument("file", metavar="IN", type=click.Path(readable=False))
+@click.argument("output", metavar="OUT")
+@click.option(
+    "--to",
+    "target",
+    type=click.Choice(TARGETS),
+    help="Set the format. Default: by the suffix of OUT.",
+)
+@click.option("--clip", "names", metavar="NAME", multiple=True, help="Choose the clip of an .mcz.")
+@where_option
+@frames_option("Frames A <= f < B, counted from 0.")
+@click.option(
+    "--joints", metavar="a,b", help="Write these joints alone, by name or index (to csv or npz)."
+)
+@skeleton_option("The ASF of an AMC, or none. Default: the one beside it, as in mcz encode.")
+@rate_option(ITS_RATE_HELP)
+@unit_option("Length unit of a file that says none.")
+@up_option("Axis that points up, of a file that does not say.")
+@arrays_option
+@model_option
+@key_error_option
+@click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF), too.")
+@decoded_option
+@force_option
+@threads_option
+@json_option
+def convert_command(
+    file: str,
+    output: str,
+    names: tuple[str, ...],
+    where: str | None,
+    max_decoded: int | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> Exit:
+    """Write the motion of IN as OUT, whose suffix says the format: any two that mcz knows.
+
+    It is mcz encode and mcz decode in one step. What OUT has no place for is named. A copy in IN's
+    own format has the same bytes; with --frames it is a part.
+    """
+    facts = {name: options.pop(name) for name in OF_SOURCES}
+    wanted = DecodeOptions(**options)
+    given = Input(file, max_decoded=max_decoded, facts=facts)
+    suffix = suffix_of(output)
+    refuse(not suffix and wanted.target is None, f"{output}: it has no suffix; --to says a format")
+    if suffix != ".mcz" or wanted.target is not None:
+        refuse(
+            not given.is_source and any(facts.values()),
+            f"{' '.join(f'--{name}' for name in OF_SOURCES)} are of source files, {file} is none",
+        )
+        return decode(given, wanted, output, names=names, where=where, force=force, as_json=as_json)
+    refuse(not given.is_source, f"{output}: mcz extract takes clips out of an .mcz")
+    has_parts = bool(names or where or wanted.frames or wanted.joints)
+    refuse(has_parts, f"{output}: an .mcz is made of a whole file; mcz extract takes parts")
+    from mcz.cli.encode import encode_command
+
+    facts |= {"rate": wanted.rate, "unit": wanted.unit, "up": wanted.up}
+    settings: Settings = {"source": file, "output": output, "force": force, "as_json": as_json}
+    code: Exit = click.get_current_context().invoke(  # which calls no callbacks
+        encode_command, params=None, **settings, **facts
+    )
+    return code

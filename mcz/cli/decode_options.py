@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from mcz.cli.common import Exit, Failure
-from mcz.cli.suffixes import CONVERSIONS, SCENES
+from mcz.cli.common import Exit, Failure, about, existing, opened, say
+from mcz.cli.hints import in_options
+from mcz.cli.outputs import CONVERSIONS, SCENES
+from mcz.model.types import Params
+
+if TYPE_CHECKING:
+    from mcz.files.reading.file import File
+
 
 EVENTS = "events"  # a signal that tables make of a recording
 
@@ -41,49 +51,96 @@ class DecodeOptions(NamedTuple):
         return self.target in SCENES
 
 
-def check_options(wanted: DecodeOptions, salvage: bool) -> None:
+def check_options(options: DecodeOptions, salvage: bool) -> None:
     """Raise Failure for options that do not go together."""
-    if not wanted.target or wanted.is_converted:
-        refuse(wanted.joints is not None, "--joints needs --to csv or --to npz")
-    lone = wanted.frames is not None or wanted.resolution or salvage or wanted.filtered
+    if not options.target or options.is_converted:
+        refuse(options.joints is not None, "--joints needs --to csv or --to npz")
+    lone = options.frames is not None or options.resolution or salvage or options.filtered
     refuse(
-        wanted.preview and (wanted.target is None or bool(lone)),
+        options.preview and (options.target is None or bool(lone)),
         "--preview needs --to, and goes with none of --frames --resolution --salvage --post-filter",
     )
-    refuse(wanted.decimate and not wanted.resolution, "--decimate needs --resolution")
+    refuse(options.decimate and not options.resolution, "--decimate needs --resolution")
     refuse(
-        wanted.rate is not None and not (wanted.is_converted or wanted.filtered),
+        options.rate is not None and not (options.is_converted or options.filtered),
         f"--rate needs --to {' or '.join((*CONVERSIONS, *SCENES))}, or --post-filter",
     )
     refuse(
-        wanted.solve and wanted.target not in ("amc", "bvh", *SCENES),
+        options.solve and options.target not in ("amc", "bvh", *SCENES),
         f"--solve-ik needs {' or '.join(f'--to {to}' for to in ('amc', 'bvh', *SCENES))}",
     )
 
 
-def check_signal(wanted: DecodeOptions) -> None:
+def check_signal(options: DecodeOptions) -> None:
     """Raise Failure for options that do not go with a signal that is not the motion."""
-    numbers = wanted.target is not None and not wanted.is_converted
-    refuse(wanted.signal is not None and not numbers, "--signal needs --to csv or --to npz")
-    refuse(wanted.stored and wanted.signal in (None, EVENTS), "--stored needs --signal")
-    other = wanted.joints is not None or wanted.preview or wanted.filtered
+    numbers = options.target is not None and not options.is_converted
+    refuse(options.signal is not None and not numbers, "--signal needs --to csv or --to npz")
+    refuse(options.stored and options.signal in (None, EVENTS), "--stored needs --signal")
+    other = options.joints is not None or options.preview or options.filtered
     refuse(
-        wanted.signal is not None and other,
+        options.signal is not None and other,
         "--signal goes with none of --joints --preview --post-filter",
     )
-    shown = wanted.is_scene
+    shown = options.is_scene
     refuse(
-        wanted.up is not None and not (shown or wanted.target == "c3d"),
+        options.up is not None and not (shown or options.target == "c3d"),
         f"--up needs --to {' or '.join(('c3d', *SCENES))}",
     )
     refuse(
-        wanted.unit is not None and not wanted.is_converted,
+        options.unit is not None and not options.is_converted,
         f"--unit needs --to {' or '.join((*CONVERSIONS, *SCENES))}",
     )
-    refuse(wanted.key_error is not None and wanted.target != "glb", "--key-error needs --to glb")
+    refuse(options.key_error is not None and options.target != "glb", "--key-error needs --to glb")
 
 
 def refuse(wrong: bool, reason: str) -> None:
     """Raise Failure with the reason if ``wrong``."""
     if wrong:
         raise Failure(reason, Exit.USAGE)
+
+
+SOURCE_GIVEN = "a source file, no .mcz; -o or --to says what it becomes, mcz encode compresses it"
+NO_LIMIT = 2**53  # of what is decoded: it was made here
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A file, and how it is read; ``facts`` are arguments of ``mcz.encode`` for a source file."""
+
+    file: str
+    salvage: bool = False
+    unverified: bool = False
+    max_decoded: int | None = None
+    facts: Params = field(default_factory=dict)
+
+    @property
+    def is_source(self) -> bool:
+        from mcz.files.reading.file import is_source
+
+        return is_source(self.file)
+
+    def with_facts(self, options: DecodeOptions) -> tuple[Input, DecodeOptions]:
+        """The same with the facts among what is wanted of a source file, and the rest of that."""
+        refuse(self.salvage or self.unverified, "--salvage and --unverified need an .mcz")
+        facts = {"unit": options.unit, "up": options.up, "rate": options.rate}
+        given = replace(self, facts=dict(self.facts) | facts)
+        return given, options._replace(unit=None, up=None, rate=None)
+
+    @contextmanager
+    def opened(self) -> Iterator[tuple[File, tuple[str, ...]]]:
+        """The open .mcz, of a source file one in memory; and the files that were read for it."""
+        if not self.is_source:
+            options = {"salvage": self.salvage, "unverified": self.unverified, "verify": True}
+            with opened(self.file, max_decoded=self.max_decoded, **options) as file:  # CEND-06
+                yield file, (self.file,)
+            return
+        import mcz
+
+        existing(self.file)
+        coded = io.BytesIO()
+        with about(self.file):
+            written = mcz.encode(self.file, coded, profile="large", **self.facts)
+            for note in written.notes:
+                say(f"{self.file}: {in_options(note)}")
+            with mcz.open(coded.getvalue(), max_decoded=NO_LIMIT) as file:
+                yield file, written.inputs

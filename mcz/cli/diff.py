@@ -19,9 +19,12 @@ from mcz.cli.common import (
     echo,
     existing,
     opened,
+    plural,
     print_json,
+    table,
 )
-from mcz.cli.diff_lines import lines_of
+from mcz.cli.figures import figure_lines
+from mcz.cli.hints import in_options
 from mcz.cli.options import (
     arrays_option,
     decoded_option,
@@ -34,11 +37,13 @@ from mcz.cli.options import (
     up_option,
     where_option,
 )
-from mcz.model.types import JsonObject
+from mcz.model.text_format import first_of
+from mcz.model.types import JsonObject, Params
 
 if TYPE_CHECKING:
     from mcz.files.reading.file import File
     from mcz.model.motion import Motion
+
 
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
 Cut = tuple[int, int | None] | None
@@ -64,7 +69,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     "names",
     metavar="NAME",
     multiple=True,
-    help=("Choose a clip of an .mcz (repeatable). Default: the only one, or all that both have."),
+    help="Choose a clip of an .mcz (repeatable). Default: the only one, or all that both have.",
 )
 @where_option
 @frames_option("Frames A <= f < B of both, from 0.")
@@ -89,13 +94,11 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     "--feet",
     metavar="NAME,...",
     callback=_to_names,
-    help=(
-        "Name the joints that stand on the floor. Default: those called foot, toe, ankle or heel."
-    ),
+    help="Name the joints that stand on the floor. Default: those called foot, toe, ankle or heel.",
 )
 @decoded_option
 @json_option
-def command(
+def diff_command(
     a: str,
     b: str,
     names: tuple[str, ...],
@@ -103,7 +106,7 @@ def command(
     frames: Cut,
     max_decoded: int | None,
     as_json: bool,
-    **options: Any,
+    **settings: Any,
 ) -> Exit:
     """Compare B with A, the original: any two of .mcz and of source formats.
 
@@ -112,33 +115,32 @@ def command(
     whenever the two could be compared, however much they differ. --where is asked of the clips of
     A, or of B where A is no .mcz.
     """
-    wanted = _Wanted(frames=frames, **options)
+    options = _Options(frames=frames, **settings)
     if (a, b) == ("-", "-"):
         raise Failure("only one of A and B can be standard input", Exit.USAGE)
     with ExitStack() as stack:
-        left, right = (_Side(path, stack, wanted, max_decoded) for path in (a, b))
-        asked = names if where is None else _taken(left, right, names, where)
-        pairs = list(_pairs(left, right, asked))
-        documents = [_compared(left, right, *pair, wanted) for pair in pairs]
-    only = {
-        f"only_in_{key}": sorted(set(own.clips) - set(other.clips))
-        for key, own, other in (("a", left, right), ("b", right, left))
-        if _by_name(left, right) and not asked
-    }
+        left, right = (_Side(path, stack, options, max_decoded) for path in (a, b))
+        if where is not None:
+            names = _filter_names(left, right, names, where)
+        only: dict[str, list[str]] = {}
+        pairs: Sequence[str | None] = names or (None,)
+        if _has_several(left, right) and not names:
+            pairs = _common(left, right, left.clips)
+            only["only_in_a"] = sorted(set(left.clips) - set(right.clips))
+            only["only_in_b"] = sorted(set(right.clips) - set(left.clips))
+        documents = [_compare(left, right, name, options) for name in pairs]
     if as_json:
         print_json({"a": a, "b": b, "clips": documents, **only})
         return Exit.FINE
     for number, document in enumerate(documents):
-        for line in ([""] if number else []) + list(lines_of(a, b, document)):
-            echo(line)
-    for key, found in only.items():
-        for name in found:
-            echo(f"only in {a if key == 'only_in_a' else b}: {name}")
+        echo(*([""] if number else []), *lines_of(a, b, document))
+    for key, clips in only.items():
+        echo(*(f"only in {a if key == 'only_in_a' else b}: {name}" for name in clips))
     return Exit.FINE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Wanted:
+class _Options:
     """Options of a comparison, and facts that the files lack."""
 
     frames: Cut
@@ -152,13 +154,6 @@ class _Wanted:
     by_joint: bool
     contacts: bool
     feet: tuple[str, ...]
-
-    def told(self, motion: Motion) -> Motion:
-        """``motion`` with what it does not say itself."""
-        from mcz.files.reading.source_files import SourceOptions
-
-        said = SourceOptions(rate=self.rate, unit=self.unit, up=self.up)
-        return said.completing(motion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,15 +169,11 @@ class _Side:
     """A or B: a source file, or an .mcz that stays open."""
 
     def __init__(
-        self,
-        path: str,
-        stack: ExitStack,
-        wanted: _Wanted,
-        max_decoded: int | None,
+        self, path: str, stack: ExitStack, options: _Options, max_decoded: int | None
     ) -> None:
         from mcz.files.reading.file import is_mcz
 
-        self.path, self._wanted = path, wanted
+        self.path, self._options = path, options
         self.file: File | None = None
         if path == "-" or is_mcz(path):
             self.file = stack.enter_context(opened(path, max_decoded=max_decoded))
@@ -194,31 +185,27 @@ class _Side:
         return [] if self.file is None else list(self.file.clips)
 
     def load(self, name: str | None) -> _Loaded:
-        """The motion called ``name``, or the only one, cut to the frames that are wanted."""
+        """The motion called ``name``, or the only one: its chosen frames, with the given facts."""
         import mcz
         from mcz.files.reading.sizes import clip_ratios
+        from mcz.files.reading.source_files import SourceOptions
 
-        frames = self._wanted.frames
+        options, ratios = self._options, None
         with about(self.path):
             if self.file is None:
-                wanted = self._wanted
                 motion = mcz.read(
-                    self.path,
-                    skeleton=wanted.skeleton,
-                    arrays=wanted.arrays,
-                    model=wanted.model,
+                    self.path, skeleton=options.skeleton, arrays=options.arrays, model=options.model
                 )
-                start, stop = _range(frames, motion.n_frames, self.path)
+                start, stop = _range(options.frames, motion.n_frames, self.path)
                 motion = motion.cut(start, stop)
-                ratios = None
             else:
                 clip = self.file.only_clip(name)
-                start, stop = _range(frames, clip.n_frames, f"clip {clip.name!r}")
+                start, stop = _range(options.frames, clip.n_frames, f"clip {clip.name!r}")
                 motion = clip.motion((start, stop))
-                found = clip_ratios(self.file, clip)
-                ratios = {key: found[key] for key in RATIOS}
-            motion = self._wanted.told(motion)
-        return _Loaded(motion, start, ratios)
+                all_ratios = clip_ratios(self.file, clip)
+                ratios = {key: all_ratios[key] for key in RATIOS}
+            facts = SourceOptions(rate=options.rate, unit=options.unit, up=options.up)
+            return _Loaded(facts.completing(motion), start, ratios)
 
 
 def _range(frames: Cut, n_frames: int, what: str) -> tuple[int, int]:
@@ -229,55 +216,40 @@ def _range(frames: Cut, n_frames: int, what: str) -> tuple[int, int]:
     return start, stop
 
 
-def _by_name(left: _Side, right: _Side) -> bool:
+def _has_several(left: _Side, right: _Side) -> bool:
     """Return whether clips are paired by name: two .mcz files, at least one with several clips."""
     return bool(left.file and right.file) and max(len(left.clips), len(right.clips)) > 1
 
 
-def _taken(left: _Side, right: _Side, names: tuple[str, ...], where: str) -> tuple[str, ...]:
-    """The names of the clips that ``where`` takes, none where each side is one clip."""
+def _filter_names(left: _Side, right: _Side, names: tuple[str, ...], where: str) -> tuple[str, ...]:
+    """The names of the clips that match ``where``; none where each side is one clip."""
     side = left if left.file is not None else right
     if side.file is None:
         raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
     clips = side.file.chosen(names or None, where)
     if names:
         return tuple(name for name in names if side.file[name] in clips)
+    names = tuple(clip.name for clip in clips)
     if left.file is not None and right.file is not None:
-        return _common(left, right, [clip.name for clip in clips]) if _by_name(left, right) else ()
-    return tuple(clip.name for clip in clips)
+        return _common(left, right, names) if _has_several(left, right) else ()
+    return names
 
 
 def _common(left: _Side, right: _Side, names: Sequence[str]) -> tuple[str, ...]:
     """The ``names`` of clips that both sides have; raises Failure if there are none."""
-    held = set(left.clips) & set(right.clips)
-    both = tuple(name for name in names if name in held)
+    shared = set(left.clips) & set(right.clips)
+    both = tuple(name for name in names if name in shared)
     if not both:
         raise Failure(f"{left.path} and {right.path} have no clip in common", Exit.USAGE)
     return both
 
 
-def _pairs(
-    left: _Side, right: _Side, names: tuple[str, ...]
-) -> Iterator[tuple[str | None, str | None]]:
-    """The clips to compare, by name on each side; None is the only one."""
-    if names:
-        for name in names:
-            yield name, name
-    elif _by_name(left, right):
-        for name in _common(left, right, left.clips):
-            yield name, name
-    else:
-        yield None, None
-
-
-def _compared(
-    left: _Side, right: _Side, a: str | None, b: str | None, wanted: _Wanted
-) -> JsonObject:
+def _compare(left: _Side, right: _Side, name: str | None, options: _Options) -> JsonObject:
     """The document of one pair of motions."""
     from mcz.files.reading.differences import document_of
     from mcz.kinematics.metrics.diff_document import diff_document
 
-    one, other = left.load(a), right.load(b)
+    one, other = left.load(name), right.load(name)
     if one.motion.n_frames != other.motion.n_frames:
         raise Failure(
             f"{left.path} has {one.motion.n_frames} frames, {right.path} "
@@ -288,10 +260,130 @@ def _compared(
             one.motion,
             other.motion,
             start=one.start,
-            shell_cm=wanted.shell_cm,
-            contacts=wanted.feet or wanted.contacts or None,
-            by_joint=wanted.by_joint,
-            contact_list=wanted.contacts,
+            shell_cm=options.shell_cm,
+            contacts=options.feet or options.contacts or None,
+            by_joint=options.by_joint,
+            contact_list=options.contacts,
         )
-        found = document_of(one.motion, other.motion)
-    return document | {"differences": found, "ratios_a": one.ratios, "ratios_b": other.ratios}
+        document["differences"] = document_of(one.motion, other.motion)
+    return document | {"ratios_a": one.ratios, "ratios_b": other.ratios}
+
+
+FEW = 12  # names of joints that are shown
+SMALL_CM = 1.0  # below it distances are shown in mm
+
+
+def lines_of(a: str, b: str, document: JsonObject) -> Iterator[str]:
+    """The text that people read, without line ends."""
+    entries = dict(document)
+    names = entries.pop("name_a"), entries.pop("name_b")
+    notes, ratios = entries.pop("notes"), [entries.pop("ratios_a"), entries.pop("ratios_b")]
+    yield f"{a} ({names[0]}) and {b} ({names[1]})"
+    joints, feet = entries.pop("joints"), entries.pop("feet")
+    equal = entries.pop("equal_joints")
+    beside = entries.pop("differences", ())
+    by_joint, contacts = entries.pop("by_joint", []), entries.pop("contact_list", [])
+    is_same = entries.get("mse_raw") == 0.0
+    yield from (f"  {line}" for line in figure_lines(entries))
+    if equal and not is_same:
+        yield f"  joints equal in every bit: {first_of(equal, FEW)}"
+    if feet is not None:
+        yield f"  {_feet_line(feet)}"
+    if joints is not None:
+        yield from (f"  {line}" for line in _joint_lines(a, b, joints))
+    for path, entry in zip((a, b), ratios, strict=True):
+        known = {key: value for key, value in (entry or {}).items() if value is not None}
+        if known:
+            shown = ", ".join(f"{key} {value:.4g}" for key, value in known.items())
+            yield f"  {path}: {shown}"
+    yield from (f"  {_difference_line(entry)}" for entry in beside)
+    yield from (f"  note: {in_options(note)}" for note in notes)
+    for rows in (_table_by_joint(by_joint), _table_of_contacts(contacts)):
+        yield from (f"  {line}".rstrip() for line in rows)
+
+
+def _difference_line(difference: Params) -> str:
+    """Something beside the numbers that A and B do not say alike."""
+    if difference["a"] is None and difference["b"] is None:
+        return f"{difference['what']}: not the same"
+    text = f"{difference['what']}: {_said(difference['a'])} in A, {_said(difference['b'])} in B"
+    for key in ("only_in_a", "only_in_b", "changed"):
+        if names := difference[key]:
+            words = key.replace("_", " ").replace(" a", " A").replace(" b", " B")
+            text += f"; {words}: {first_of(names, FEW)}"
+    return text
+
+
+def _said(value: object) -> str:
+    return "unknown" if value is None else f"{value:g}" if isinstance(value, float) else f"{value}"
+
+
+def _joint_lines(a: str, b: str, joints: JsonObject) -> Iterator[str]:
+    n_joints = len(joints["joints"])
+    if not n_joints:
+        yield "no joint has the same name in both"
+        return
+    suffix, unit = ("", "units") if joints["unit_cm"] is None else ("_cm", "cm")
+    if joints["mean"] is not None:
+        mean, most = joints[f"mean{suffix}"], joints[f"greatest{suffix}"]
+        yield (
+            f"{plural(n_joints, 'joint')} of the same name: mean {mean:.6g} {unit} apart, "
+            f"at most {most:.6g} {unit} (frame {joints['frame']}, {joints['joint']})"
+        )
+    for path, names in ((a, joints["only_in_a"]), (b, joints["only_in_b"])):
+        if names:
+            yield f"joints of {path} alone: {first_of(names, FEW)}"
+
+
+def _feet_line(feet: Params) -> str:
+    """The joints, axis and frame rate used to detect contacts."""
+    guessed = " (guessed)" if feet["up_guessed"] else ""
+    assumed = " (assumed)" if feet["rate_assumed"] else ""
+    return (
+        f"feet: {first_of(feet['joints'], FEW)}; {feet['up_axis']} up{guessed}, "
+        f"{feet['frame_rate']:g} frames a second{assumed}"
+    )
+
+
+def _table_by_joint(joints: Sequence[Params]) -> list[str]:
+    """A row a joint: distances of its points and of its shell, in mm where all are small."""
+    if not joints:
+        return []
+    in_cm = joints[0]["mean_position_error_cm"] is not None
+    points = [f"{key}_position_error{'_cm' if in_cm else ''}" for key in ("mean", "max")]
+    shell = ["shell_mean_cm", "shell_max_cm"]
+    greatest = max((joint[k] or 0.0 for joint in joints for k in (points[1], shell[1])), default=0)
+    unit, factor = ("units", 1.0) if not in_cm else ("cm", 1.0)
+    if in_cm and greatest < SMALL_CM:
+        unit, factor = "mm", 10.0
+    rows = [["joint", f"mean {unit}", f"max {unit}", "frame"]]
+    shelled = any(joint["shell_mean_cm"] is not None for joint in joints)
+    rows[0] += [f"shell mean {unit}", f"max {unit}", "frame"] if shelled else []
+    for joint in joints:
+        row = [joint["joint"], *(_scaled(joint[key], factor) for key in points)]
+        row.append(_frame_text(joint["max_position_error_frame"]))
+        if shelled:
+            row += [_scaled(joint[key], factor) for key in shell]
+            row.append(_frame_text(joint["shell_max_frame"]))
+        rows.append(row)
+    return ["", *table(rows, "lrrrrrr"[: len(rows[0])])]
+
+
+def _table_of_contacts(contacts: Sequence[Params]) -> list[str]:
+    """A row a contact: its frames, how far the foot slides in it, and both paths, in mm."""
+    if not contacts:
+        return []
+    keys = ("mean_mm", "max_mm", "path_mm", "path_original_mm")
+    rows = [["contact of", "first", "frames", "mean mm", "max mm", "path mm", "original's mm"]]
+    for each in contacts:
+        counts = [str(each["first"]), str(each["n_frames"])]
+        rows.append([each["joint"], *counts, *(_scaled(each[key], 1.0) for key in keys)])
+    return ["", *table(rows, "lrrrrrr")]
+
+
+def _scaled(value: float | None, factor: float) -> str:
+    return "" if value is None else f"{value * factor:.4g}"
+
+
+def _frame_text(value: int | None) -> str:
+    return "" if value is None else str(value)

@@ -35,8 +35,8 @@ from mcz.cli.options import (
     skeleton_option,
     threads_option,
 )
-from mcz.cli.progress import Progress
-from mcz.cli.suffixes import file_in
+from mcz.cli.outputs import file_in
+from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
     from mcz.files.writing.file import Written
@@ -49,9 +49,7 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     metavar="OUT.mcz",
-    help=(
-        "Write to a file, a folder, or - for standard output. Default: SRC with the suffix .mcz."
-    ),
+    help="Write to a file, a folder, or - for standard output. Default: SRC with the suffix .mcz.",
 )
 @skeleton_option(
     "The ASF of an AMC, or none. Default: one beside it or in a sibling folder asf/ that has "
@@ -61,10 +59,8 @@ if TYPE_CHECKING:
     "--format",
     "format_name",
     type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "npy", "npz")),
-    help=(
-        "Set the format of standard input. Default: by its content; live BVH, or "
-        "AMC with --skeleton."
-    ),
+    help="Set the format of standard input. Default: by its content; live BVH, or AMC with "
+    "--skeleton.",
 )
 @copies_option("no")
 @encoding_options
@@ -72,7 +68,7 @@ if TYPE_CHECKING:
 @force_option
 @threads_option
 @json_option
-def command(
+def encode_command(
     source: str,
     more: tuple[str, ...],
     output: str | None,
@@ -111,7 +107,7 @@ def _encode_piped(
     format_name: str | None,
     **options: Any,
 ) -> Exit:
-    from mcz.cli.encode_stdin import encode_lines, stored
+    from mcz.cli.standard_input import encode_lines, stored
     from mcz.files.live.text_writer import codes_live
     from mcz.files.writing.atomic import refuse_inputs
 
@@ -194,12 +190,12 @@ def _is_special(target: str) -> bool:
 def summary(target: str, written: Written) -> str:
     """One line about a file just written."""
     source_size = written.source_bytes
-    held = [
+    contents = [
         f"{plural(clip.n_frames, 'frame')} of {plural(clip.n_channels, 'channel')}"
         for clip in written.clips
     ]
-    held += ["a skeleton"] * (0 if written.clips else written.n_skeletons)
-    held += ["verbatim"] * written.n_attachments
+    contents += ["a skeleton"] * (0 if written.clips else written.n_skeletons)
+    contents += ["verbatim"] * written.n_attachments
     ratio = f", {source_size / written.size:.2f} : 1" if source_size else ""
     sizes = f"{source_size:,} -> {written.size:,} bytes{ratio}"
-    return f"{target}: {', '.join(held)}; {sizes}"
+    return f"{target}: {', '.join(contents)}; {sizes}"

@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import (
-    Exit,
-    Failure,
-    about,
-    damage_of,
-    echo,
-    existing,
-    plural,
-    print_json,
-    say,
-)
-from mcz.cli.damage_hint import hinted
+from mcz.cli.common import Exit, Failure, about, damage_of, echo, existing, plural, print_json, say
+from mcz.cli.hints import hinted
 from mcz.cli.options import (
     clips_option,
     copies_option,
@@ -30,8 +20,8 @@ from mcz.cli.options import (
     salvage_option,
     where_option,
 )
-from mcz.cli.progress import Progress
-from mcz.cli.suffixes import file_in
+from mcz.cli.outputs import file_in
+from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
     from mcz.files.editing.extraction import ExtractedClip, Extraction
@@ -64,7 +54,7 @@ if TYPE_CHECKING:
 @decoded_option
 @force_option
 @json_option
-def command(
+def extract_command(
     file: str,
     output: str,
     resolution: int,
@@ -93,7 +83,7 @@ def command(
     existing(file)
     output = file_in(output, file)
     with about(file), hinted(file, {"salvage": salvage}), Progress() as progress:
-        found = mcz.extract(
+        extraction = mcz.extract(
             file,
             output,
             resolution=resolution,
@@ -109,17 +99,17 @@ def command(
             progress=progress,
         )
     if as_json:
-        print_json({"output": output, **asdict(found)})
+        print_json({"output": output, **asdict(extraction)})
     else:
-        echo(*_lines(output, found))
-    for text in () if as_json else found.left_out:
+        echo(*_lines(output, extraction))
+    for text in () if as_json else extraction.left_out:
         say(f"left out: {text}")
-    return damage_of(file, found.damage)
+    return damage_of(file, extraction.damage)
 
 
-def _lines(output: str, found: Extraction) -> Iterator[str]:
-    yield f"{output}: {plural(len(found.clips), 'clip')}, {found.size:,} bytes"
-    for clip in found.clips:
+def _lines(output: str, extraction: Extraction) -> Iterator[str]:
+    yield f"{output}: {plural(len(extraction.clips), 'clip')}, {extraction.size:,} bytes"
+    for clip in extraction.clips:
         yield f"  {clip.name}: {', '.join(_parts(clip))}"
 
 

@@ -28,12 +28,12 @@ DISTANCES = ("rms_coordinate_error", "mean_position_error", "max_position_error"
 
 def figure_lines(entries: Params) -> Iterator[str]:
     """Lines of the figures in ``entries``, metric id -> number or text; None is left out."""
-    held = {_shown(k): _shown(v) for k, v in entries.items() if v is not None}
-    yield from _what(held)
-    rows = [["metric", "value", "unit", "cm", ""], *_rows(held)]
+    figures = {_shown(k): _shown(v) for k, v in entries.items() if v is not None}
+    yield from _what(figures)
+    rows = [["metric", "value", "unit", "cm", ""], *_rows(figures)]
     if len(rows) > 1:
-        yield from table(rows, "lrlrl").split("\n")
-    yield from _contact_lines(held)
+        yield from table(rows, "lrlrl")
+    yield from _contact_lines(figures)
 
 
 def reached(quality: Mapping[str, str]) -> str:
@@ -63,74 +63,74 @@ def reached(quality: Mapping[str, str]) -> str:
     return f"{text}; {remark}" if remark else text
 
 
-def _what(held: Mapping[str, str]) -> Iterator[str]:
+def _what(figures: Mapping[str, str]) -> Iterator[str]:
     """Settings, and how much was compared."""
-    if "codec" in held:
+    if "codec" in figures:
         settings = [
             f"{key.removeprefix(SETTING)} {value}"
-            for key, value in held.items()
+            for key, value in figures.items()
             if key.startswith(SETTING)
         ]
-        yield ", ".join([f"codec {held['codec']}", *settings])
+        yield ", ".join([f"codec {figures['codec']}", *settings])
     counts = [
-        plural(int(held[key]), key.removesuffix("s"))
+        plural(int(figures[key]), key.removesuffix("s"))
         for key in ("frames", "channels", "points")
-        if _is_number(held.get(key))
+        if _is_number(figures.get(key))
     ]
-    if "point_set" in held:
-        counts.append(f"point set {held['point_set']}")
-        unit = held.get("unit_cm")
+    if "point_set" in figures:
+        counts.append(f"point set {figures['point_set']}")
+        unit = figures.get("unit_cm")
         counts.append(f"1 unit = {_number(unit)} cm" if unit else "unit unknown")
     if counts:
         yield ", ".join(counts)
 
 
-def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
+def _rows(figures: Mapping[str, str]) -> Iterator[list[str]]:
     notes = {
-        "max_position_error": _where(held, "max_position_error", "point"),
-        "shell_mean_cm": _radius(held),
-        "shell_max_cm": _where(held, "shell_max", "joint"),
+        "max_position_error": _where(figures, "max_position_error", "point"),
+        "shell_mean_cm": _radius(figures),
+        "shell_max_cm": _where(figures, "shell_max", "joint"),
     }
-    for key, value in held.items():
+    for key, value in figures.items():
         metric = key.removeprefix(UNCUT)
-        beside = key.removesuffix("_cm") in held and key.endswith("_cm")
+        beside = key.removesuffix("_cm") in figures and key.endswith("_cm")
         if key in SHOWN_ELSEWHERE or key.startswith(SETTING) or beside:
             continue
         note = notes.get(key, "")
         if key.endswith("_cm"):
             yield [key.removesuffix("_cm"), "", "", _number(value), note]
         elif metric in DISTANCES:
-            yield [key, _number(value), "units", _number(held.get(f"{key}_cm", "")), note]
+            yield [key, _number(value), "units", _number(figures.get(f"{key}_cm", "")), note]
         else:
             unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
             yield [key, _number(value), unit, "", note]
 
 
-def _where(held: Mapping[str, str], metric: str, what: str) -> str:
+def _where(figures: Mapping[str, str], metric: str, what: str) -> str:
     """The place of a maximum, if recorded: ``frame 7, point Head``."""
     words = ("frame", what)
-    return ", ".join(f"{w} {held[f'{metric}_{w}']}" for w in words if f"{metric}_{w}" in held)
+    return ", ".join(f"{w} {figures[f'{metric}_{w}']}" for w in words if f"{metric}_{w}" in figures)
 
 
-def _radius(held: Mapping[str, str]) -> str:
-    radius = held.get("shell_radius_cm")
+def _radius(figures: Mapping[str, str]) -> str:
+    radius = figures.get("shell_radius_cm")
     return "" if radius is None else f"{_number(radius)} cm from where joints start"
 
 
-def _contact_lines(held: Mapping[str, str]) -> Iterator[str]:
+def _contact_lines(figures: Mapping[str, str]) -> Iterator[str]:
     """Lines about the contacts of feet and their sliding."""
-    if "contacts" not in held:
+    if "contacts" not in figures:
         return
-    some = held["contacts"] != "0" and "contact_frames" in held
-    frames = f", {held['contact_frames']} frames" if some else ""
-    yield f"contacts of feet: {held['contacts']}{frames}"
+    some = figures["contacts"] != "0" and "contact_frames" in figures
+    frames = f", {figures['contact_frames']} frames" if some else ""
+    yield f"contacts of feet: {figures['contacts']}{frames}"
     keys = ("mean", "max", "path", "path_original")
-    mean, most, path, meant = (_number(held.get(f"slide_{key}_mm", "?")) for key in keys)
-    if "slide_mean_mm" in held:
-        where = _where(held, "slide_max", "joint")
+    mean, most, path, meant = (_number(figures.get(f"slide_{key}_mm", "?")) for key in keys)
+    if "slide_mean_mm" in figures:
+        where = _where(figures, "slide_max", "joint")
         at = f" ({where})" if where else ""
         yield f"they slide {mean} mm on average, at most {most} mm{at}"
-    if "slide_path_mm" in held:
+    if "slide_path_mm" in figures:
         yield f"they move {path} mm in all, {meant} mm in the original"
 
 

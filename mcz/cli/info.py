@@ -24,9 +24,18 @@ from mcz.cli.common import (
     say,
     table,
 )
-from mcz.cli.duplicate_options import Once
 from mcz.cli.figures import figure_lines
 from mcz.cli.hints import OPTION_HINTS, in_options
+from mcz.cli.info_lines import (
+    array_lines,
+    preview_lines,
+    preview_of,
+    rate_text,
+    recording_lines,
+    skeleton_lines,
+    time_lines,
+)
+from mcz.cli.lazy import Once
 from mcz.cli.options import (
     clips_option,
     decoded_option,
@@ -36,9 +45,6 @@ from mcz.cli.options import (
     version_option,
     where_option,
 )
-from mcz.cli.previews import preview_lines
-from mcz.cli.recording_lines import array_lines, recording_lines
-from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
 from mcz.errors import FormatError, MczError
@@ -78,13 +84,11 @@ RATIOS = (  # of the bytes that a codec wrote, which restore no source alone
 @click.option(
     "--preview/--no-preview",
     default=None,
-    help=(
-        "Draw the energy over time as a line, and the bytes of joints as bars. "
-        "Default: on a terminal, for clips that are quickly decoded."
-    ),
+    help="Draw the energy over time as a line, and the bytes of joints as bars. Default: on a "
+    "terminal, for clips that are quickly decoded.",
 )
 @decoded_option
-def command(
+def info_command(
     file: str,
     as_json: bool,
     show_layout: bool,
@@ -116,13 +120,13 @@ def command(
         raise Failure(text, Exit.USAGE)
     if check:
         return _validate(file, max_decoded, as_json)
-    with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
+    with opened(file, salvage=salvage, max_decoded=max_decoded) as opened_file:
         if show_layout:
-            parts = layout(held)
+            parts = layout(opened_file)
         else:
-            document = info(held, clips or None, where)
-            _add_previews(held, document, as_json, preview)
-        damage = list(held.damage)
+            document = info(opened_file, clips or None, where)
+            _add_previews(opened_file, document, as_json, preview)
+        damage = list(opened_file.damage)
     if show_layout:
         _print_layout(parts, as_json)
     elif as_json:
@@ -132,26 +136,24 @@ def command(
     return damage_of(file, damage)
 
 
-def _add_previews(held: File, document: JsonObject, as_json: bool, preview: bool | None) -> None:
+def _add_previews(file: File, document: JsonObject, as_json: bool, preview: bool | None) -> None:
     """Add a preview to each clip that is shown in full, where it is wanted."""
     if preview is False or (preview is None and (as_json or not is_terminal())):
         return
     if not as_json and len(document["clips"]) > FEW:
         return
-    from mcz.cli.previews import preview_of
     from mcz.show.pictures.energy import is_cheap
 
     for clip in document["clips"]:
-        found = held.clips[clip["name"]]
-        if preview or is_cheap(found):
+        stored = file.clips[clip["name"]]
+        if preview or is_cheap(stored):
             with suppress(MczError):  # damaged: the rest is shown
-                clip["preview"] = preview_of(found)
+                clip["preview"] = preview_of(stored)
 
 
 def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) -> Exit:
     import mcz
-    from mcz.cli.previews import motion_of
-    from mcz.cli.source_text import source_lines
+    from mcz.cli.info_lines import motion_of, source_lines
     from mcz.files.reading.report import source_info
 
     existing(file)
@@ -172,8 +174,8 @@ def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
 
     size = 0
     try:
-        with opened(file, max_decoded=max_decoded) as held:
-            size, problems = held.size, validate(held)
+        with opened(file, max_decoded=max_decoded) as opened_file:
+            size, problems = opened_file.size, validate(opened_file)
     except FormatError as error:
         if not is_unsound(error):
             raise
@@ -202,19 +204,22 @@ def _print_layout(parts: list[tuple[int, int, str]], as_json: bool) -> None:
         print_json([{"offset": at, "bytes": n, "meaning": text} for at, n, text in parts])
         return
     rows = [[f"{at}", f"{n}", text] for at, n, text in parts]
-    echo(*table([["offset", "bytes", "meaning"], *rows], "rrl").split("\n"))
+    echo(*table([["offset", "bytes", "meaning"], *rows], "rrl"))
 
 
 def lines(file: str, document: JsonObject) -> Iterator[str]:
     """The text that people read, without line ends."""
-    held = [plural(len(document["clips"]), "clip"), plural(len(document["skeletons"]), "skeleton")]
+    counts = [
+        plural(len(document["clips"]), "clip"),
+        plural(len(document["skeletons"]), "skeleton"),
+    ]
     if document["attachments"]:
-        held.append(plural(len(document["attachments"]), "attachment"))
+        counts.append(plural(len(document["attachments"]), "attachment"))
     yield (
         f"{file}: MCZ {document['format_version']} (readers of {document['needs_version']} on), "
         f"{document['profile']} profile, {document['file_bytes']:,} bytes"
     )
-    yield f"  {', '.join(held)}"
+    yield f"  {', '.join(counts)}"
     for skeleton in document["skeletons"][:FEW]:
         yield from skeleton_lines(skeleton)
     if len(document["skeletons"]) > FEW:
@@ -227,7 +232,7 @@ def lines(file: str, document: JsonObject) -> Iterator[str]:
             if not alone:
                 yield from _preview(clip)
     else:
-        yield from ("", *_clips(document["clips"]).split("\n"))
+        yield from ("", *_clips(document["clips"]))
         yield from _notes(document["clips"])
     for attachment in document["attachments"]:
         yield ""
@@ -253,8 +258,8 @@ def _file_parts(document: JsonObject) -> Iterator[str]:
 
 
 def _part_table(parts: Mapping[str, int], whole: int) -> Iterator[str]:
-    rows = [[name, f"{n:,}", _percent(n, whole)] for name, n in parts.items() if n]
-    for line in table([["part", "bytes", "share"], *rows], "lrr").split("\n"):
+    rows = [[name, f"{n:,}", f"{100 * n / whole:.1f} %"] for name, n in parts.items() if n]
+    for line in table([["part", "bytes", "share"], *rows], "lrr"):
         yield f"  {line}"
 
 
@@ -319,7 +324,7 @@ def _source(clip: JsonObject) -> Iterator[str]:
     yield f"  exceptions {clip['n_exceptions']:,} numbers off their grid ({share:.3g} %)"
 
 
-def _clips(clips: list[JsonObject]) -> str:
+def _clips(clips: list[JsonObject]) -> list[str]:
     heading = ["clip", "codec", "frames", "rate", "channels", "source", "payload", "other", "ratio"]
     rows = [
         [
@@ -357,12 +362,8 @@ def _notes(clips: list[JsonObject]) -> Iterator[str]:
         yield f"{note}: {first_of(names, FEW)}"
 
 
-def _percent(part: int, total: int) -> str:
-    return f"{100 * part / total:.1f} %" if total else ""
-
-
 def main() -> None:
-    sys.exit(run(version_option(command), "mcz-info"))
+    sys.exit(run(version_option(info_command), "mcz-info"))
 
 
 if __name__ == "__main__":

@@ -5,25 +5,28 @@ No command of theirs takes an option twice, unless that makes a list.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 
 import click
 
-from mcz.cli.duplicate_options import refuse_repeats
+from mcz.model.types import Settings
 
 
-def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
-    """A group of commands that are the ``command`` of the modules called ``prefix`` and a name."""
+def lazy_group(commands: Mapping[str, str]) -> type[click.Group]:
+    """Class of a group of commands; each value is a module of ``mcz.cli`` and its function."""
+    names = tuple(commands)
 
     class Commands(click.Group):
         def list_commands(self, ctx: click.Context) -> list[str]:
             return list(names)
 
         def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-            if cmd_name not in names:
+            if cmd_name not in commands:
                 return None
-            command: click.Command = import_module(prefix + cmd_name).command
+            module, function = commands[cmd_name].split(".")
+            command: click.Command = getattr(import_module(f"mcz.cli.{module}"), function)
             return command
 
         def resolve_command(
@@ -65,3 +68,38 @@ def unknown(name: str, names: Sequence[str]) -> str:
     near += [known for known in names if known.startswith(name) and known not in near][:3]
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names)}"
     return f"no command {name!r}; {hint}"
+
+
+HELP = ["-h", "--help"]
+
+
+def refuse_repeats(
+    command: click.Command,
+    name: str | None,
+    arguments: Sequence[str],
+    parent: click.Context | None = None,
+) -> None:
+    """Raise UsageError where ``arguments`` give an option twice that does not take a list."""
+    settings: Settings = {"help_option_names": HELP, **command.context_settings}
+    with click.Context(command, parent, name, **settings) as context:
+        if command.no_args_is_help and not arguments:
+            return
+        if isinstance(command, click.Group):
+            context.allow_interspersed_args = False
+        _, _, given = command.make_parser(context).parse_args(list(arguments))
+        if any(option.is_eager for option in given):
+            return  # --help and the like end the run
+        counts = Counter(option for option in given if isinstance(option, click.Option))
+        for option, count in counts.items():
+            if count > 1 and not option.multiple and not option.count:
+                shown = max((*option.opts, *option.secondary_opts), key=len)
+                raise click.UsageError(f"{shown} is given {count} times, and takes one", context)
+
+
+class Once(click.Command):
+    """A command outside a group that rejects repeated options."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if not ctx.resilient_parsing:
+            refuse_repeats(self, ctx.info_name, args, ctx.parent)
+        return super().parse_args(ctx, args)

@@ -39,17 +39,14 @@ HEADS = {"name": "clip", "n_frames": "frames", "n_channels": "channels", "frame_
 @click.option(
     "--columns",
     metavar="a,b",
-    help=(
-        "Print these fields and metadata keys, such as "
-        "name,subject,duration,description; see docs/reference/queries.md. Default: those of "
-        "the index."
-    ),
+    help="Print these fields and metadata keys, such as name,subject,duration,description; see "
+    "docs/reference/queries.md. Default: those of the index.",
 )
 @click.option("--sort", metavar="KEY", help="Sort by a field or metadata key; -KEY: descending.")
 @click.option("--csv", "as_csv", is_flag=True, help="Print a CSV table of the clips alone.")
 @salvage_option
 @json_option
-def command(
+def list_command(
     file: str,
     where: str | None,
     columns: str | None,
@@ -65,18 +62,18 @@ def command(
     if as_csv and as_json:
         raise JsonRefused("--csv or --json, not both", Exit.USAGE)
     names = None if columns is None else [name.strip() for name in columns.split(",")]
-    with opened(file, salvage=salvage) as held, about(file):
-        clips = held.chosen(where=where)
+    with opened(file, salvage=salvage) as opened_file, about(file):
+        clips = opened_file.chosen(where=where)
         if sort is not None:
             from mcz.files.editing.reorganize import in_order
 
-            clips = in_order(held, clips, sort)
-        rows = _rows(held, clips, names)
+            clips = in_order(opened_file, clips, sort)
+        rows = _rows(opened_file, clips, names)
         totals = _totals(clips)
         whole = where is None and names is None
-        attachments = [{"name": a.name, "bytes": a.size} for a in held.attachments.values()]
-        aliases = [(name, *held.alias_of(name)) for name in sorted(held.aliases)]
-        damage = list(held.damage)
+        attachments = [{"name": a.name, "bytes": a.size} for a in opened_file.attachments.values()]
+        aliases = [(name, *opened_file.alias_of(name)) for name in sorted(opened_file.aliases)]
+        damage = list(opened_file.damage)
     if as_csv:
         echo(*_as_csv(rows, names or USUAL).split("\n"))
     elif as_json:
@@ -96,11 +93,11 @@ def command(
     return damage_of(file, damage)
 
 
-def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[JsonObject]:
+def _rows(file: File, clips: Sequence[Clip], names: list[str] | None) -> list[JsonObject]:
     """The values of each clip by column; without ``names`` those of the index, and its skeleton."""
     from mcz.files.reading.fields import getter_of
 
-    every = held.clips.values()
+    every = file.clips.values()
     getters: dict[str, Callable[[Clip], object]] = {
         name: getter_of(name, every) for name in names or USUAL
     }
@@ -139,7 +136,7 @@ def _print(rows: list[JsonObject], names: Sequence[str], totals: JsonObject) -> 
     heads = [HEADS.get(name, name) for name in names]
     cells = [[_text(name, row[name]) for name in names] for row in rows]
     numbers = [all(isinstance(row[n], int | float | None) for row in rows) for n in names]
-    echo(*table([heads, *cells], "".join("r" if n else "l" for n in numbers)).split("\n"))
+    echo(*table([heads, *cells], "".join("r" if n else "l" for n in numbers)))
     if len(rows) > 1:
         echo(_summary(totals))
 

@@ -22,7 +22,7 @@ from mcz.cli.common import (
     to_rate,
 )
 from mcz.cli.options import clips_option, json_option, where_option
-from mcz.cli.progress import Progress
+from mcz.cli.terminal import Progress
 
 if TYPE_CHECKING:
     from mcz.files.editing.metadata_edit import Said
@@ -59,48 +59,38 @@ def _to_pairs(
 )
 @click.option(
     "--set", "pairs", metavar="KEY=VALUE", multiple=True, callback=_to_pairs,
-    help="Set a key (repeatable). Keys: docs/guides/metadata.md, or x-... of your own.",
+    help="Set a key (repeatable). Keys: docs/guides/metadata.md, or x-... of your own."
 )  # fmt: skip
 @click.option(
     "--remove", "removed", metavar="KEY", multiple=True, help="Remove a key (repeatable)."
 )
 @click.option(
     "--from", "table", metavar="TABLE.csv", type=click.Path(readable=False),
-    help=(
-"Set the metadata of a table: a row a clip, a column a key; CSV or TSV with "
-"a head."
-),
+    help="Set the metadata of a table: a row a clip, a column a key; CSV or TSV with a head."
 )  # fmt: skip
 @click.option(
     "--match",
     metavar="TEXT",
-    help=(
-        "Name clips by columns of the table: {subject:0>2}_{trial:0>2}. Default: a "
-        "column clip, name, path or file."
-    ),
+    help="Name clips by columns of the table: {subject:0>2}_{trial:0>2}. Default: a column clip, "
+    "name, path or file.",
 )
 @click.option(
     "--take", metavar="a,b",
-    help=(
-"Take these columns of the table, as KEY=COLUMN if the names differ. "
-"Default: all."
-),
+    help="Take these columns of the table, as KEY=COLUMN if the names differ. Default: all."
 )  # fmt: skip
 @click.option("--skip-unknown", is_flag=True, help="Ignore rows that match no clip.")
 @click.option(
     "--rate", metavar="R", callback=to_rate,
-    help=(
-"Set the frame rate of clips whose source states none (AMC); rewrites the "
-"file. Default: of all clips of unknown rate."
-),
+    help="Set the frame rate of clips whose source states none (AMC); rewrites the file. Default: "
+    "of all clips of unknown rate."
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Change a known rate.")
 @click.option(
     "--purge", is_flag=True,
-    help="Rewrite the file without any earlier metadata.",
+    help="Rewrite the file without any earlier metadata."
 )  # fmt: skip
 @json_option
-def command(
+def meta_command(
     file: str,
     clips: tuple[str, ...],
     where: str | None,
@@ -127,16 +117,16 @@ def command(
     if set(pairs) & set(removed):
         raise Failure(f"{sorted(set(pairs) & set(removed))[0]} is set and removed", Exit.USAGE)
     if not (pairs or removed or table or rate or purge):
-        with opened(file) as held:
-            return _show(held, _chosen(held, clips, where, of_file), as_json)
+        with opened(file) as opened_file:
+            return _show(opened_file, _select_clips(opened_file, clips, where, of_file), as_json)
     rows = None
     if table is not None:
         from mcz.files.editing.metadata_edit import from_table
 
         columns = None if take is None else [name.strip() for name in take.split(",")]
         rows = partial(from_table, table, match=match, take=columns, skip_unknown=skip_unknown)
-    said = dict.fromkeys(removed) | pairs
-    changes, unknown = _changes(file, clips, where, of_file, said, rows)
+    edits = dict.fromkeys(removed) | pairs
+    changes, unknown = _changes(file, clips, where, of_file, edits, rows)
     if unknown:
         from mcz.files.reading.clips import list_some
 
@@ -144,28 +134,28 @@ def command(
     return _set(file, changes, rate, (clips, where, force), purge, as_json)
 
 
-def _chosen(
-    held: File, clips: tuple[str, ...], where: str | None, of_file: bool
+def _select_clips(
+    file: File, clips: tuple[str, ...], where: str | None, of_file: bool
 ) -> Mapping[str, Clip | None]:
     if of_file:
         return {"": None}
-    chosen = held.chosen(clips or None, where)
+    chosen = file.chosen(clips or None, where)
     every: dict[str, Clip | None] = {} if clips or where else {"": None}
     return every | {clip.name: clip for clip in chosen}
 
 
-def _show(held: File, chosen: Mapping[str, Clip | None], as_json: bool) -> Exit:
-    said = {
-        name: dict(held.metadata if clip is None else clip.metadata)
+def _show(file: File, chosen: Mapping[str, Clip | None], as_json: bool) -> Exit:
+    shown = {
+        name: dict(file.metadata if clip is None else clip.metadata)
         for name, clip in chosen.items()
     }
     if as_json:
-        clips = [{"name": name, "metadata": pairs} for name, pairs in said.items() if name]
-        whole = {"metadata": said[""]} if "" in said else {}
+        clips = [{"name": name, "metadata": pairs} for name, pairs in shown.items() if name]
+        whole = {"metadata": shown[""]} if "" in shown else {}
         print_json(whole | {"clips": clips})
         return Exit.FINE
-    for name, pairs in said.items():
-        if pairs or len(said) == 1:
+    for name, pairs in shown.items():
+        if pairs or len(shown) == 1:
             echo(f"{name}:" if name else "the file:")
             echo(*(f"  {key}: {value}" for key, value in pairs.items()))
     return Exit.FINE
@@ -176,22 +166,24 @@ def _changes(
     clips: tuple[str, ...],
     where: str | None,
     of_file: bool,
-    said: Said,
+    edits: Said,
     rows: Rows | None,
 ) -> tuple[dict[str, dict[str, str | None]], list[str]]:
     """Metadata changes by clip, and the table rows that match no clip."""
     changes: dict[str, dict[str, str | None]] = {}
     unknown: list[str] = []
-    with opened(file) as held, about(file):
+    with opened(file) as opened_file, about(file):
         if rows is not None:
-            found, unknown = rows(held)
-            wanted = {clip.name for clip in held.chosen(clips or None, where)}
+            found, unknown = rows(opened_file)
+            wanted = {clip.name for clip in opened_file.chosen(clips or None, where)}
             changes = {name: dict(row) for name, row in found.items() if name in wanted}
-        if said:
-            names: Iterable[str] = [""] if of_file else _chosen(held, clips, where, False)
+        if edits:
+            names: Iterable[str] = (
+                [""] if of_file else _select_clips(opened_file, clips, where, False)
+            )
             for name in names:
                 if name or of_file:
-                    changes[name] = changes.get(name, {}) | dict(said)
+                    changes[name] = changes.get(name, {}) | dict(edits)
     return changes, unknown
 
 
@@ -225,9 +217,9 @@ def _set(
         return Exit.FINE
     of_rate = sum(outcome.result == "rate" for outcome in outcomes)
     names = {outcome.path for outcome in outcomes if outcome.result == "said"}
-    of_clips = plural(len(names - {""}), "clip")
+    n_clips = plural(len(names - {""}), "clip")
     rates = f", the rate of {plural(of_rate, 'clip')}" if rate is not None else ""
     whole = " and of the file" if "" in names else ""
     purged = ", and purged earlier values" if purge else ""
-    echo(f"{file}: updated metadata of {of_clips}{whole}{rates}{purged}")
+    echo(f"{file}: updated metadata of {n_clips}{whole}{rates}{purged}")
     return Exit.FINE

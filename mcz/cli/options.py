@@ -9,7 +9,7 @@ from functools import wraps
 import click
 
 from mcz.cli.common import Exit, Failure, echo, existing, to_frames, to_params, to_rate
-from mcz.cli.suffixes import file_in
+from mcz.cli.outputs import file_in
 from mcz.model.types import Settings
 
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
@@ -47,15 +47,9 @@ version_option = click.option(
     help="Print the version and exit.",
 )
 
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 
-def json_option(function: Function) -> Function:
-    return click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")(
-        function
-    )
-
-
-def force_option(function: Function) -> Function:
-    return click.option("--force", is_flag=True, help="Overwrite what exists.")(function)
+force_option = click.option("--force", is_flag=True, help="Overwrite what exists.")
 
 
 def output_option(function: Function) -> Function:
@@ -75,21 +69,16 @@ def output_option(function: Function) -> Function:
     )(command)
 
 
-def salvage_option(function: Function) -> Function:
-    """``--salvage``, as the argument ``salvage`` of ``mcz.open``."""
-    return click.option(
-        "--salvage", is_flag=True, help="Read the intact parts of a damaged file; report the rest."
-    )(function)
+salvage_option = click.option(
+    "--salvage", is_flag=True, help="Read the intact parts of a damaged file; report the rest."
+)
 
-
-def decoded_option(function: Function) -> Function:
-    """``--max-decoded``, as the argument ``max_decoded`` of ``mcz.open``."""
-    return click.option(
-        "--max-decoded",
-        metavar="BYTES",
-        callback=to_bytes,
-        help="Decode up to BYTES (200M, 2G) of one file. Default: 64 MiB, or 4096 times its size.",
-    )(function)
+decoded_option = click.option(
+    "--max-decoded",
+    metavar="BYTES",
+    callback=to_bytes,
+    help="Decode up to BYTES (200M, 2G) of one file. Default: 64 MiB, or 4096 times its size.",
+)
 
 
 def threads_option(function: Function) -> Function:
@@ -171,10 +160,8 @@ token_option = click.option(
     "--token",
     metavar="TEXT",
     envvar="MCZ_TOKEN",
-    help=(
-        "Require this token from clients; MCZ_TOKEN in the environment keeps it out "
-        "of the list of processes. It encrypts nothing."
-    ),
+    help="Require this token from clients; MCZ_TOKEN in the environment keeps it out of the list "
+    "of processes. It encrypts nothing.",
 )
 
 param_option = click.option(
@@ -218,41 +205,26 @@ def up_option(what: str) -> Callable[[Function], Function]:
 ARRAYS = ("positions", "rotation-vectors", "quaternions-wxyz", "quaternions-xyzw")
 ROBOTS = ("unitree-g1-29", "unitree-g1-23", "unitree-h1", "unitree-h1-2", "booster-t1")
 
+arrays_option = click.option(
+    "--arrays",
+    type=click.Choice((*ARRAYS, *ROBOTS)),
+    help="Set the meaning of the numbers of a plain .npy or .npz, or name a robot's columns.",
+)
 
-def arrays_option(function: Function) -> Function:
-    """``--arrays``, as the argument ``arrays`` of ``mcz.read`` and ``mcz.encode``."""
-    return click.option(
-        "--arrays",
-        type=click.Choice((*ARRAYS, *ROBOTS)),
-        help="Set the meaning of the numbers of a plain .npy or .npz, or name a robot's columns.",
-    )(function)
+model_option = click.option(
+    "--model",
+    metavar="NPZ",
+    help="Take the bone lengths of bodies in an .npz from your model file of SMPL and its "
+    "kin. {gender} stands for that of the take, {body} for smpl, smplh or smplx.",
+)
 
-
-def model_option(function: Function) -> Function:
-    """``--model``, as the argument ``model`` of ``mcz.read`` and ``mcz.encode``."""
-    return click.option(
-        "--model",
-        metavar="NPZ",
-        help=(
-            "Take the bone lengths of bodies in an .npz from your model file of SMPL "
-            "and its kin. {gender} stands for that of the take, {body} for smpl, smplh "
-            "or smplx."
-        ),
-    )(function)
-
-
-def key_error_option(function: Function) -> Function:
-    """``--key-error``, as the argument ``key_error``."""
-    return click.option(
-        "--key-error",
-        metavar="MM",
-        type=click.FloatRange(min=0),
-        help=(
-            "Leave out keys of an animation as long as all stays within MM (with --to "
-            "glb). 0: a key in every frame. Default: 0.1, or 1/20,000 of the figure if "
-            "its unit is unknown."
-        ),
-    )(function)
+key_error_option = click.option(
+    "--key-error",
+    metavar="MM",
+    type=click.FloatRange(min=0),
+    help="Leave out keys of an animation as long as all stays within MM (with --to glb). 0: a "
+    "key in every frame. Default: 0.1, or 1/20,000 of the figure if its unit is unknown.",
+)
 
 
 def skeleton_option(help_text: str) -> Callable[[Function], Function]:
@@ -271,11 +243,9 @@ def rate_option(help_text: str = RATE_HELP) -> Callable[[Function], Function]:
     return click.option("--rate", metavar="R", callback=to_rate, help=help_text)
 
 
-def force_rate_option(function: Function) -> Function:
-    """``--force-rate``, as the argument ``force_rate``."""
-    return click.option(
-        "--force-rate", is_flag=True, help="Use --rate even for files that state another."
-    )(function)
+force_rate_option = click.option(
+    "--force-rate", is_flag=True, help="Use --rate even for files that state another."
+)
 
 
 def _to_quality(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -315,11 +285,8 @@ def encoding_options(function: Function) -> Function:
             "--quality",
             metavar="Q",
             callback=_to_quality,
-            help=(
-                "Encode lossy, with no point off by more than a length (0.5mm), or than mm "
-                "(1 mm), visible (5 mm) or preview (3 cm). Sets --codec to lossy by "
-                "default."
-            ),
+            help="Encode lossy, with no point off by more than a length (0.5mm), or than mm (1 "
+            "mm), visible (5 mm) or preview (3 cm). Sets --codec to lossy by default.",
         ),
         param_option,
         unit_option("Length unit of the source."),

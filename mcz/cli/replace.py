@@ -13,20 +13,10 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.cli.common import (
-    Exit,
-    Failure,
-    about,
-    echo,
-    existing,
-    plural,
-    print_json,
-    printable,
-    say,
-)
+from mcz.cli.common import Exit, Failure, about, echo, existing, plural, print_json, printable, say
 from mcz.cli.options import copies_option, force_option, json_option
-from mcz.cli.progress import Progress
-from mcz.cli.suffixes import file_in
+from mcz.cli.outputs import file_in
+from mcz.cli.terminal import Progress
 from mcz.model.text_format import cell_text
 
 if TYPE_CHECKING:
@@ -55,15 +45,13 @@ if TYPE_CHECKING:
 @click.option(
     "--recode",
     is_flag=True,
-    help=(
-        "Re-encode a clip whose joints are coded in one, so that others change a "
-        "little. Default: refuse such a clip."
-    ),
+    help="Re-encode a clip whose joints are coded in one, so that others change a little. "
+    "Default: refuse such a clip.",
 )
 @copies_option("where IN.mcz has some")
 @force_option
 @json_option
-def command(
+def replace_command(
     file: str,
     output: str | None,
     joint: str,
@@ -96,10 +84,10 @@ def command(
         if output is not None and Path(output).exists() and Path(output).samefile(file):
             raise Failure("it is IN.mcz itself; --in-place changes that", Exit.USAGE, path=output)
         refuse_inputs(shown, (table,))
-        with mcz.open(file) as held:
-            values = read_values(table, held.only_clip(name), joint)
+        with mcz.open(file) as opened_file:
+            values = read_values(table, opened_file.only_clip(name), joint)
         with Progress() as progress:
-            found = mcz.replace(
+            result = mcz.replace(
                 file,
                 name,
                 joint,
@@ -112,19 +100,19 @@ def command(
                 progress=progress,
             )
     if as_json:
-        print_json({"output": shown, **asdict(found)})
+        print_json({"output": shown, **asdict(result)})
         return Exit.FINE
-    coded = f"{found.joint} of {found.clip}" + (", coded anew" if found.anew else "")
-    line = f"{shown}: {found.size:,} bytes; {coded}: {found.joint_bytes:,}"
-    echo(f"{line} of {found.joint_bytes_before:,} bytes, {found.codec}")
-    if found.anew:
-        off = f"{found.max_error:.3g}, others by {found.others_error:.3g}"
-        echo(f"  off by at most, in units of the source: {found.joint} by {off}")
-    if found.n_exceptions or found.n_exceptions_before:
-        before = f"{found.n_exceptions_before:,} before"
-        line = f"  {plural(found.n_exceptions, 'number')} of the joint off the grid, {before}"
-        echo(f"{line}; --on-grid rounds to it" if found.n_exceptions else line)
-    for text in found.left_out:
+    coded = f"{result.joint} of {result.clip}" + (", coded anew" if result.anew else "")
+    line = f"{shown}: {result.size:,} bytes; {coded}: {result.joint_bytes:,}"
+    echo(f"{line} of {result.joint_bytes_before:,} bytes, {result.codec}")
+    if result.anew:
+        off = f"{result.max_error:.3g}, others by {result.others_error:.3g}"
+        echo(f"  off by at most, in units of the source: {result.joint} by {off}")
+    if result.n_exceptions or result.n_exceptions_before:
+        before = f"{result.n_exceptions_before:,} before"
+        line = f"  {plural(result.n_exceptions, 'number')} of the joint off the grid, {before}"
+        echo(f"{line}; --on-grid rounds to it" if result.n_exceptions else line)
+    for text in result.left_out:
         say(f"left out: {text}")
     return Exit.FINE
 
@@ -137,7 +125,7 @@ def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
     all_names = channel_names(clip.skeleton, clip.signals[0].channels)
     if not is_npz:  # as the CSV export has them
         all_names = [*map(printable, all_names)]
-    wanted = [all_names[column] for column in clip.skeleton.columns(clip.skeleton.find(joint))]
+    expected = [all_names[column] for column in clip.skeleton.columns(clip.skeleton.find(joint))]
     reading = _read_npz if is_npz else _read_csv
     try:
         names, values = reading(Path(path))
@@ -145,24 +133,24 @@ def read_values(path: str, clip: Clip, joint: str) -> NDArray[np.float64]:
         raise Failure(
             f"not a table of numbers: {' '.join(str(error).split())}", path=path
         ) from None
-    older = {f"{name}.value": name for name in wanted}  # as tables were called up to 0.9.0
+    older = {f"{name}.value": name for name in expected}  # as tables were called up to 0.9.0
     names = [older.get(name, name) for name in names]
-    missing = [name for name in wanted if name not in names]
+    missing = [name for name in expected if name not in names]
     if not missing:
-        return values[:, [names.index(name) for name in wanted]]
-    if any(name in names for name in all_names) or values.shape[1] != len(wanted):
-        raise Failure(f"no column {missing[0]}, and not {len(wanted)} columns alone", path=path)
+        return values[:, [names.index(name) for name in expected]]
+    if any(name in names for name in all_names) or values.shape[1] != len(expected):
+        raise Failure(f"no column {missing[0]}, and not {len(expected)} columns alone", path=path)
     return values
 
 
 def _read_npz(path: Path) -> tuple[list[str], NDArray[np.float64]]:
-    with np.load(path, allow_pickle=False) as held:
-        values = np.asarray(held["values"], np.float64)
+    with np.load(path, allow_pickle=False) as arrays:
+        values = np.asarray(arrays["values"], np.float64)
         if values.ndim != 2:
             raise ValueError(f"values of shape {values.shape}")
-        if "mask" in held:
-            values = np.where(held["mask"], values, np.nan)
-        return [str(name) for name in held["names"]] if "names" in held else [], values
+        if "mask" in arrays:
+            values = np.where(arrays["mask"], values, np.nan)
+        return [str(name) for name in arrays["names"]] if "names" in arrays else [], values
 
 
 def _read_csv(path: Path) -> tuple[list[str], NDArray[np.float64]]:

@@ -9,12 +9,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from hmac import compare_digest
 from io import BufferedReader
-from threading import Condition, Thread
+from threading import Condition, Event, Lock, Thread
 from time import monotonic, sleep
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
-from mcz.cli.common import Exit, Failure, say
-from mcz.cli.encode_stdin import Awaited
+from mcz.cli.common import Exit, Failure, about, say
+from mcz.cli.standard_input import Awaited
+
+if TYPE_CHECKING:
+    from mcz.files.live.writer import LiveWriter
 
 MOST_WAITING = 4 * 2**20  # bytes that a client may be behind
 LINGER = 10.0  # seconds that clients have for the rest, once all is coded
@@ -269,3 +272,62 @@ class _Client:
         with suppress(OSError):
             self._connection.shutdown(socket.SHUT_RDWR)
         self._connection.close()
+
+
+@contextmanager
+def listening(where: str, token: str | None) -> Iterator[Listener]:
+    """A sink that sends to clients."""
+    with about(where):
+        listener = Listener(where, token)
+    say(f"listening on {listener.address}")
+    if listener.is_open_to_others:
+        who = "everyone who" if token is None else "everyone who has the token and"
+        hint = "; --token asks for one" if token is None else ""
+        say(f"{who} reaches the port can read the stream, which is not encrypted{hint}")
+    try:
+        yield listener
+    finally:
+        listener.close()
+
+
+class Heart:
+    """Writes a heartbeat after every ``seconds`` without a frame, from a thread; 0: never.
+
+    Who uses the writer holds ``lock``.
+    """
+
+    def __init__(
+        self, writer: LiveWriter, seconds: float, listener: Listener | None = None
+    ) -> None:
+        self.lock = Lock()
+        self._writer, self._seconds, self._listener = writer, seconds, listener
+        self._is_over = Event()
+        self._thread = Thread(target=self._beat, daemon=True)
+
+    def __enter__(self) -> Heart:
+        if self._seconds:
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._is_over.set()
+        if self._seconds:
+            self._thread.join()
+
+    def _beat(self) -> None:
+        sent, since = self._writer.traffic.total, monotonic()
+        while not self._is_over.wait(min(self._seconds / 4, 1.0)):
+            with self.lock:
+                now = self._writer.traffic.total
+                if now == sent and monotonic() - since >= self._seconds:
+                    with suppress(OSError):  # the next frame meets it, too
+                        self._write()
+                    now = self._writer.traffic.total
+            if now != sent:
+                sent, since = now, monotonic()
+
+    def _write(self) -> None:
+        if self._listener is None:
+            self._writer.heartbeat()
+        else:
+            self._listener.beat(self._writer.heartbeat)

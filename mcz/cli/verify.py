@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    check_new,
     echo,
     existing,
     given,
@@ -19,6 +21,7 @@ from mcz.cli.common import (
     plural,
     print_json,
     say,
+    write_output,
 )
 from mcz.cli.hints import OPTION_HINTS, in_options
 from mcz.cli.options import (
@@ -29,12 +32,12 @@ from mcz.cli.options import (
     threads_option,
     where_option,
 )
-from mcz.cli.progress import Progress
-from mcz.cli.verify_report import VerifyReport
+from mcz.cli.terminal import Progress, json_text
 from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
 from mcz.model.types import JsonObject
 
 if TYPE_CHECKING:
+    from mcz.files.bags import BagCheck
     from mcz.files.reading.file import File
 
 
@@ -64,7 +67,7 @@ if TYPE_CHECKING:
 @force_option
 @jobs_option
 @json_option
-def command(
+def verify_command(
     file: str,
     source: str | None,
     quick: bool,
@@ -87,32 +90,25 @@ def command(
         raise Failure("--date is that of the --report", Exit.USAGE)
     if source is not None:
         existing(source)
-    if Path(file).is_dir() and (where is not None or source is not None):
+    is_folder = Path(file).is_dir()
+    if is_folder and (where is not None or source is not None):
         raise Failure("--where and --source are of one file, not of a bag", Exit.USAGE)
-    counts = ""
     report_file = None if report is None else VerifyReport(report, date, force, inputs=(file,))
-    if Path(file).is_dir():
-        return _bag(file, quick, max_decoded, report_file, as_json)
+    if is_folder:
+        return _verify_bag(file, quick, max_decoded, report_file, as_json)
     if quick:
-        rows, counts = _verify_quickly(file, report_file)
+        rows, success = _verify_quickly(file, report_file)
     else:
-        rows = _verify_fully(file, source, where, max_decoded, report_file)
+        rows, success = _verify_fully(file, source, where, max_decoded, report_file)
     failed = [row for row in rows if row["problems"]]
     if report_file is not None:
         report_file.write(rows, quick=quick, where=where)
     if as_json:
         print_json({"verified": not failed, "mode": "quick" if quick else "full", "parts": rows})
     elif not failed:
-        echo(_success_line(file, rows, counts))
+        echo(f"{file}: {success}")
     _print_problems(file, failed)
     return Exit.NOT_VERIFIED if failed else Exit.FINE
-
-
-def _success_line(file: str, rows: list[JsonObject], counts: str) -> str:
-    """One line about a sound file; ``counts``: of a quick check."""
-    if counts:
-        return f"{file}: checksums right, {counts}; values and sources were not checked"
-    return f"{file}: verified, {', '.join(_counts(rows))}"
 
 
 def _print_problems(file: str, failed: list[JsonObject]) -> None:
@@ -121,7 +117,7 @@ def _print_problems(file: str, failed: list[JsonObject]) -> None:
             say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
 
 
-def _bag(
+def _verify_bag(
     folder: str,
     quick: bool,
     max_decoded: int | None,
@@ -134,17 +130,17 @@ def _bag(
     if not is_bag(folder):
         raise Failure("a folder and no bag: it has no bagit.txt", path=folder, kind="AccessError")
     with about(folder), Progress() as progress:
-        found = check_bag(folder, progress)
-    fine, documents, files = not found.problems, [], []
-    for name in found.files:
+        bag = check_bag(folder, progress)
+    fine, documents, files = not bag.problems, [], []
+    for name in bag.files:
         if not name.lower().endswith(".mcz"):
             continue
-        path, counts = str(Path(folder) / name), ""
+        path, success = str(Path(folder) / name), ""
         try:
             if quick:
-                rows, counts = _verify_quickly(path, report_file)
+                rows, success = _verify_quickly(path, report_file)
             else:
-                rows = _verify_fully(path, None, None, max_decoded, report_file)
+                rows, success = _verify_fully(path, None, None, max_decoded, report_file)
             if report_file is not None:
                 documents.append(report_file.document(rows, quick=quick, where=None))
         except MczError as error:  # the others are checked all the same
@@ -153,18 +149,17 @@ def _bag(
         files.append({"file": name, "verified": not failed, "parts": rows})
         fine = fine and not failed
         if not failed and not as_json:
-            echo(_success_line(path, rows, counts))
+            echo(f"{path}: {success}")
         _print_problems(path, failed)
     if report_file is not None:
-        report_file.write_bag(found, fine, files, documents)
+        report_file.write_bag(bag, fine, files, documents)
     if as_json:
-        mode = "quick" if quick else "full"
-        document = {"verified": fine, "mode": mode, "problems": found.problems, "files": files}
-        print_json(document)
-    elif not found.problems:
-        count = plural(len(found.files), "file")
-        echo(f"{folder}: a valid bag, {count}, {found.n_bytes:,} bytes")
-    for problem in found.problems:
+        document = {"verified": fine, "mode": "quick" if quick else "full"}
+        print_json(document | {"problems": bag.problems, "files": files})
+    elif not bag.problems:
+        count = plural(len(bag.files), "file")
+        echo(f"{folder}: a valid bag, {count}, {bag.n_bytes:,} bytes")
+    for problem in bag.problems:
         say(f"{folder}: {problem}")
     return Exit.FINE if fine else Exit.NOT_VERIFIED
 
@@ -175,26 +170,26 @@ def _verify_fully(
     where: str | None,
     max_decoded: int | None,
     report_file: VerifyReport | None,
-) -> list[JsonObject]:
-    """The verification row of each part of the file."""
+) -> tuple[list[JsonObject], str]:
+    """The verification row of each part of the file, and a line for success."""
     try:
-        with opened(file, max_decoded=max_decoded) as held, Progress() as progress:
-            rows = list(_parts(held, where, progress))
+        with opened(file, max_decoded=max_decoded) as opened_file, Progress() as progress:
+            rows = list(_check_parts(opened_file, where, progress))
             if source is not None:
-                rows.append(_compare(held, source))
+                rows.append(_compare(opened_file, source))
             if report_file is not None:
-                report_file.take(held)
+                report_file.take(opened_file)
     except MczError as error:
         if not is_unsound(error):
             raise
         if report_file is not None:
             report_file.take_bytes(file)
         rows = [_row("structure", "", [error.describe(OPTION_HINTS, with_path=False)])]
-    return rows
+    return rows, f"verified, {', '.join(_counts(rows))}"
 
 
 def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[JsonObject], str]:
-    """One row, that of the checksums; and what was seen."""
+    """One row, that of the checksums, and a line for success."""
     from mcz.files.reading.faults import quick_check
 
     target = given(file)
@@ -202,8 +197,8 @@ def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[J
         seen, problems = quick_check(target, lambda done, total: progress(done, total, file))
     if report_file is not None:
         try:
-            with opened(file) as held:
-                report_file.take(held)
+            with opened(file) as opened_file:
+                report_file.take(opened_file)
         except MczError as error:
             if not is_unsound(error):
                 raise
@@ -213,9 +208,8 @@ def _verify_quickly(file: str, report_file: VerifyReport | None) -> tuple[list[J
         counts += f", {seen.n_packets:,} packets"
     if not seen.indexed:
         counts += ", no index"
-    return [
-        _row("checksums", "", [f"at {p.offset}: {in_options(p.message)}" for p in problems])
-    ], counts
+    rows = [_row("checksums", "", [f"at {p.offset}: {in_options(p.message)}" for p in problems])]
+    return rows, f"checksums right, {counts}; values and sources were not checked"
 
 
 def is_unsound(error: MczError) -> bool:
@@ -223,16 +217,16 @@ def is_unsound(error: MczError) -> bool:
     return isinstance(error, FormatError) and not isinstance(error, UnsupportedError | LimitError)
 
 
-def _parts(held: File, where: str | None, progress: Progress) -> Iterator[JsonObject]:
+def _check_parts(file: File, where: str | None, progress: Progress) -> Iterator[JsonObject]:
     from mcz.files.reading.faults import part_problems, structure_problems
 
-    clips = None if where is None else held.chosen(where=where)
-    total = 1 + len(held.clips if clips is None else clips) + len(held.attachments)
-    problems = structure_problems(held)
+    clips = None if where is None else file.chosen(where=where)
+    total = 1 + len(file.clips if clips is None else clips) + len(file.attachments)
+    problems = structure_problems(file)
     yield _row("structure", "", [in_options(problem.message) for problem in problems])
-    for done, (kind, name, found) in enumerate(part_problems(held, clips)):
+    for done, (kind, name, messages) in enumerate(part_problems(file, clips)):
         progress(min(done, total), total, name)
-        yield _row(kind, name, [in_options(problem.message) for problem in found])
+        yield _row(kind, name, [in_options(problem.message) for problem in messages])
 
 
 def _row(kind: str, name: str, problems: list[str]) -> JsonObject:
@@ -240,45 +234,143 @@ def _row(kind: str, name: str, problems: list[str]) -> JsonObject:
 
 
 def _counts(rows: list[JsonObject]) -> Iterator[str]:
-    kinds = [row["kind"] for row in rows]
-    for kind in dict.fromkeys(kinds):
-        count = kinds.count(kind)
-        if kind == "structure":
-            yield "every chunk checked"
-        elif kind == "source":
-            yield "source identical"
-        else:
-            yield f"{count:,} {kind}{'s' if count > 1 else ''}"
+    words = {"structure": "every chunk checked", "source": "source identical"}
+    for kind, count in Counter(row["kind"] for row in rows).items():
+        yield words.get(kind) or plural(count, kind)
 
 
-def _compare(held: File, source: str) -> JsonObject:
+def _compare(file: File, source: str) -> JsonObject:
     """Compare SRC with what is restored under its name, or with the only clip."""
-    restore = _find(held, source)
+    restore = _find_restore(file, source)
     with about(source):
-        wanted = Path(source).read_bytes()
+        expected = Path(source).read_bytes()
         restored = restore()
-    if restored == wanted:
+    if restored == expected:
         return _row("source", source, [])
     same = next(
-        (i for i, (a, b) in enumerate(zip(restored, wanted, strict=False)) if a != b),
-        min(len(restored), len(wanted)),
+        (i for i, (a, b) in enumerate(zip(restored, expected, strict=False)) if a != b),
+        min(len(restored), len(expected)),
     )
-    text = f"differs from byte {same} on; restored {len(restored)} bytes, compared {len(wanted)}"
+    text = f"differs from byte {same} on; restored {len(restored)} bytes, compared {len(expected)}"
     return _row("source", source, [text])
 
 
-def _find(held: File, source: str) -> Callable[[], bytes]:
+def _find_restore(file: File, source: str) -> Callable[[], bytes]:
     """The function that restores the stored file with the name of ``source``."""
     name = Path(source).name
-    for clip in held.clips.values():
+    for clip in file.clips.values():
         if clip.source is not None and PurePosixPath(clip.source.path).name == name:
             return clip.source_bytes
-    for alias, (_, target) in held.aliases.items():
-        if PurePosixPath(alias).name == name and target in dict(held.skeletons):
-            return lambda: held.skeleton_bytes(target)
-    for attachment in held.attachments.values():
+    for alias, (_, target) in file.aliases.items():
+        if PurePosixPath(alias).name == name and target in dict(file.skeletons):
+            return lambda: file.skeleton_bytes(target)
+    for attachment in file.attachments.values():
         if PurePosixPath(attachment.name).name == name:
             return attachment.read
-    if len(held.clips) != 1:
+    if len(file.clips) != 1:
         raise Failure("the file holds nothing of this name", Exit.USAGE, path=source)
-    return held.only_clip().source_bytes
+    return file.only_clip().source_bytes
+
+
+SUFFIXES = (".txt", ".json")
+NONE = "none"  # as a date
+
+
+class VerifyReport:
+    """A report at ``path``, which must be new unless ``force``; raises Failure at once."""
+
+    def __init__(self, path: str, date: str | None, force: bool, inputs: Sequence[str]) -> None:
+        from mcz.files.writing.atomic import refuse_inputs
+
+        self.path, self.force = Path(path), force
+        if self.path.suffix.lower() not in SUFFIXES:
+            raise Failure("a report is a .txt or a .json", Exit.USAGE, path=path)
+        with about(path):
+            refuse_inputs(path, inputs)
+        check_new(self.path, force)
+        self.date = _now() if date is None else None if date == NONE else date
+        self._facts: JsonObject = {}  # of the file that was taken last
+
+    def take(self, file: File) -> None:
+        """Keep what the report says of an open file."""
+        from mcz.files.reading.verification import bytes_facts, contents
+
+        self._facts = {**bytes_facts(file.container.source), **contents(file)}
+
+    def take_bytes(self, file: str) -> None:
+        """Keep what can be said of a file that cannot be opened."""
+        from mcz.files.reading.file import open_bytes
+        from mcz.files.reading.verification import bytes_facts
+
+        with about(file):
+            source = open_bytes(given(file))
+            try:
+                self._facts = bytes_facts(source)
+            finally:
+                source.close()
+
+    def document(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> JsonObject:
+        """The report, see ``mcz.files.reading.verification.report``."""
+        from mcz import __version__
+        from mcz.files.reading.verification import report
+
+        tool = f"mcz {__version__}"
+        return report(self._facts, rows, tool=tool, date=self.date, quick=quick, chosen=where)
+
+    def write(self, rows: Sequence[JsonObject], *, quick: bool, where: str | None) -> None:
+        """Write the report of ``rows``, one for each part."""
+        from mcz.files.reading.verification import text_lines
+
+        document = self.document(rows, quick=quick, where=where)
+        self._write(document, text_lines(document))
+
+    def write_bag(
+        self,
+        bag: BagCheck,
+        verified: bool,
+        files: Sequence[JsonObject],
+        documents: Sequence[JsonObject],
+    ) -> None:
+        """Write the report of a bag: of itself, then the ``documents`` of the archives in it.
+
+        ``files``: a row for each archive, unreadable ones included.
+        """
+        from mcz import __version__
+        from mcz.files.reading.verification import bag_lines, text_lines
+
+        unread = [
+            f"{row['file']}: {problem}"
+            for row in files
+            for part in row["parts"]
+            if part["kind"] == "file"
+            for problem in part["problems"]
+        ]
+        document = {
+            "verified": verified,
+            "bag": str(bag.folder),
+            "tool": f"mcz {__version__}",
+            "date": self.date,
+            "bagit_version": bag.version,
+            "algorithms": bag.algorithms,
+            "info": dict(bag.info),
+            "payload_files": len(bag.files),
+            "payload_bytes": bag.n_bytes,
+            "problems": [*bag.problems, *unread],
+            "files": list(documents),
+        }
+        lines = bag_lines(document)
+        for each in documents:
+            lines += ["", *text_lines(each)]
+        self._write(document, lines)
+
+    def _write(self, document: object, lines: Sequence[str]) -> None:
+        as_text = self.path.suffix.lower() == ".txt"
+        text = "\n".join(lines) if as_text else json_text(document)
+        write_output(self.path, f"{text}\n".encode("utf-8", "backslashreplace"), self.force)
+
+
+def _now() -> str:
+    """The date and time of the day, in UTC, to a second."""
+    from datetime import UTC, datetime
+
+    return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -37,14 +43,17 @@ from mcz.cli.options import (
     up_option,
     where_option,
 )
-from mcz.cli.suffixes import file_in
+from mcz.cli.outputs import file_in
 from mcz.cli.terminal import say_json
-from mcz.cli.view_rerun import is_rerun, show_in_rerun
-from mcz.model.types import Settings
+from mcz.model.extras import import_extra
+from mcz.model.types import JsonObject, Settings
 
 if TYPE_CHECKING:
+    from mcz.files.reading.clip import Clip
+    from mcz.model.motion import Motion
     from mcz.show.viewing.embedding import PageWritten
     from mcz.show.viewing.file_registry import Shelf
+
 
 SAID = ("skeleton", "rate", "unit", "up", "arrays", "model")  # what a file may not say itself
 OF_PAGE = ("clips", "where", "codec", "effort", "params", "max_decoded", "most", "force")
@@ -110,7 +119,7 @@ LOOPBACK = "127.0.0.1"
 @force_option
 @threads_option
 @json_option
-def command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
+def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
     """Show motions in the browser: files, folders of them, URLs of an .mcz.
 
     Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot, .sto, .npy and .npz. What has no points is
@@ -138,8 +147,8 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
         else:
             say(line)
 
-    said = {key: options[key] for key in SAID}
-    shelf = Shelf(said, told, salvage=options["salvage"], hints=OPTION_HINTS)
+    facts = {key: options[key] for key in SAID}
+    shelf = Shelf(facts, told, salvage=options["salvage"], hints=OPTION_HINTS)
     try:
         for path in files:
             with about(path):
@@ -147,7 +156,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
         if in_rerun:
             return show_in_rerun(shelf, output, as_json, options)
         if output is not None:
-            return _write(shelf, output, as_json, {key: options[key] for key in OF_PAGE})
+            return _write_page(shelf, output, as_json, {key: options[key] for key in OF_PAGE})
         return _serve(shelf, as_json, **{key: options[key] for key in OF_SERVER})
     finally:
         shelf.close()
@@ -175,9 +184,9 @@ def _check_use(output: str | None, options: Settings, in_rerun: bool) -> None:
 
 
 def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str, port: int) -> Exit:
-    from mcz.show.viewing.browser import show
+    from mcz.show.viewing.player import viewer_page
     from mcz.show.viewing.server import Server
-    from mcz.show.viewing.small_page import viewer_page
+    from mcz.show.viewing.view import show
 
     with Server(viewer_page(shelf), shelf, host=host, port=port) as server:
         if as_json:
@@ -193,7 +202,7 @@ def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str,
     return Exit.FINE
 
 
-def _write(shelf: Shelf, output: str, as_json: bool, options: Settings) -> Exit:
+def _write_page(shelf: Shelf, output: str, as_json: bool, options: Settings) -> Exit:
     from pathlib import Path
 
     from mcz.show.viewing.embedding import MOST_BYTES, Wanted, write_page
@@ -203,16 +212,151 @@ def _write(shelf: Shelf, output: str, as_json: bool, options: Settings) -> Exit:
     if "://" not in output:
         check_new(Path(output), force)
     with about(output):
-        found = write_page(
+        written = write_page(
             page(shelf.say), shelf, output, Wanted(**options), most=most, force=force
         )
     if as_json:
-        print_json({"output": output, **asdict(found)})
+        print_json({"output": output, **asdict(written)})
     else:
-        echo(*_lines(output, found))
+        echo(*_page_lines(output, written))
     return Exit.FINE
 
 
-def _lines(output: str, found: PageWritten) -> list[str]:
-    files = (f"  {f.name}: {plural(f.n_clips, 'clip')}, {f.size:,} bytes" for f in found.files)
-    return [f"{output}: {found.size:,} bytes, the player {found.player_size:,} of them", *files]
+def _page_lines(output: str, written: PageWritten) -> list[str]:
+    files = (f"  {f.name}: {plural(f.n_clips, 'clip')}, {f.size:,} bytes" for f in written.files)
+    return [f"{output}: {written.size:,} bytes, the player {written.player_size:,} of them", *files]
+
+
+RERUN_SUFFIX = ".rrd"
+FACTS = ("rate", "unit", "up")
+MOST_BESIDE, MOST_VIEWS = 4, 64  # clips that are shown beside each other, and one at a time
+SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def is_rerun(rerun: bool, output: str | None) -> bool:
+    """Return whether ``--rerun`` or the output suffix selects rerun; raises Failure."""
+    is_file = output is not None and output.lower().endswith(RERUN_SUFFIX)
+    if rerun and output is not None and not is_file:
+        raise Failure(f"with --rerun a file is called OUT{RERUN_SUFFIX}", Exit.USAGE, path=output)
+    return rerun or is_file
+
+
+def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: Settings) -> Exit:
+    """Log every clip that is wanted, to ``output`` or to a viewer that is started."""
+    if output is None:
+        recording = _recording()
+        _check_screen()
+        try:
+            recording.spawn()
+        except RuntimeError as error:  # its viewer is not on the path
+            raise Failure(f"rerun: {str(error).strip().splitlines()[0]}") from error
+        rows, failed = _log_clips(shelf, recording, options)
+        recording.flush()
+        if as_json:
+            print_json({"output": None, "clips": rows})
+        else:
+            echo(f"rerun: {plural(len(rows), 'clip')}")
+    else:
+        rows, failed = _write_rerun(shelf, output, options)
+        size = Path(output).stat().st_size
+        if as_json:
+            print_json({"output": output, "size": size, "clips": rows})
+        else:
+            echo(f"{output}: {plural(len(rows), 'clip')}, {size:,} bytes")
+    return Exit.BAD_INPUT if failed else Exit.FINE
+
+
+def _recording() -> Any:
+    import uuid
+
+    from mcz.show.rerun import APPLICATION
+
+    rerun = import_extra("rerun", "rerun")
+    return rerun.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
+
+
+def _check_screen() -> None:
+    if sys.platform.startswith("linux") and not any(map(os.environ.get, SCREENS)):
+        raise Failure(
+            f"there is no screen for the viewer of rerun; -o OUT{RERUN_SUFFIX} writes a file for "
+            "one elsewhere"
+        )
+
+
+def _write_rerun(shelf: Shelf, output: str, options: Settings) -> tuple[list[JsonObject], int]:
+    """Log to a file, which appears when it is whole."""
+    from mcz.files.writing.atomic import replacing
+
+    check_new(Path(output), options["force"])
+    inputs = [file.source for _, file in shelf.given()]
+    with (
+        about(output),
+        tempfile.TemporaryDirectory() as folder,
+        replacing(output, force=options["force"], inputs=inputs) as stream,
+    ):
+        path, recording = Path(folder, "take.rrd"), _recording()
+        recording.save(path)
+        rows, failed = _log_clips(shelf, recording, options)
+        recording.disconnect()
+        if not rows:
+            raise Failure("no clip could be logged", path=output)
+        with path.open("rb") as written:
+            shutil.copyfileobj(written, stream)
+    return rows, failed
+
+
+def _log_clips(shelf: Shelf, recording: Any, options: Settings) -> tuple[list[JsonObject], int]:
+    """Log the clips; return their rows and the number of failures."""
+    from mcz.errors import MczError
+    from mcz.show.rerun import to_rerun, view_of
+
+    rows: list[JsonObject] = []
+    views: list[Any] = []
+    failed = unknown = 0
+    several = len(shelf.given()) > 1
+    for file, clip in _clips(shelf, options):
+        entity = f"{file}/{clip.name}" if several else clip.name
+        try:
+            motion = _complete(clip, options)
+            to_rerun(motion, recording, entity=entity)
+            unknown += not motion.skeleton.up_axis
+            if len(views) < MOST_VIEWS:
+                views.append(view_of(motion, entity))
+        except MczError as error:
+            shelf.say(f"{file}: {clip.name}: {error.describe(OPTION_HINTS)}")
+            failed += 1
+            continue
+        rows.append({"file": file, "name": clip.name, "entity": entity, "n_frames": clip.n_frames})
+    if unknown:
+        shelf.say(f"{plural(unknown, 'clip')}: which axis points up is unknown; --up says it")
+    if views:
+        blueprint = import_extra("rerun.blueprint", "rerun")
+        arranged = blueprint.Grid if len(views) <= MOST_BESIDE else blueprint.Tabs
+        recording.send_blueprint(blueprint.Blueprint(arranged(*views), collapse_panels=True))
+    return rows, failed
+
+
+def _clips(shelf: Shelf, options: Settings) -> Iterator[tuple[str, Clip]]:
+    from mcz.files.reading.file import open
+
+    for _, given in shelf.given():
+        with (
+            about(given.source),
+            open(
+                given.target(), salvage=options["salvage"], max_decoded=options["max_decoded"]
+            ) as file,
+        ):
+            for clip in file.chosen(options["clips"] or None, options["where"]):
+                yield given.name, clip
+
+
+def _complete(clip: Clip, options: Settings) -> Clip | Motion:
+    """The clip; decoded as a whole where options say what its file does not."""
+    skeleton = clip.skeleton
+    unknown = (clip.frame_rate is None, skeleton.unit_cm is None, not skeleton.up_axis)
+    facts = [options[fact] for fact in FACTS]
+    if not any(there and fact is not None for there, fact in zip(unknown, facts, strict=True)):
+        return clip
+    from mcz.files.reading.source_files import SourceOptions
+
+    return SourceOptions(**{fact: options[fact] for fact in FACTS}).completing(clip.motion())

@@ -1,14 +1,22 @@
-"""Display of motions in notebooks: the one call from a lower layer to a higher one.
+"""Display of motions in notebooks, by the player that ``mcz`` registers.
 
-By its name, and only when somebody asks: a Motion knows nothing of pages.
+It stands apart from ``motion``: ``import mcz`` loads it, and must not wait for numpy.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
+from collections.abc import Callable
+
+Player = Callable[[object], str]
+
+_players: list[Player] = []
 
 
-def html_of(moving: object) -> str:
-    """Small player of a Motion or Clip: at most 300 kB of HTML, by ``mcz.show.viewing.player``."""
-    text: str = import_module("mcz.show.viewing.player").player(moving)
-    return text
+def register_player(player: Player) -> None:
+    """Show motions by ``player``, which returns HTML."""
+    _players[:] = [player]
+
+
+def html_of(motion: object) -> str | None:
+    """Return HTML of a Motion or Clip; None, for which a notebook prints text, without a player."""
+    return _players[0](motion) if _players else None

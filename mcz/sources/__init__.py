@@ -20,7 +20,7 @@ from typing import Any
 from mcz.errors import FormatError, SourceError, UnsupportedError
 from mcz.model.motion import FrameNotes, Source
 from mcz.model.types import JsonObject
-from mcz.sources.text.line_by_line import Arriving
+from mcz.sources.text.source import Arriving
 
 __all__ = [
     "FORMATS",
@@ -144,7 +144,7 @@ FORMATS: dict[str, Format] = {
                 (f".{name}",) if kind else (".csv", ".tsv"),
                 _of(module, f"read{kind}"),
                 _of(module, f"write{kind}"),
-                _of("tables.notes", "join_table_notes"),
+                _of("tables.source", "join_table_notes"),
                 states_rate=True,
                 is_table=True,
                 restate=_of("stated_rates", "restate_table"),
@@ -167,8 +167,8 @@ FORMATS: dict[str, Format] = {
                 _of("arrays.read", f"read_{name}"),
                 _of("arrays.read", "write_arrays"),
                 states_rate=name == "npz",
-                is_motion=_of("arrays.sniffing", "is_motion"),
-                arrays=_of("arrays.listing", "list_arrays"),
+                is_motion=_of("arrays.header", "is_motion"),
+                arrays=_of("arrays.layout", "list_arrays"),
             )
             for format_id, name in ((12, "npy"), (13, "npz"))
         ),
@@ -264,7 +264,7 @@ def with_analog_scales(source: Source, scales: Mapping[int, float]) -> Source | 
 
 
 def arrays_of(source: Source | None, signals: Sequence[str]) -> list[JsonObject] | None:
-    """List the use of each array of a source, see ``arrays.listing``; None without arrays.
+    """List the use of each array of a source, see ``arrays.layout``; None without arrays.
 
     ``signals`` are the names of the clip's signals. Raises FormatError on bad bytes.
     """

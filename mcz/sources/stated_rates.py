@@ -16,10 +16,9 @@ from mcz.errors import SourceError
 from mcz.model.clock import SAME_RATE
 from mcz.model.schema import build, parse
 from mcz.sources.c3d.c3d import rate_of
-from mcz.sources.c3d.events import event_times
 from mcz.sources.c3d.layout import C3dOutputsTemplate, C3dTemplate
 from mcz.sources.c3d.parameters import FLOAT, INTEGER, find_parameters, parse_parameters
-from mcz.sources.rates import frame_rate, frame_time
+from mcz.sources.c3d.recording import event_times
 from mcz.sources.tables.layout import (
     PHRASES,
     Clock,
@@ -29,7 +28,7 @@ from mcz.sources.tables.layout import (
     parsed_clock,
     with_phrases,
 )
-from mcz.sources.tables.times import stated_rate
+from mcz.sources.tables.times import frame_rate, frame_time, stated_rate
 from mcz.sources.text.layout import MAX_RUNS, Template
 
 HEADER_RATE = 20  # where the header of a C3D has a binary32 of the rate

@@ -15,7 +15,7 @@ import pytest
 
 import mcz
 from mcz.cli.common import run
-from mcz.cli.info import command as info_command
+from mcz.cli.info import info_command
 from mcz.cli.main import COMMANDS
 from mcz.container.limits import FORMAT_NAME as VERSION
 from tests.commands import Call, fails

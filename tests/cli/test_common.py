@@ -15,8 +15,7 @@ import mcz
 from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, about, run, table, write_output
 from mcz.cli.lazy import OTHER_NAMES
 from mcz.cli.main import COMMANDS, cli
-from mcz.cli.progress import Progress
-from mcz.cli.terminal import say
+from mcz.cli.terminal import Progress, say
 from mcz.errors import AccessError, ChecksumError, ExistsError, MczError, OptionError
 from tests.motions import smooth
 
@@ -72,13 +71,13 @@ def test_output_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 def test_table_aligns() -> None:
     shown = table([["a", "b"], ["long", "12"], ["", "3"]], "lr")
-    assert shown == "a      b\nlong  12\n       3"
+    assert shown == ["a      b", "long  12", "       3"]
 
 
 def test_progress_is_silent_without_a_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mcz.cli.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("mcz.cli.terminal.PATIENCE", 0.0)
     with Progress() as progress:
         progress(1, 2, "walk")
     assert capsys.readouterr().err == ""
@@ -87,8 +86,8 @@ def test_progress_is_silent_without_a_terminal(
 def test_progress_shows_on_a_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mcz.cli.progress.PATIENCE", 0.0)
-    monkeypatch.setattr("mcz.cli.progress.INTERVAL", 0.0)
+    monkeypatch.setattr("mcz.cli.terminal.PATIENCE", 0.0)
+    monkeypatch.setattr("mcz.cli.terminal.INTERVAL", 0.0)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     monkeypatch.setenv("COLUMNS", "40")
     with Progress() as progress:
@@ -111,7 +110,7 @@ def test_progress_waits_for_a_second_of_work(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [5.0]
-    monkeypatch.setattr("mcz.cli.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("mcz.cli.terminal.time.monotonic", lambda: now[0])
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with Progress() as progress:
         seen = []

@@ -17,7 +17,7 @@ import pytest
 import mcz
 from mcz import OptionError
 from mcz.cli.common import run
-from mcz.cli.info import command as info_command
+from mcz.cli.info import info_command
 from mcz.cli.main import COMMANDS, cli
 from tests.commands import ENV, Call
 

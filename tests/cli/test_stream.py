@@ -17,7 +17,7 @@ import mcz
 from mcz import live_frames
 from mcz.cli import common, tcp
 from mcz.cli.main import cli
-from mcz.cli.rows import Rows
+from mcz.cli.standard_input import Rows
 from tests.commands import Started
 
 NAMES = b"a,b\n"

@@ -16,7 +16,7 @@ import mcz
 from mcz.cli import terminal
 from mcz.cli.common import run
 from mcz.cli.main import COMMANDS, cli
-from mcz.cli.progress import Progress
+from mcz.cli.terminal import Progress
 from tests.motions import smooth
 
 CLI = Path(terminal.__file__).parent
@@ -191,7 +191,7 @@ def test_binary_data_are_not_printed_on_a_terminal(hostile: Path) -> None:
 def test_progress_shows_names_as_they_are_meant(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mcz.cli.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("mcz.cli.terminal.PATIENCE", 0.0)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with Progress() as progress:
         progress(1, 2, f"[/red]{STEERING}")

@@ -23,7 +23,7 @@ from mcz import MczError, MotionError, OptionError, SourceError
 from mcz.files.editing.folders import motion_files
 from mcz.model.numbers import GridKind
 from mcz.sources import FORMATS, likely_formats
-from mcz.sources.arrays.kinds import KINDS
+from mcz.sources.arrays.skeletons import KINDS
 from tests.commands import run
 from tests.formats.saved_arrays import arrays, saved
 from tools.vectors.build.array_files import Member, floats, npy, npz

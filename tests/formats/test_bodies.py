@@ -20,7 +20,7 @@ from mcz import (
     offsets_from_positions,
     offsets_of_model,
 )
-from mcz.sources.arrays.body_trees import TURNS, skeleton_of, tree
+from mcz.sources.arrays.skeletons import TURNS, skeleton_of, tree
 
 RANDOM = np.random.default_rng(3)
 

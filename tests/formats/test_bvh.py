@@ -14,8 +14,8 @@ import mcz
 from mcz import Channel, Exceptions, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.container.limits import BASE, LARGE
 from mcz.model.numbers import Grid, GridKind
-from mcz.sources import likely_formats, limits
-from mcz.sources.text import amc, asf, bvh, hierarchy
+from mcz.sources import likely_formats
+from mcz.sources.text import amc, asf, bvh, hierarchy, source
 from tests.formats.text_files import BVH
 
 
@@ -187,8 +187,8 @@ def test_channels_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_limits_are_those_of_the_largest_profile() -> None:
-    assert (LARGE.joints, LARGE.channels) == (limits.MOST_JOINTS, limits.MOST_CHANNELS)
-    assert BASE.joints == limits.MOST_DEPTH
+    assert (LARGE.joints, LARGE.channels) == (source.MOST_JOINTS, source.MOST_CHANNELS)
+    assert BASE.joints == source.MOST_DEPTH
 
 
 def test_a_byte_order_mark_is_kept_of_text_that_arrives() -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.sources import FORMATS, likely_formats
-from mcz.sources.tables.notes import join_table_notes
+from mcz.sources.tables.source import join_table_notes
 from tests.formats.c3d_files import c3d_files, made
 from tests.formats.csv_files import column_files, motive_files, vicon_files
 from tests.formats.saved_arrays import archives, arrays, saved

@@ -8,7 +8,7 @@ import pytest
 
 from mcz import SourceError
 from mcz.sources import format_of
-from mcz.sources.text.find import NUMBER, SUBJECT, TAKE, skeletons_around
+from mcz.sources.text.bones import NUMBER, SUBJECT, TAKE, skeletons_around
 
 
 def touch(folder: Path, *names: str) -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz.sources.rates import MAX_TERM, frame_rate, frame_time
+from mcz.sources.tables.times import MAX_TERM, frame_rate, frame_time
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz.cli.options import ARRAYS, ROBOTS
-from mcz.sources.arrays.kinds import KINDS
+from mcz.sources.arrays.skeletons import KINDS
 from mcz.sources.robots import robot_layouts
 
 N_FRAMES = 40

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from mcz.bench import plots
 from mcz.bench.cases import Case
+from mcz.bench.report import can_draw
 from mcz.bench.tasks import Task
 from mcz.cli.common import run as run_command
 from tests.papers.walks import put_walk
@@ -81,7 +81,7 @@ def test_all_tables_of_a_generated_clip(
     assert "CR of L = 60 < 120 < 240" in claimed
     assert claimed["LSDT distorts less than DCT and DWT at equal non-zeros"] == "yes"
     assert claimed["clip-LSDT beats frame-LSDT"] == "yes"
-    if plots.can_draw():
+    if can_draw():
         names = {path.name for path in out.glob("*.png")}
         assert {"hou2016_rates.png", "hou2016_convergence.png", "hou2016_spatial.png"} <= names
     monkeypatch.setattr("mcz.bench.tasks.perform", lambda *given: pytest.fail("measured again"))

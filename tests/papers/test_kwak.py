@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.bench import plots
 from mcz.bench.cases import Case
+from mcz.bench.report import can_draw
 from mcz.cli.common import run as run_command
 from mcz.codecs import codec_by_name
 from mcz.errors import OptionError
@@ -274,7 +274,7 @@ def test_all_tables_of_generated_clips(
     assert [row[0] for row in markers] == ["13_29.amc, 41 markers", "86_02.c3d"]
     bd_rows = found["Kwak and Bajic, Table III: BD SQNR and BD rate"]["rows"]
     assert {"MOD", "RC", "RCA", "FIL", "ours", "ours + filter"} <= {row[1] for row in bd_rows}
-    if plots.can_draw():
+    if can_draw():
         names = {path.name for path in out.glob("*.png")}
         assert {"kwak_sqnr_markers.png", "kwak_sizes.png", "kwak_losses.png"} <= names
     monkeypatch.setattr("mcz.bench.tasks.perform", lambda *given: pytest.fail("measured again"))

@@ -15,8 +15,8 @@ import pytest
 
 import mcz
 from mcz import AccessError
-from mcz.show.viewing import page_build
-from mcz.show.viewing.page_build import built
+from mcz.show.viewing import page
+from mcz.show.viewing.page import built
 
 ROOT = Path(mcz.__file__).parents[1]
 PAGE = Path(__file__).with_name("page.html")
@@ -27,7 +27,7 @@ def checkout(tmp_path: Path) -> Path:
     """A source checkout without the page."""
     names = ("build.mjs", "package.json", "package-lock.json", "src/main.js", "../js/mcz.js")
     for name in names:
-        path = tmp_path / page_build.VIEWER / name
+        path = tmp_path / page.VIEWER / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("")
         changed(path, 100)
@@ -60,15 +60,15 @@ def changed(path: Path, seconds: int) -> None:
 
 def test_it_is_built_once_and_when_sources_change(checkout: Path, programs: list[str]) -> None:
     said: list[str] = []
-    page = built(said.append, checkout)
-    assert page.read_bytes() == PAGE.read_bytes()
+    built_page = built(said.append, checkout)
+    assert built_page.read_bytes() == PAGE.read_bytes()
     assert programs == ["npm ci --no-audit --no-fund", "node build.mjs"]
     assert len(said) == 2
-    assert built(said.append, checkout) == page
+    assert built(said.append, checkout) == built_page
     assert len(programs) == 2
-    viewer = checkout / page_build.VIEWER
-    made = (page, viewer / "node_modules" / ".package-lock.json")
-    for name in ("tools/js/mcz.js", f"{page_build.VIEWER}/src/main.js"):
+    viewer = checkout / page.VIEWER
+    made = (built_page, viewer / "node_modules" / ".package-lock.json")
+    for name in ("tools/js/mcz.js", f"{page.VIEWER}/src/main.js"):
         for path in made:
             changed(path, 200)
         changed(checkout / name, 300)
@@ -88,12 +88,12 @@ def test_without_npm_the_command_is_said(
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(AccessError, match=r"\(cd tools/viewer && npm ci && npm run build\)"):
         built(lambda line: None, checkout)
-    page = checkout / page_build.VIEWER / "dist" / "viewer.html"
-    page.parent.mkdir()
-    page.write_bytes(PAGE.read_bytes())
-    changed(page, 50)
+    built_page = checkout / page.VIEWER / "dist" / "viewer.html"
+    built_page.parent.mkdir()
+    built_page.write_bytes(PAGE.read_bytes())
+    changed(built_page, 50)
     said: list[str] = []
-    assert built(said.append, checkout) == page
+    assert built(said.append, checkout) == built_page
     assert "older than its sources" in said[0]
     assert not programs
 

@@ -19,8 +19,8 @@ import pytest
 
 import mcz
 from mcz import AccessError, OptionError
-from mcz.show.viewing import browser, view
-from mcz.show.viewing.open_pages import Visitors
+from mcz.show.viewing import view
+from mcz.show.viewing.server_tasks import Visitors
 from tests.commands import Call
 
 
@@ -103,7 +103,7 @@ def test_it_ends_with_its_pages(
         Thread(target=pages).start()
         return True
 
-    monkeypatch.setattr(browser, "show", visit)
+    monkeypatch.setattr(view, "show", visit)
     code, out, errors = call("view", samples / "walk.bvh")
     assert (code, errors) == (0, "")
     assert out.startswith("http://127.0.0.1:")
@@ -270,7 +270,7 @@ def test_the_browser_is_that_of_the_user(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(webbrowser, "open", open_)
     monkeypatch.setenv("DISPLAY", ":0")
-    assert browser.show("http://x/")
+    assert view.show("http://x/")
     assert opened == ["http://x/"]
 
 

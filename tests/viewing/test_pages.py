@@ -17,9 +17,8 @@ import pytest
 import mcz
 from mcz.codecs import CODECS
 from mcz.model.annexes import annex_bytes
-from mcz.show.viewing.embedding import element
+from mcz.show.viewing.embedding import TABLES, element, tables_for
 from mcz.show.viewing.page import page
-from mcz.show.viewing.tables import TABLES, tables_for
 from tests.commands import run
 from tests.motions import smooth
 
@@ -229,7 +228,7 @@ def test_what_a_codec_needs_is_there(tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("no node")
-    from mcz.show.viewing.tables import deflated
+    from mcz.show.viewing.embedding import deflated
 
     motion = smooth(40)
     documents = []

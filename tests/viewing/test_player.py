@@ -19,9 +19,8 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Channel, FormatError, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
-from mcz.show.viewing import player_data as drawn_module
-from mcz.show.viewing.player import MOST_BYTES
-from mcz.show.viewing.player_data import lines_of
+from mcz.show.viewing import player as drawn_module
+from mcz.show.viewing.player import MOST_BYTES, lines_of
 from tests.motions import motions, smooth
 
 MARKER = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))

@@ -600,7 +600,7 @@ def test_any_bytes_are_a_form_or_refused(
 ) -> None:
     import io
 
-    from mcz.show.viewing.multipart import save_files
+    from mcz.show.viewing.requests import save_files
 
     whole = form(("a/x.bvh", body), ("b.bvh", body[::-1]))
     folder = tmp_path_factory.mktemp("form")
@@ -618,15 +618,15 @@ def test_any_bytes_are_a_form_or_refused(
 def test_a_form_in_pieces_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import io
 
-    from mcz.show.viewing import multipart
+    from mcz.show.viewing import requests
 
     data = b"\r\n--\r\n--X" * 3 + b"\r\n-" + bytes(range(256)) * 4
     data = data.replace(b"\r\n--X", b"\r\n--Z")
     body = form(("a.bvh", data), ("b.bvh", b""))
     for size in (1, 2, 3, 5, 64, 4096):
-        monkeypatch.setattr(multipart, "PIECE", size)
+        monkeypatch.setattr(requests, "PIECE", size)
         (tmp_path / str(size)).mkdir()
-        paths = multipart.save_files(io.BytesIO(body), len(body), b"X", tmp_path / str(size))
+        paths = requests.save_files(io.BytesIO(body), len(body), b"X", tmp_path / str(size))
         assert [path.read_bytes() for path in paths] == [data, b""]
 
 

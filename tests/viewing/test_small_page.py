@@ -10,20 +10,21 @@ import pytest
 
 import mcz
 from mcz import AccessError
-from mcz.show.viewing import page, page_build
+from mcz.show.viewing import page
 from mcz.show.viewing.file_registry import Shelf, put
+from mcz.show.viewing.page import built
+from mcz.show.viewing.player import MOST_CLIPS, viewer_page
 from mcz.show.viewing.server import Server
-from mcz.show.viewing.small_page import MOST_CLIPS, viewer_page
 from tests.viewing.asking import ask
 
 
 @pytest.fixture
 def without_npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A source checkout in which the page was never built, on a machine without npm."""
-    (tmp_path / page_build.VIEWER).mkdir(parents=True)
-    (tmp_path / page_build.VIEWER / "build.mjs").touch()
+    (tmp_path / page.VIEWER).mkdir(parents=True)
+    (tmp_path / page.VIEWER / "build.mjs").touch()
     monkeypatch.delenv(page.OTHER, raising=False)
-    monkeypatch.setattr(page, "built", lambda say: page_build.built(say, tmp_path))
+    monkeypatch.setattr(page, "built", lambda say: built(say, tmp_path))
     monkeypatch.setattr(shutil, "which", lambda name: None)
 
 

@@ -18,7 +18,7 @@ from mcz.model.motion import Motion, Skeleton
 from mcz.sources import FORMATS
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from mcz.sources.text import asf
-from mcz.sources.text.line_by_line import Floats
+from mcz.sources.text.source import Floats
 from tools.fuzz.guard import hold
 from tools.fuzz.seeds import sources
 from tools.vectors.build import table_files

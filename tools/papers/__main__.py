@@ -8,12 +8,11 @@ from pathlib import Path
 
 import click
 
-from mcz.bench.cache import Cache, default_folder
-from mcz.bench.tasks import Runner
+from mcz.bench.tasks import Cache, Runner, default_folder
 from mcz.cli.bench import show
 from mcz.cli.common import Exit, about, existing, run
 from mcz.cli.options import json_option, unit_option
-from mcz.cli.progress import Progress
+from mcz.cli.terminal import Progress
 from tools.papers.hou2016.run import hou2016
 from tools.papers.khan2014.run import khan2014
 from tools.papers.khan2016.run import khan2016

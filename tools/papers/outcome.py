@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from mcz.bench.cases import Case, find_cases
-from mcz.bench.run import Outcome
+from mcz.bench.report import Outcome
 from mcz.bench.tables import Table
 from mcz.bench.tasks import Task
 from mcz.errors import OptionError

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcz.bench.plots import MARKS, PUBLISHED, plain_ticks
+from mcz.bench.report import MARKS, PUBLISHED, plain_ticks
 
 N_COLUMNS = 3
 

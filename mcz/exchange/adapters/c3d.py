@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import io
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
 from mcz.exchange.conversion import convert
+from mcz.files.reading.source_info import ANALOG, recording
 from mcz.model.extras import import_extra
-from mcz.model.motion import Motion
+from mcz.model.motion import Motion, Signal
 from mcz.sources import FORMATS
 from mcz.sources.c3d.layout import FORMAT, OUTPUTS_FORMAT
 
 if TYPE_CHECKING:
     from c3d import Reader
+    from ezc3d import c3d
 
 
 def from_c3d(reader: Reader, *, name: str = "motion") -> Motion:
@@ -63,3 +71,107 @@ def c3d_bytes(motion: Motion) -> bytes:
     """The C3D file of a motion: its source's, or a plain one of its points."""
     data: bytes = FORMATS["c3d"].write(for_c3d(motion))
     return data
+
+
+Held = dict[str | None, tuple[NDArray[np.float64], NDArray[np.bool_]]]
+OUTPUTS = "outputs"  # the role of the signal of what models gave, which ezc3d has among the points
+REFUSED = (OSError, ValueError, RuntimeError, LookupError)  # what ezc3d raises
+NOTE = "numbers that binary32 cannot hold: without the events and parameters of its C3D"
+
+
+def from_ezc3d(c3d: object, *, name: str = "motion") -> Motion:
+    """The motion in an ``ezc3d.c3d``: points, residuals, outputs of models, analog, events.
+
+    It is that of the file which ezc3d writes, with its source. Where points or analog samples are
+    numbers that such a file would round to binary32, filtered ones for example, they are kept and
+    the source is not, nor events and parameters; the ``source-note`` of the metadata says so.
+    Raises OptionError where ezc3d cannot write the file, and SourceError.
+    """
+    if not hasattr(c3d, "write"):
+        raise OptionError(f"a {type(c3d).__name__} is no ezc3d.c3d; mcz.read reads files")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "motion.c3d")
+        try:
+            c3d.write(str(path))
+        except REFUSED as error:
+            raise OptionError(f"ezc3d cannot write what it holds: {error}") from error
+        motion: Motion = FORMATS["c3d"].read(path.read_bytes(), name)
+    held = _held(c3d, motion)
+    signals = tuple(_exact(signal, held) for signal in motion.signals)
+    if all(own is other for own, other in zip(signals, motion.signals, strict=True)):
+        return motion
+    note = "; ".join(filter(None, (motion.metadata.get("source-note"), NOTE)))
+    metadata = {**motion.metadata, "source-note": note}
+    return replace(motion, signals=signals, metadata=metadata).without_source()
+
+
+def to_ezc3d(motion: Motion) -> c3d:
+    """``motion`` as an ``ezc3d.c3d``; needs ezc3d (``mcz[ezc3d]``).
+
+    It has what the C3D file of the motion says (``mcz.to_c3d``), with points and analog samples in
+    binary64; ezc3d writes them as binary32. Gaps are NaN. Raises MotionError where ezc3d cannot
+    read that file, and as ``mcz.convert(motion, "c3d")`` does.
+    """
+    ezc3d = import_extra("ezc3d", "ezc3d")
+    plain = for_c3d(motion)
+    data = c3d_bytes(plain)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "motion.c3d")
+        path.write_bytes(data)
+        try:
+            made = ezc3d.c3d(str(path))
+        except REFUSED as error:
+            raise MotionError(f"ezc3d cannot read it: {error}", clip=motion.name) from error
+    held = _held(made, FORMATS["c3d"].read(data, motion.name))
+    for signal in plain.signals:
+        if signal.role in held:
+            array, chosen = held[signal.role]
+            there, values = array[chosen], signal.masked().T
+            if there.size != values.size:
+                raise MotionError(
+                    f"of signal {signal.name!r} ezc3d reads {there.size} "
+                    f"numbers, and there are {values.size}",
+                    clip=motion.name,
+                )
+            array[chosen] = values.reshape(there.shape)
+    return made
+
+
+def _held(held: c3d, motion: Motion) -> Held:
+    """By the roles of signals of ``motion``, an array of ezc3d, time last, and which rows count.
+
+    Residuals are none of them: they are as ezc3d has read or written them.
+    """
+    told = recording(motion)
+    is_point = np.array([not point.groups for point in told.points] if told else [], np.bool_)
+    places, samples = held["data"]["points"][:3].transpose(1, 0, 2), held["data"]["analogs"][0]
+    if len(places) != len(is_point):
+        raise MotionError(
+            f"ezc3d has {len(places)} points, and the C3D {len(is_point)}", clip=motion.name
+        )
+    return {
+        "motion": (places, is_point),
+        OUTPUTS: (places, ~is_point),
+        ANALOG: (samples, np.ones(len(samples), np.bool_)),
+    }
+
+
+def _exact(signal: Signal, held: Held) -> Signal:
+    """``signal``, in binary64 where it has not the numbers that ezc3d holds."""
+    if signal.role not in held or not signal.values.size:
+        return signal
+    array, chosen = held[signal.role]
+    rows = array[chosen]
+    values = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T, np.float64)
+    if np.array_equal(signal.masked(), values, equal_nan=True):
+        return signal
+    known = np.isfinite(values)
+    return Signal(
+        np.where(known, values, 0.0),
+        name=signal.name,
+        samples_per_frame=signal.samples_per_frame,
+        mask=None if known.all() else known,
+        channels=signal.channels,
+        role=signal.role,
+        of=signal.of,
+    )

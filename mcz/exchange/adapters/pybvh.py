@@ -24,7 +24,7 @@ from mcz.model.motion import (
     Skeleton,
     check_poses,
 )
-from mcz.sources.rates import frame_rate
+from mcz.sources.tables.times import frame_rate
 
 if TYPE_CHECKING:
     from pybvh import Bvh

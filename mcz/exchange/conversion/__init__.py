@@ -5,20 +5,72 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from mcz.errors import OptionError
-from mcz.exchange.conversion.acclaim import to_amc
-from mcz.exchange.conversion.counted_times import COUNTING, with_counted_times
-from mcz.exchange.conversion.hierarchy import to_bvh
-from mcz.exchange.conversion.losses import held, left_out
+import numpy as np
+
+from mcz.errors import MotionError, OptionError
+from mcz.exchange.conversion.hierarchy import to_amc, to_bvh
+from mcz.exchange.conversion.losses import COUNTING, held, left_out, with_counted_times
 from mcz.exchange.conversion.marker_fit import Fit, from_positions
-from mcz.exchange.conversion.markers import to_c3d
-from mcz.exchange.conversion.tables import needs_rate, to_storage, to_trc
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import Hint
 from mcz.kinematics import point_set
+from mcz.kinematics.marker_motion import in_positions
 from mcz.model.clock import Timeline
 from mcz.model.motion import Motion
+from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS
+
+PRINTED = Grid(GridKind.FIXED, 6)  # of points that are computed: far below noise
+
+
+def to_trc(motion: Motion) -> Motion:
+    """Its points as markers of their names, in mm where the length unit is known.
+
+    A motion of markers is returned as it is.
+    """
+    made = to_c3d(motion)
+    signal = made.signals[0]
+    if signal is motion.signals[0]:
+        return replace(made, signals=(signal,))
+    signal = replace(signal, grids=(PRINTED,) * signal.n_channels, grid_changes=(), ordinals=None)
+    return replace(made, signals=(signal,))
+
+
+def to_storage(motion: Motion) -> Motion:
+    """Its motion signal, a column a channel."""
+    return replace(motion, signals=motion.signals[:1])
+
+
+def needs_rate(motion: Motion, to: str) -> bool:
+    """Return whether a table needs a frame rate: TRC states it, others have times."""
+    return to == "trc" or motion.timeline is None
+
+
+MM_CM = 0.1
+MM_PER_CM = 10.0
+
+
+def to_c3d(motion: Motion) -> Motion:
+    """Its points as markers of their names, in mm where the length unit is known.
+
+    A motion of markers is returned as it is. A point whose position is not known is invalid.
+    """
+    made = in_positions(motion)
+    unit_cm = motion.skeleton.unit_cm
+    if made is motion or unit_cm is None:
+        return replace(made, metadata=motion.metadata)
+    with np.errstate(over="ignore"):
+        values = np.asarray(made.signals[0].values, np.float64) * (unit_cm * MM_PER_CM)
+    if np.isinf(values).any():
+        raise MotionError("a position in mm is beyond float64", clip=motion.name)
+    signal = replace(made.signals[0], values=values)
+    return replace(
+        made,
+        skeleton=replace(made.skeleton, unit_cm=MM_CM),
+        signals=(signal, *made.signals[1:]),
+        metadata=motion.metadata,
+    )
+
 
 __all__ = [
     "TARGETS",
@@ -70,10 +122,7 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
 
 
 def converted_files(
-    motion: Motion,
-    to: str,
-    rate: Fraction | float | None = None,
-    with_skeleton: bool = False,
+    motion: Motion, to: str, rate: Fraction | float | None = None, with_skeleton: bool = False
 ) -> dict[str, bytes]:
     """The plain file of ``convert``, under ``to``, and with an AMC its ASF under "asf" if wanted.
 

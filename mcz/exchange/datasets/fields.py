@@ -167,11 +167,7 @@ def chosen_fields(names: str | Iterable[str]) -> tuple[Field, ...]:
 
 
 def subject_of(
-    skeleton: Skeleton,
-    fields: Iterable[Field],
-    joints: Joints,
-    unit: str | None,
-    is_timed: bool,
+    skeleton: Skeleton, fields: Iterable[Field], joints: Joints, unit: str | None, is_timed: bool
 ) -> Subject:
     """``skeleton`` as these fields look at it; raises MotionError and OptionError."""
     from mcz.kinematics.frames import frame_poses_of

@@ -15,8 +15,7 @@ from numpy.typing import DTypeLike
 from mcz.errors import MczError, OptionError
 from mcz.exchange.datasets.caches import to_size
 from mcz.exchange.datasets.fields import chosen_fields, names_of
-from mcz.exchange.datasets.members import Member
-from mcz.exchange.datasets.sources import MOST_OPEN, Recipe
+from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe
 from mcz.exchange.datasets.windows import Dataset, Settings
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
@@ -82,7 +81,7 @@ def dataset(
             if name not in given:
                 stack.enter_context(file)
                 opened[name] = file
-            for clip in _chosen(file, where):
+            for clip in file.clips.values() if where is None else file.find(where):
                 for member in _members(clip, name, recipe, assumed, across_gaps):
                     if member.n_frames < (window or 1):
                         skipped.append(member)
@@ -142,10 +141,6 @@ def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterato
             if is_source(name):
                 raise OptionError(f"{name}: a data set is made of .mcz files; mcz pack makes one")
             yield open(name, threads=1), name
-
-
-def _chosen(file: File, where: Where | None) -> list[Clip]:
-    return list(file.clips.values()) if where is None else file.find(where)
 
 
 def _members(

@@ -15,7 +15,6 @@ import numpy as np
 from mcz.container.decoded_cache import DecodedCache, SharedCache
 from mcz.exchange.datasets.caches import Arrays
 from mcz.exchange.datasets.fields import Field, Rows, Subject, features_of, subject_of
-from mcz.exchange.datasets.members import Member
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.kinematics.chain import Floats
@@ -188,3 +187,27 @@ def _steps(recipe: Recipe, clip: Clip, member: Member, low: int, high: int) -> F
         return timeline.steps[member.first + low : member.first + max(low, high - 1)]
     rate = recipe.rate or member.source_rate
     return np.full(max(0, high - low - 1), 1.0 / float(rate) if rate else np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One clip of a data set, or the part of one between two gaps.
+
+    ``target`` is what ``mcz.open`` takes, ``n_source`` its frames at ``source_rate`` frames a
+    second (None: unknown) from frame ``first`` on, at ``time`` in seconds (None: unknown);
+    ``n_frames`` are those of the data set, at the rate of the data set. ``is_even``: each frame
+    follows the one before by 1 / ``source_rate``; else the times of the clip say when it was.
+    """
+
+    target: str
+    clip: str
+    n_source: int
+    source_rate: Fraction | None
+    n_frames: int
+    first: int = 0
+    time: float | None = None
+    is_even: bool = True
+
+    @property
+    def label(self) -> str:
+        return f"{self.target}: {self.clip}"

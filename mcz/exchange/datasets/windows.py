@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from mcz.errors import OptionError, OutOfRangeError
 from mcz.exchange.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
 from mcz.exchange.datasets.fields import FIELDS, Subject, names_of
-from mcz.exchange.datasets.members import Member
 from mcz.exchange.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler, WindowSampler
-from mcz.exchange.datasets.sources import BLOCK, Recipe, Sources, timeline_of_member
+from mcz.exchange.datasets.sources import BLOCK, Member, Recipe, Sources, timeline_of_member
 from mcz.files.reading.file import File
 from mcz.kinematics.poses.conversions import continuous_signs
 from mcz.model.indexing import row_numbers
@@ -373,7 +372,7 @@ class Dataset:
         splits the same clips in the same way. Raises OptionError where a clip has none, and where
         there are fewer subjects than parts.
         """
-        from mcz.exchange.datasets.splitting import split
+        from mcz.exchange.datasets.samplers import split
 
         groups = split(self._labels(by, pattern), list(map(self._count, self.members)), parts, seed)
         return {
@@ -382,7 +381,7 @@ class Dataset:
         }
 
     def _labels(self, by: str, pattern: str | None) -> list[str]:
-        from mcz.exchange.datasets.splitting import label_of
+        from mcz.exchange.datasets.samplers import label_of
 
         clips = (self._sources.clip(member) for member in self.members)
         return [label_of(m, clip, by, pattern) for m, clip in zip(self.members, clips, strict=True)]

@@ -162,7 +162,7 @@ def _opened(url: str) -> tuple[Any, str]:
 
 
 def skeletons_beside(name: str, skeletons: list[str]) -> tuple[str, ...]:
-    """ASFs that ``mcz.sources.text.find`` tries for an AMC: in its folder and a sibling ``asf``."""
+    """ASFs that an AMC may have: in its folder and a sibling ``asf``."""
     path = PurePosixPath(name)
     if not wants_skeleton(name):
         return ()

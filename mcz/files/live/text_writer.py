@@ -17,7 +17,7 @@ from mcz.model.motion import Skeleton
 from mcz.model.types import Params
 from mcz.model.units import facing, in_unit
 from mcz.sources import FORMATS, likely_formats
-from mcz.sources.text.line_by_line import Arriving
+from mcz.sources.text.source import Arriving
 
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 

@@ -14,9 +14,8 @@ from mcz.model.clock import EXACT, numbers_or_rows
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject, Params
 from mcz.sources import FORMATS, arrays_of
-from mcz.sources.c3d.events import Event
 from mcz.sources.c3d.parameters import TEXT, Parameter, Parameters
-from mcz.sources.c3d.recording import parameters_of
+from mcz.sources.c3d.recording import Event, parameters_of
 
 # Parameters that say where data lie and which frames there are, which is compared by itself.
 OF_DATA = {"DATA_START", "FRAMES", "LONG_FRAMES", "ACTUAL_START_FIELD", "ACTUAL_END_FIELD"}

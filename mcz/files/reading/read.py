@@ -22,8 +22,7 @@ from mcz.model.motion import Motion, Skeleton
 from mcz.model.text_format import first_of
 from mcz.model.units import in_unit
 from mcz.sources import Format, format_of
-from mcz.sources.text.bones import Match, match_bones
-from mcz.sources.text.find import Candidate, skeletons_around
+from mcz.sources.text.bones import Candidate, Match, match_bones, skeletons_around
 
 NONE = "none"  # given in place of a skeleton file: do without
 NOTE = "skeleton-note"

@@ -12,7 +12,7 @@ from mcz.errors import MczError, OptionError, SourceError, reason_of
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.units import facing, in_unit, unit_cm_of
 from mcz.sources import FORMATS, HEAD_BYTES, Format, format_of, has_known_suffix, likely_formats
-from mcz.sources.arrays.kinds import kinds_of, with_kinds
+from mcz.sources.arrays.skeletons import kinds_of, with_kinds
 from mcz.sources.tables.motion_bids import MOTION_SUFFIX, with_side_files
 
 
@@ -139,7 +139,7 @@ class SourceOptions:
         if self.arrays is not None:
             motion = with_kinds(motion, self.arrays)
         if self.model is not None:
-            from mcz.sources.arrays.shaped import with_model
+            from mcz.sources.arrays.body_models import with_model
 
             motion = with_model(motion, self.model)
         if self.rate is not None and (self.force_rate or motion.frame_rate is None):

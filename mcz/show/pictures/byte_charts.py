@@ -22,10 +22,8 @@ from mcz.files.writing.planning import prepare
 from mcz.kinematics.metrics import Comparison, compare
 from mcz.kinematics.metrics.sums import times
 from mcz.model.motion import Motion
-from mcz.show.pictures.chart_pages import Sheet
-from mcz.show.pictures.charts import Chart, legend, name_ticks, rows_of, styled
-from mcz.show.pictures.libraries import library
-from mcz.show.pictures.themes import Theme, rgb
+from mcz.show.pictures.canvases import Theme, library, rgb
+from mcz.show.pictures.charts import Chart, Sheet, legend, name_ticks, rows_of, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

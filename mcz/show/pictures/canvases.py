@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, BinaryIO
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.errors import OptionError
 from mcz.kinematics.chain import Floats
+from mcz.model.extras import import_extra
 from mcz.model.text_format import printable
-from mcz.show.pictures.libraries import library, new_figure, quietly
-from mcz.show.pictures.themes import Theme
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 Pixels = NDArray[np.uint8]
 
@@ -96,3 +104,102 @@ class Canvas:
         with quietly():
             about = {"Date": None, "Title": printable(title)}
             self._figure.savefig(stream, format="svg", metadata=about)
+
+
+EXTRAS = {"matplotlib": "plot", "PIL": "plot", "av": "render"}
+PACKAGES = {"PIL": "pillow", "av": "av (PyAV)"}
+
+
+def library(name: str) -> ModuleType:
+    """The module ``name``; OptionError that names the extra of mcz where it is not installed."""
+    top = name.partition(".")[0]
+    return import_extra(name, EXTRAS[top], package=PACKAGES.get(top, top), purpose="this picture")
+
+
+def new_figure(width: int, height: int, **options: object) -> Figure:
+    """A matplotlib figure of so many pixels, apart from every global state of pyplot."""
+    library("matplotlib")
+    canvas = library("matplotlib.backends.backend_agg")
+    figure: Figure = library("matplotlib.figure").Figure(
+        figsize=(width / DPI, height / DPI), dpi=DPI, **options
+    )
+    canvas.FigureCanvasAgg(figure)
+    return figure
+
+
+DPI = 100
+SVG = {"svg.fonttype": "path", "svg.hashsalt": "mcz", "axes.unicode_minus": False}
+
+
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Draw letters that the font lacks as boxes, without a word, and SVG the same every time."""
+    matplotlib = library("matplotlib")
+    with warnings.catch_warnings(), matplotlib.rc_context(SVG):
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        warnings.filterwarnings("ignore", message="Matplotlib currently does not support")
+        yield
+
+
+Color = tuple[float, float, float]  # red, green, blue, each 0 to 1
+
+
+def rgb(text: str) -> Color:
+    """
+    >>> rgb("#ff0000")
+    (1.0, 0.0, 0.0)
+    """
+    red, green, blue = (int(text[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return red, green, blue
+
+
+@dataclass(frozen=True, slots=True)
+class Theme:
+    """The colors of a picture; ``series`` are those of lines in plots."""
+
+    ground: str
+    ink: str
+    quiet: str
+    grid: str
+    shadow: str
+    left: str
+    right: str
+    middle: str
+    series: tuple[str, ...]
+
+    def sides(self) -> NDArray[np.float64]:
+        """The colors of the middle, the left and the right, float64 (3, 3)."""
+        return np.array([rgb(self.middle), rgb(self.left), rgb(self.right)])
+
+
+THEMES = {
+    "light": Theme(
+        ground="#fbfbf9",
+        ink="#1f2328",
+        quiet="#6a7178",
+        grid="#d9dcdf",
+        shadow="#e4e5e4",
+        left="#0072b2",
+        right="#e08214",
+        middle="#8d959e",
+        series=("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a07800", "#3aa0d8"),
+    ),
+    "dark": Theme(
+        ground="#16191d",
+        ink="#eceff1",
+        quiet="#98a1a9",
+        grid="#353b42",
+        shadow="#0c0e10",
+        left="#4ba9e4",
+        right="#f0a13a",
+        middle="#a7afb8",
+        series=("#56b4e9", "#f0862f", "#1fc296", "#e394c0", "#e6c14a", "#9fd4f5"),
+    ),
+}
+
+
+def theme_of(name: str) -> Theme:
+    """The theme of that name; OptionError for another."""
+    if name not in THEMES:
+        raise OptionError(f"theme {name!r} is not one of {', '.join(THEMES)}")
+    return THEMES[name]

@@ -9,7 +9,7 @@ import numpy as np
 from mcz.kinematics.chain import Floats
 from mcz.show.pictures.bodies import DOT, HEAD, Ints
 from mcz.show.pictures.cameras import Camera
-from mcz.show.pictures.themes import Theme, rgb
+from mcz.show.pictures.canvases import Theme, rgb
 from mcz.show.pictures.tracks import Track
 
 ARC = np.linspace(0.0, 1.0, 15)  # along the round end of a capsule

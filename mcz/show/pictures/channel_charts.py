@@ -17,9 +17,8 @@ from mcz.kinematics.poses import velocities
 from mcz.kinematics.poses.motion_like import signal_of
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal
 from mcz.model.text_format import among, printable
-from mcz.show.pictures.chart_pages import Sheet
-from mcz.show.pictures.charts import Chart, legend, line, rows_of, styled
-from mcz.show.pictures.themes import Theme
+from mcz.show.pictures.canvases import Theme
+from mcz.show.pictures.charts import Chart, Sheet, legend, line, rows_of, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,7 @@ from typing import Any, BinaryIO, Protocol
 import numpy as np
 
 from mcz.errors import OptionError
-from mcz.show.pictures.canvases import Pixels
-from mcz.show.pictures.libraries import library
+from mcz.show.pictures.canvases import Pixels, library
 
 VIDEO = {
     "mp4": ("libx264", {"crf": "18", "preset": "medium"}),

@@ -18,13 +18,11 @@ from mcz.model.motion import Motion
 from mcz.model.types import Settings
 from mcz.show.pictures.bodies import MIDDLE
 from mcz.show.pictures.cameras import Viewport
+from mcz.show.pictures.canvases import Theme, library
 from mcz.show.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
 from mcz.show.pictures.channel_charts import times_of
-from mcz.show.pictures.chart_pages import Sheet
-from mcz.show.pictures.charts import Chart, legend, line, name_ticks, number, rows_of, styled
-from mcz.show.pictures.libraries import library
+from mcz.show.pictures.charts import Chart, Sheet, legend, line, name_ticks, number, rows_of, styled
 from mcz.show.pictures.stages import stage_of
-from mcz.show.pictures.themes import Theme
 from mcz.show.pictures.tracks import Track, track_of
 
 if TYPE_CHECKING:

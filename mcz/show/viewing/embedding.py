@@ -5,22 +5,25 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
 from mcz.codecs import choose_name, codec_by_name
+from mcz.codecs.basis_models import known_model_name
 from mcz.errors import LimitError, MczError
 from mcz.files.reading.file import File
 from mcz.files.reading.file import open as mcz_open
+from mcz.files.reading.sizes import models_used
 from mcz.files.writing.atomic import replacing
 from mcz.hints import Hint, with_hint
 from mcz.kinematics.metrics.diff_document import diff_document
+from mcz.model.annexes import annex_bytes
 from mcz.model.text_format import brief
 from mcz.model.types import JsonObject, Params, Target
 from mcz.show.viewing.file_registry import FACTS, Shelf, Shelved
 from mcz.show.viewing.page import Page
-from mcz.show.viewing.tables import deflated, tables_for
 
 MOST_BYTES = 50 * 2**20  # of a page, unless more is asked for: what mail and browsers take
 MOST_COMPARED = 32  # pairs of clips whose figures are put into the page; it finds the rest itself
@@ -198,3 +201,50 @@ def _differences(files: Sequence[File], names: Sequence[str], shelf: Shelf) -> I
             except MczError as error:
                 notes.append(f"{a}: {error.describe(shelf.hints)}")
         yield {"a": names[0], "b": name, "clips": found, "notes": notes}
+
+
+ALWAYS = ("words.bin",)  # the names of joints are packed with them
+BASES = "pca_start.json"  # how models of bases are coded
+TABLES = {
+    "raw": (),
+    "mrdwt": ("wavelet_start.json",),
+    "qbc": ("qbc_start.json",),
+    "pca": (BASES,),
+    "dwt": ("wavelet_start.json",),
+    "awt": ("wavelet_start.json",),
+    "lsdt-frame": ("frame_start.json", BASES),
+    "lsdt-clip": ("window_start.json", BASES),
+    "mdtt": ("window_start.json", BASES),
+    "pca-rdo": ("window_start.json", BASES),
+    "online": ("online_start.json", BASES),
+    "best": ("best_start.json",),
+    "posewave": ("posewave_start.json", "posewave_priors.json"),
+    "fast": (),
+}
+
+
+def tables_for(file: File) -> set[str]:
+    """The names of the annexes that decoding any clip of ``file`` may need."""
+    from mcz.codecs import CODECS
+
+    found = set(ALWAYS)
+    for row in file.container.directory.clips.values():
+        for signal in row.signals:
+            found.update(TABLES.get(CODECS.find(signal.codec, signal.preset) or "", ()))
+    for clip in file:
+        try:
+            models = {id_ for signal in clip.signals for id_ in models_used(signal)}
+        except MczError:  # a damaged clip, which the decoder cannot read either
+            continue
+        found.update(f"bases_{name}.bin" for id_ in models if (name := known_model_name(id_)))
+    return found
+
+
+def deflated(names: Iterable[str]) -> dict[str, str]:
+    """These annexes by name, each raw deflate in base64."""
+    found = {}
+    for name in sorted(names):
+        packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+        data = packer.compress(annex_bytes(name)) + packer.flush()
+        found[name] = base64.b64encode(data).decode()
+    return found

@@ -16,21 +16,15 @@ from threading import Lock, RLock
 from typing import BinaryIO, Protocol
 
 from mcz.container.source import ByteSource
-from mcz.errors import (
-    AccessError,
-    LimitError,
-    MczError,
-    OptionError,
-    reason_of,
-)
+from mcz.errors import AccessError, LimitError, MczError, OptionError, reason_of
 from mcz.files.reading.file import open_bytes
 from mcz.files.reading.source_files import SourceOptions
 from mcz.hints import PYTHON_HINTS, Words, worded
 from mcz.model.motion import Motion
 from mcz.model.types import Params
-from mcz.show.viewing.contents import Contents, FarAway, OnDisk
+from mcz.show.viewing.requests import Contents, FarAway, OnDisk
 from mcz.sources import FORMATS, wants_skeleton
-from mcz.sources.text.find import skeletons_around
+from mcz.sources.text.bones import skeletons_around
 
 Say = Callable[[str], None]
 Make = Callable[[BinaryIO], None]  # writes an .mcz

@@ -28,7 +28,7 @@ from mcz.show.viewing.requests import (
     length_of,
     range_of,
 )
-from mcz.show.viewing.site import Site
+from mcz.show.viewing.server_tasks import Site
 
 PULSE = 1.0  # seconds between two looks at whether a page is still there
 BEAT = 15  # pulses between two signs of life

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from mcz.container.locks import lock
 from mcz.errors import AccessError, FormatError, reason_of
 from mcz.show.viewing.file_registry import Say
-from mcz.show.viewing.page_build import built
 
 PACKAGED = Path(__file__).with_name("viewer.html")  # in a wheel that was built with it
 OTHER = "MCZ_VIEWER_PAGE"  # an environment variable: a page to be taken in place of ours
@@ -50,3 +53,68 @@ def page(say: Say | None = None) -> Page:
         raise AccessError(reason_of(error), path=path) from None
     except UnicodeDecodeError:
         raise FormatError("it is no page", path=path) from None
+
+
+ROOT = Path(__file__).parents[3]
+VIEWER = "tools/viewer"
+COMMAND = f"(cd {VIEWER} && npm ci && npm run build)"
+INSTALL = ("ci", "--no-audit", "--no-fund")
+SHOWN = 300  # characters of what a program that failed has said last
+
+
+def built(say: Callable[[str], None], root: Path = ROOT) -> Path:
+    """The page that is built from the sources below ``root``; raises AccessError without one.
+
+    It is built with npm where it is older than its sources. Without npm an old one is taken.
+    """
+    folder = root / VIEWER
+    page = folder / "dist" / "viewer.html"
+    if not (folder / "build.mjs").is_file():
+        text = "this installation has no page of the viewer: its wheel was built without"
+        raise AccessError(f"{text}; in a clone of the repository {COMMAND} makes it")
+    if page.is_file() and not _is_older(page, _sources(root)):
+        return page
+    npm, node = shutil.which("npm"), shutil.which("node")
+    if npm is None or node is None:
+        if page.is_file():
+            say(f"{page} is older than its sources, and npm, which would build it, is not here")
+            return page
+        raise AccessError(f"the page of the viewer is not built: install Node.js, then {COMMAND}")
+    _build(folder, npm, node, say)
+    return page
+
+
+def _sources(root: Path) -> Iterator[Path]:
+    folder = root / VIEWER
+    yield from (folder / name for name in ("build.mjs", "package.json", "package-lock.json"))
+    yield from (path for path in (folder / "src").rglob("*") if path.is_file())
+    yield from (root / "tools" / "js").rglob("*.js")
+    yield from (root / "mcz" / "annex").glob("*")
+
+
+def _is_older(made: Path, sources: Iterator[Path]) -> bool:
+    when = made.stat().st_mtime_ns
+    return any(path.stat().st_mtime_ns > when for path in sources if path.is_file())
+
+
+def _build(folder: Path, npm: str, node: str, say: Callable[[str], None]) -> None:
+    (folder / "dist").mkdir(exist_ok=True)
+    with (folder / "dist" / "building").open("wb") as stream:
+        if not lock(stream):
+            raise AccessError("another process builds the page; try again soon", path=folder)
+        packages = folder / "node_modules" / ".package-lock.json"
+        if not packages.is_file() or _is_older(packages, iter([folder / "package-lock.json"])):
+            say(f"fetching what the page is built with, once: npm ci in {folder}")
+            _run([npm, *INSTALL], folder)
+        say("building the page: node build.mjs")
+        _run([node, "build.mjs"], folder)
+
+
+def _run(words: list[str], folder: Path) -> None:
+    done = subprocess.run(
+        words, cwd=folder, capture_output=True, stdin=subprocess.DEVNULL, check=False
+    )
+    if done.returncode:
+        said = " ".join((done.stderr or done.stdout).decode("utf-8", "replace").split())[-SHOWN:]
+        command = " ".join([Path(words[0]).name, *words[1:]])
+        raise AccessError(f"the page could not be built: {command} in {folder} said: {said}")

@@ -15,10 +15,8 @@ from typing import Any
 from mcz.errors import AccessError, OptionError, reason_of
 from mcz.show.viewing.file_registry import Shelf
 from mcz.show.viewing.handler import Handler
-from mcz.show.viewing.open_pages import Visitors
 from mcz.show.viewing.page import Page
-from mcz.show.viewing.server_tasks import Work, lossy_codecs
-from mcz.show.viewing.site import Site
+from mcz.show.viewing.server_tasks import Site, Visitors, Work, lossy_codecs
 
 GRACE = 5.0  # seconds that a page has to come back, as when it is loaded anew
 MOST_CONNECTIONS = 128

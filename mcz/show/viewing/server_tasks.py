@@ -9,11 +9,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from threading import BoundedSemaphore, Lock
+from threading import BoundedSemaphore, Condition, Lock
 from typing import Any, BinaryIO
 
 from mcz.codecs.parameters import Dial
@@ -25,8 +26,16 @@ from mcz.files.reading.source_files import SourceOptions
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject, Params
 from mcz.show.viewing.file_registry import Shelf, Shelved, encode, kind_of, pack
-from mcz.show.viewing.multipart import Readable, boundary_of, save_files
-from mcz.show.viewing.requests import Refused, object_of, params_of, text_of
+from mcz.show.viewing.page import Page
+from mcz.show.viewing.requests import (
+    Readable,
+    Refused,
+    boundary_of,
+    object_of,
+    params_of,
+    save_files,
+    text_of,
+)
 from mcz.sources import FORMATS
 
 MOST_POSTED = 2**30  # bytes of the files that the page may give at once
@@ -258,3 +267,68 @@ def glb_writer() -> Callable[..., Any] | None:
     except ModuleNotFoundError:
         return None
     return writer
+
+
+@dataclass(slots=True)
+class Site:
+    """The page, files and tasks below ``token``; ``port`` is that of the server."""
+
+    page: Page
+    shelf: Shelf
+    work: Work
+    visitors: Visitors
+    token: str
+    port: int = 0
+
+
+PULSE = 0.5  # seconds between two looks, so that Ctrl-C is heard on every system
+
+
+class Visitors:
+    """A context is a page that is open; ``grace``: seconds in which one may come back."""
+
+    def __init__(self, grace: float) -> None:
+        self._grace = grace
+        self._n_open = self._n_seen = 0
+        self.is_closing = False
+        self._changed = Condition()
+
+    def __enter__(self) -> Visitors:
+        with self._changed:
+            self._n_open += 1
+            self._n_seen += 1
+            self._changed.notify_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._changed:
+            self._n_open -= 1
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Let everybody who waits go on."""
+        with self._changed:
+            self.is_closing = True
+            self._changed.notify_all()
+
+    def stay(self, seconds: float) -> bool:
+        """Wait so long; whether the page may stay open then."""
+        with self._changed:
+            self._changed.wait_for(lambda: self.is_closing, seconds)
+            return not self.is_closing
+
+    def wait(self, *, for_ever: bool = False) -> None:
+        """Wait until a page was there and all have been gone for the time of grace.
+
+        ``for_ever``: until ``close``, whoever comes and goes.
+        """
+        with self._changed:
+            while not self.is_closing:
+                seen = self._n_seen
+                if for_ever or not seen or self._n_open:
+                    self._changed.wait(PULSE)
+                elif not self._changed.wait_for(partial(self._is_back, seen), self._grace):
+                    return
+
+    def _is_back(self, seen: int) -> bool:
+        return self.is_closing or self._n_seen > seen

@@ -13,11 +13,9 @@ from mcz.errors import OptionError
 from mcz.files.reading.clip import Clip
 from mcz.model.motion import Motion
 from mcz.model.types import JsonObject
-from mcz.show.viewing.browser import show
 from mcz.show.viewing.file_registry import Shelf, Stored, put
-from mcz.show.viewing.player import player
+from mcz.show.viewing.player import player, viewer_page
 from mcz.show.viewing.server import Server
-from mcz.show.viewing.small_page import viewer_page
 
 _OPEN: set[View] = set()  # those that are served, whether anybody keeps them or not
 
@@ -156,3 +154,16 @@ def _copy(clip: Clip, out: BinaryIO) -> None:
 def _close_all() -> None:
     for shown in list(_OPEN):
         shown.close()
+
+
+def show(url: str) -> bool:
+    """Open ``url`` in the browser; False where there is none, or only one within the terminal."""
+    import webbrowser
+
+    graphic = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in graphic):
+        return False
+    try:
+        return webbrowser.open(url)
+    except webbrowser.Error:
+        return False

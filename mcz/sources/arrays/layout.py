@@ -8,14 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import numpy as np
 from construct import If, IfThenElse, Int8ul, this
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
+from mcz.model.motion import Source
 from mcz.model.schema import POSITIVE, SIZED, UVARINT, Record, build, counted, field, one_of, parse
+from mcz.model.types import JsonObject
 
 # Types of NumPy by their number in a template: |b1 to <f8, without byte order.
 TYPES = ("b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
@@ -195,3 +197,57 @@ def check_spans(pieces: Sequence[Piece]) -> None:
         if start < end:  # ARRAY-08
             raise FormatError(f"source template: CRC-32 of pieces {start} to {stop}, which overlap")
         end = stop
+
+
+LOCAL, HEADER = b"PK\3\4", 30  # how a member of a ZIP begins; bytes before its name
+
+
+def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
+    """The arrays of a file in order: ``name type order columns signal``, ``name`` alone where kept.
+
+    ``columns`` are the numbers of a row, ``order`` is "C" or "F"; ``signals`` are the names of the
+    clip's. The name is "" in an NPY file. Raises FormatError on bad bytes.
+    """
+    pieces = parse_arrays(source.template, source.detail)
+    members = members_of(pieces) if source.format == "npz" else [("", pieces)]
+    return [_list_array(name, own, signals) for name, own in members]
+
+
+def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
+    """The members of an NPZ: the name of each array, and its pieces from its header on."""
+    starts = [
+        index
+        for index, piece in enumerate(pieces)
+        if piece.kind == Kind.TEXT and piece.text.startswith(LOCAL)
+    ]
+    return [
+        (_name(pieces[start:]), pieces[start:stop])
+        for start, stop in pairwise((*starts, len(pieces)))
+    ]
+
+
+def _list_array(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonObject:
+    listed = {"name": name} | dict.fromkeys(("type", "order", "columns", "signal"))
+    for piece in pieces:
+        if piece.kind == Kind.DATA:
+            listed |= {
+                "type": (">" if piece.flags & BIG_ENDIAN else "<") + TYPES[piece.type],
+                "order": "F" if piece.flags & BY_COLUMNS else "C",
+                "columns": piece.n_columns,
+                "signal": signals[piece.signal] if piece.signal < len(signals) else "",
+            }
+    return listed
+
+
+def _name(pieces: Sequence[Piece]) -> str:
+    """The name in a local header, which begins with the first of ``pieces``."""
+    header = b""
+    for piece in pieces:
+        if piece.kind == Kind.TEXT:
+            header += piece.text
+        elif piece.kind in (Kind.CRC, Kind.SIZE4, Kind.SIZE8):
+            header += bytes(8 if piece.kind == Kind.SIZE8 else 4)
+        else:
+            break
+    size = int.from_bytes(header[26:28], "little")
+    return header[HEADER : HEADER + size].decode("utf-8", "replace").removesuffix(".npy")

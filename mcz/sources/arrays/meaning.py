@@ -5,8 +5,9 @@ Nothing here is normative: a template says where each column went.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
 
@@ -16,18 +17,9 @@ from mcz.errors import SourceError
 from mcz.model.clock import times_fault
 from mcz.model.motion import Channel, Joint, Skeleton
 from mcz.model.types import Items
-from mcz.sources.arrays.body import Body, body_of
-from mcz.sources.arrays.facts import (
-    BODY_NAMES,
-    JOINT_NAMES,
-    JOINTS,
-    SHAPE,
-    TIMES,
-    facts_of,
-    names_of,
-    rate_of,
-)
-from mcz.sources.arrays.files import DEFLATED, STAYS, Array
+from mcz.sources.arrays.columns import DEFLATED, STAYS, Array
+from mcz.sources.arrays.skeletons import BodyTree, skeleton_of, tree
+from mcz.sources.tables.times import UNITS, rate_of_times
 
 MAX_PER_FRAME = 1000  # rows a frame of an array that is longer than the motion
 
@@ -180,3 +172,228 @@ def _channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...]:
         is_time = array.name in TIMES and array.head.code.startswith("f")
         return (Channel("", array.name, "s" if is_time else ""),)
     return tuple(Channel("", label) for label in labels(inner))
+
+
+TIMES = ("time", "times", "timestamp", "timestamps")
+RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
+JOINT_NAMES = ("joint_names", "dof_names")
+BODY_NAMES = ("body_names", "link_names")
+JOINTS = {  # arrays of robots that have a column for each joint, and their units
+    "joint_pos": "rad",
+    "dof_pos": "rad",
+    "dof": "rad",
+    "joint_vel": "rad/s",
+    "dof_vel": "rad/s",
+}
+SHAPE = "betas"  # numbers of a body, of which it is said how many there are
+LONGEST = 200  # characters of a word
+EVEN = 1e-6  # of a step: times that are off by less are uniform
+_KEY = re.compile(r"[a-z0-9]+")
+
+
+def rate_of(arrays: Sequence[Array], n_frames: int) -> tuple[Fraction | None, bool, list[str]]:
+    """The frame rate, whether that is exactly what the file says, and what is odd about it.
+
+    Of times that are there and are not uniform there is none.
+    """
+    numbers = (_number(array) for array in arrays if array.name.lower() in RATES)
+    stated = next((number for number in numbers if number is not None), None)
+    rate, exact = _round(*stated) if stated is not None else (None, True)
+    for array in arrays:
+        if array.kept or array.name not in TIMES or array.numbers.shape != (n_frames, 1):
+            continue
+        if array.head.code not in ("f4", "f8") or n_frames < 2:
+            continue
+        times = array.numbers[:, 0].astype(np.float64)
+        half = 0.0
+        if np.isfinite(times).all():
+            half = float(np.spacing(np.abs(array.numbers).max())) / 2
+            half = max(half, EVEN * abs(float(np.median(np.diff(times)))) / 2)
+        own, own_exact = rate_of_times(times, [half], () if rate is None else (rate,))
+        if own is None:
+            return None, True, ["the times are not uniform"]
+        odd = [] if rate in (None, own) else [f"{float(own):g} frames a second by {array.name}"]
+        return own, own_exact, odd
+    return rate, exact, []
+
+
+def _number(array: Array) -> tuple[float, np.dtype[np.generic]] | None:
+    """The only number of an array and its type, None where it is none of a rate."""
+    if array.words is None or array.words.size != 1:
+        return None
+    value = float(array.words.ravel()[0])
+    return (value, array.words.dtype) if 1e-6 <= value <= 1e9 else None
+
+
+def _round(value: float, dtype: np.dtype[np.generic]) -> tuple[Fraction, bool]:
+    """The simplest rate that is this number in its type, and whether it is exactly that."""
+    exact = Fraction(value)
+    for unit in UNITS:
+        rate = round(exact / unit) * unit
+        if rate and float(np.array(float(rate)).astype(dtype)) == value:
+            return rate, rate == exact
+    return exact.limit_denominator(10**6), False
+
+
+def facts_of(arrays: Sequence[Array]) -> dict[str, str]:
+    """Metadata ``x-NAME`` of all single words and numbers; how many betas there are."""
+    facts: dict[str, str] = {}
+    for array in arrays:
+        key = "x-" + "-".join(_KEY.findall(array.name.lower()))
+        text = None if array.name.lower() in RATES else _text(array)
+        if text is not None and len(key) > 2:
+            facts.setdefault(key, text)
+    for array in arrays:
+        if array.name == SHAPE and array.head.shape:
+            facts.setdefault("x-num-betas", str(array.head.shape[-1]))
+    return facts
+
+
+def names_of(arrays: Sequence[Array], keys: Sequence[str]) -> tuple[str, ...]:
+    """The texts of the first array that has one of the names ``keys``, () where there is none."""
+    for array in arrays:
+        if array.name in keys and array.words is None and len(array.head.shape) == 1:
+            code = array.head.code
+            size = int(code[1:]) * (4 if code[0] == "U" else 1) if code[:1] in ("U", "S") else 0
+            if size and size * array.head.shape[0] <= len(array.text):
+                parts = [array.text[k : k + size] for k in range(0, len(array.text), size)]
+                texts = [_decoded(part, array) for part in parts[: array.head.shape[0]]]
+                return tuple(text for text in texts if text) if all(texts) else ()
+    return ()
+
+
+def _decoded(data: bytes, array: Array) -> str | None:
+    """A text of an array of texts, None where it is empty or not printable."""
+    encoding = "utf-8"
+    if array.head.code[0] == "U":
+        encoding = "utf-32-be" if array.head.big_endian else "utf-32-le"
+    try:
+        text = data.decode(encoding).rstrip("\0")
+    except UnicodeDecodeError:
+        return None
+    return text if text.isprintable() and text else None
+
+
+def _text(array: Array) -> str | None:
+    """A single word or number as text, None of all else."""
+    if array.words is not None:
+        if array.words.size != 1 or len(array.head.shape) > 1:
+            return None
+        return str(array.words.ravel()[0].item())
+    if array.head.code[:1] not in ("U", "S") or np.prod(array.head.shape, dtype=np.float64) != 1:
+        return None
+    text = _decoded(array.text[: 4 * LONGEST], array)
+    return text if text and len(text) <= LONGEST else None
+
+
+WHOLE = ("poses", "fullpose", "full_pose")  # all joints
+PLACES = ("trans", "transl")  # where the root is
+ROOT, BODY = ("root_orient", "global_orient"), ("pose_body", "body_pose")
+FACE = (("pose_jaw", "jaw_pose"), ("pose_eye",), ("leye_pose",), ("reye_pose",))
+HANDS = (("pose_hand",), ("left_hand_pose",), ("right_hand_pose",))
+FACE_SIZE, HANDS_SIZE = 9, 90  # numbers of a face and of two hands that have all their joints
+BODY_SIZES = {63: "smplh", 69: "smpl"}  # numbers of a body without its root, and its model
+WITHOUT_HANDS = 22  # joints that SMPL-H and SMPL-X share
+POSITION = 3  # channels of the root before its rotation
+WITH_FACE = 165  # numbers of SMPL-X
+PARTS = {**dict.fromkeys(ROOT, 0), **dict.fromkeys(BODY, 3)}  # where parts of all joints begin
+FACES = {"pose_jaw": 66, "jaw_pose": 66, "pose_eye": 69, "leye_pose": 69, "reye_pose": 72}
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """The motion signal of a body: ``words`` side by side, and where columns of arrays are."""
+
+    skeleton: Skeleton
+    n_frames: int
+    words: list[Items]
+    places: dict[int, Sequence[int]]
+
+
+def body_of(arrays: Sequence[Array]) -> Body | None:
+    """The body that the arrays of a file speak of, None where they do not."""
+    named = {
+        array.name: index
+        for index, array in reversed([*enumerate(arrays)])
+        if not array.kept and array.head.code.startswith("f")
+    }
+    whole = next((named[name] for name in WHOLE if name in named), None)
+    turns = [whole] if whole is not None else _pose_parts(arrays, named)
+    model = _model(sum(arrays[k].numbers.shape[1] for k in turns)) if turns else None
+    if model is None:
+        return None
+    n_frames = arrays[turns[0]].n_rows
+    if any(arrays[k].n_rows != n_frames for k in turns):
+        return None
+    places = [named[name] for name in PLACES if name in named]
+    root = [k for k in places if arrays[k].numbers.shape == (n_frames, POSITION)][:1]
+    repeats: dict[int, Sequence[int]] = {}
+    at = 0
+    for index in (*root, *turns):
+        repeats[index] = range(at, at + arrays[index].numbers.shape[1])
+        at += len(repeats[index])
+    if whole is not None:
+        repeats |= dict(_repeated_parts(arrays, named, whole, POSITION * len(root)))
+    skeleton = skeleton_of(model, moves=bool(root))
+    return Body(skeleton, n_frames, [arrays[k].numbers for k in (*root, *turns)], repeats)
+
+
+def _pose_parts(arrays: Sequence[Array], named: Mapping[str, int]) -> list[int]:
+    """The arrays of parts that are the joints of a model in its order, [] where there are none."""
+    root, body = (next((named[n] for n in names if n in named), None) for names in (ROOT, BODY))
+    if root is None or body is None or arrays[root].numbers.shape[1] != 3:
+        return []
+    if arrays[body].numbers.shape[1] not in BODY_SIZES:
+        return []
+    joined = [root, body]
+    if BODY_SIZES[arrays[body].numbers.shape[1]] == "smpl":
+        return joined
+    for group, size in ((FACE, FACE_SIZE), (HANDS, HANDS_SIZE)):
+        parts = [k for names in group for k in (next((named[n] for n in names if n in named), -1),)]
+        parts = [k for k in parts if k >= 0]
+        if sum(arrays[k].numbers.shape[1] for k in parts) == size:
+            joined += parts
+    return joined
+
+
+def _model(n_numbers: int) -> BodyTree | None:
+    """The model, or the first joints of one, that has so many rotation vectors."""
+    n_joints, rest = divmod(n_numbers, 3)
+    if rest:
+        return None
+    if n_joints in (24, 52, 55):
+        return tree(n_joints)
+    base = {WITHOUT_HANDS: "smplh", WITHOUT_HANDS + FACE_SIZE // 3: "smplx"}.get(n_joints)
+    if base is None:
+        return None
+    full = tree(base)
+    return replace(full, names=full.names[:n_joints], parents=full.parents[:n_joints])
+
+
+def _repeated_parts(
+    arrays: Sequence[Array], named: Mapping[str, int], whole: int, first: int
+) -> Iterator[tuple[int, Sequence[int]]]:
+    """Arrays that repeat columns of ``whole``, whose channels begin with ``first``."""
+    words = arrays[whole].numbers
+    starts = PARTS | dict.fromkeys(("pose_hand", "left_hand_pose"), 66)
+    starts["right_hand_pose"] = 66 + HANDS_SIZE // 2
+    if words.shape[1] == WITH_FACE:
+        hands = [name for names in HANDS for name in names]
+        starts = {n: at + FACE_SIZE * (n in hands) for n, at in starts.items()} | FACES
+    for name, at in starts.items():
+        index = named.get(name)
+        if index is None:
+            continue
+        part = arrays[index].numbers
+        stop = at + part.shape[1]
+        if stop <= words.shape[1] and _same(words[:, at:stop], part):
+            yield index, range(first + at, first + stop)
+
+
+def _same(one: Items, other: Items) -> bool:
+    """Return True if two arrays have the same type and bits."""
+    if one.dtype != other.dtype or one.shape != other.shape:
+        return False
+    kind = f"u{one.dtype.itemsize}"
+    words = [np.ascontiguousarray(each).view(kind) for each in (one, other)]
+    return np.array_equal(words[0], words[1])

@@ -12,12 +12,10 @@ from collections.abc import Sequence
 from mcz.errors import MotionError, SourceError
 from mcz.model.motion import Motion, Signal, Source
 from mcz.sources.arrays.archive import Archive
-from mcz.sources.arrays.columns import columns_of, signal_of
-from mcz.sources.arrays.files import Array, npy_array, npz_arrays
+from mcz.sources.arrays.columns import Array, columns_of, npy_array, npz_arrays, signal_of
 from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Piece, build_arrays
 from mcz.sources.arrays.meaning import Meaning, meaning_of
-from mcz.sources.arrays.pieces import Placed, pieces_of
-from mcz.sources.arrays.restore import restore_arrays
+from mcz.sources.arrays.restore import Placed, pieces_of, restore_arrays
 
 NO_ARCHIVE = Archive((), (), ())
 

@@ -133,12 +133,7 @@ def _words(data: bytes, parameters: Parameters, shape: Shape) -> Items:
 
 
 def _point_signals(
-    data: bytes,
-    parameters: Parameters,
-    shape: Shape,
-    grid: Grid,
-    names: list[str],
-    split: Split,
+    data: bytes, parameters: Parameters, shape: Shape, grid: Grid, names: list[str], split: Split
 ) -> list[Signal]:
     """Points, residuals, outputs; ``grid`` is that of integer coordinates.
 

@@ -6,8 +6,7 @@ import re
 from collections.abc import Sequence
 
 from mcz.errors import SourceError
-from mcz.sources.limits import MOST_CHANNELS, check
-from mcz.sources.text.source import BOM
+from mcz.sources.text.source import BOM, MOST_CHANNELS, check
 
 SEPARATORS: tuple[bytes | None, ...] = (b",", b";", b"\t", None)  # None: blanks
 # words for a number that is not there, those of spreadsheets among them
@@ -117,9 +116,7 @@ def texts_of(line: bytes, separator: bytes | None, encoding: str) -> list[str]:
     return [cell.decode(encoding, "replace") for cell in cells_of(line, separator)]
 
 
-def first_row(
-    lines: Sequence[tuple[int, bytes]],
-) -> tuple[int, bytes | None, int] | None:
+def first_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes | None, int] | None:
     """The number of the first row of numbers, its separator and how many cells it has.
 
     Some columns may be text. A line of names may look like numbers; it has no other one below.
@@ -155,9 +152,7 @@ def _is_number(cell: bytes) -> bool:
     return _NUMBER.fullmatch(cell) is not None
 
 
-def _first_numbers(
-    lines: Sequence[tuple[int, bytes]],
-) -> tuple[int, bytes | None, int] | None:
+def _first_numbers(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes | None, int] | None:
     """The first line whose cells are all numbers or blank."""
     first = None
     for number, (_, line) in enumerate(lines[:LOOKED_AT]):

@@ -16,7 +16,7 @@ from mcz.model.motion import Exceptions, Motion, Signal
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources.restore import printed_count, rows_text, text_limit
 from mcz.sources.tables.layout import Section, fill, parse_table
-from mcz.sources.tables.notes import TableNotes
+from mcz.sources.tables.source import TableNotes
 
 Ints = NDArray[np.int64]
 

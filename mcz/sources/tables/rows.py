@@ -18,9 +18,9 @@ from mcz.errors import SourceError
 from mcz.model.numbers import scan
 from mcz.sources.tables.csv_text import BLANK_CELLS, cell_spans
 from mcz.sources.tables.text_columns import TextColumn, odd_cells, refuse_commas, split_text
+from mcz.sources.text import BLANKS, FREE, FULL
 from mcz.sources.text.layout import FRAME_NUMBER, MAX_WIDTH, Pattern, runs_of
 from mcz.sources.text.rows import DENSE, Rows, Token, line_of, read_rows
-from mcz.sources.text.text_items import BLANKS, FREE, FULL
 
 Bools = NDArray[np.bool_]
 

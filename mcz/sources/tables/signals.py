@@ -70,11 +70,7 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 
 
 
 def read_text(
-    data: bytes,
-    rows: Rows,
-    texts: Sequence[TextColumn],
-    labels: Sequence[str],
-    at: tuple[int, int],
+    data: bytes, rows: Rows, texts: Sequence[TextColumn], labels: Sequence[str], at: tuple[int, int]
 ) -> tuple[Signal, ...]:
     """The signal of the numbers in text columns, if there are any.
 

@@ -22,8 +22,7 @@ from mcz.model.numbers.tokens import kernels
 from mcz.sources.tables.csv_text import DECIMAL_COMMA, NO_NUMBER, check_points
 from mcz.sources.text.layout import MAX_PATTERNS, Pattern, runs_of
 from mcz.sources.text.notes import RowNotes
-from mcz.sources.text.padding import padding
-from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, line_of
+from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, line_of, padding
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from decimal import Decimal
 from fractions import Fraction
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.model.numbers import Grid, GridKind, Tokens
-from mcz.sources.rates import DECIMAL, MAX_TERM
+from mcz.model.clock import TIMES, Timeline, times_fault
+from mcz.model.motion import Channel, Signal
+from mcz.model.numbers import Grid, GridKind, Tokens, scan
 from mcz.sources.tables.layout import Clock
+from mcz.sources.tables.signals import read_columns
+from mcz.sources.text.rows import Rows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -203,3 +208,108 @@ def half_digits_of(data: bytes, stop: Ints, tokens: Tokens) -> list[float]:
         ends = [int(at) for at in stop[:ZEROS_IN]]
         zeros = min(len(data[at : at + 32]) - len(data[at : at + 32].lstrip(b"0")) for at in ends)
     return [0.5 * 10.0**-each for each in dict.fromkeys((places + zeros, places))]
+
+
+MAX_TERM = 2**53 - 1  # of a frame rate's numerator and denominator
+DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
+    """Frames a second, and whether that is exactly the reciprocal of the seconds printed.
+
+    A rate whose reciprocal rounds to the printed digits is taken for the true one, if it is an
+    integer, or an integer divided by 1.001, or, where at least 6 more digits are printed than
+    would tell such rates apart, one of at most 3 decimals; in this order. Otherwise it is the
+    reciprocal itself. None where the frame time is zero, negative, absurd or not a number.
+    """
+    if len(frame_time) > 64 or not DECIMAL.fullmatch(frame_time):
+        return None, True
+    if not 1e-9 <= float(frame_time) <= 1e9:
+        return None, True
+    time = Fraction(frame_time)
+    half_digit = Fraction(10) ** int(Decimal(frame_time).as_tuple().exponent) / 2
+    half_digit += time / 2**53  # it may have been a binary64 before, itself rounded
+    reciprocal = 1 / time
+    spread = half_digit / time * reciprocal  # of the rates that print alike, about
+    units = [Fraction(1), Fraction(1000, 1001)]
+    units += [Fraction(1, n) for n in (10, 100, 1000) if spread * 10**6 < Fraction(1, n)]
+    for unit in units:
+        rate = round(reciprocal / unit) * unit
+        if rate and abs(1 / rate - time) <= half_digit and rate.numerator <= MAX_TERM:
+            return rate, 1 / rate == time
+    if max(reciprocal.numerator, reciprocal.denominator) <= MAX_TERM:
+        return reciprocal, True
+    return reciprocal.limit_denominator(min(MAX_TERM, int(MAX_TERM / (reciprocal + 1)))), False
+
+
+def frame_time(rate: Fraction | None) -> str:
+    """The seconds a frame takes, as the shortest decimal of its binary64; 0 where unknown."""
+    return "0" if rate is None else repr(float(1 / rate))
+
+
+SECOND = Fraction(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """``signals``: one of times where there are some that no clock gives, named ``time``.
+
+    ``rate`` is None where times are not whole frames apart. ``exact``: it is round or stated.
+    ``note`` says why the signal has not the role of times. ``printed`` are the times of a clock.
+    """
+
+    clock: Clock | None
+    signals: tuple[Signal, ...]
+    rate: Fraction | None
+    exact: bool
+    note: str = ""
+    printed: Timeline | None = None
+
+
+def as_times(signal: Signal, channel: Channel) -> tuple[Signal, str]:
+    """A signal of one channel as the times, and why it has not their role, "" where it has."""
+    fault = times_fault(signal.masked()[:, 0])
+    role = "" if fault else TIMES
+    named = replace(signal, name="time", channels=(channel,), role=role)
+    return named, f"the times do not count: {fault}" if fault else ""
+
+
+def read_times(
+    data: bytes,
+    rows: Rows,
+    column: int,
+    stated: Sequence[Fraction] = (),
+    unit: Fraction = SECOND,
+    name: str = "time",
+) -> Times:
+    """The times in a column; ``stated``: rates that the file states; ``unit`` in seconds."""
+    present = np.flatnonzero(rows.stop[:, column])
+    tokens = scan(data, rows.start[present, column], rows.stop[present, column])
+    whole = len(tokens) == rows.n_rows and not tokens.bad().any()
+    numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
+    clock = find_clock(tokens, numbers, stated, unit) if whole else None
+    used = any(
+        run.column <= column < run.column + run.n_columns
+        for pattern in rows.patterns
+        for run in pattern.runs
+    )
+    signals: tuple[Signal, ...] = ()
+    note = ""
+    if clock is None and used:
+        symbol = {3: "ms", 6: "us", 9: "ns"}.get(len(str(unit.denominator)) - 1, "s")
+        channel = Channel("", name, symbol)
+        signal, note = as_times(read_columns(data, rows, [column]), channel)
+        signals = (signal,)
+    rate, exact = None, True
+    if whole:
+        digits = half_digits_of(data, rows.stop[present, column], tokens)
+        seconds = tokens.values() * float(unit)
+        in_seconds = [digit * float(unit) for digit in digits]
+        rate, exact = rate_of_times(seconds, in_seconds, stated, rows.numbers)
+    if rate is None and stated and (rows.n_rows < 2 or not len(tokens)):
+        rate = stated[0]
+    printed = None
+    if clock is not None:
+        half = 0.5 * 10.0**-clock.grid.digits
+        printed = Timeline(tokens.values() * float(unit), rate, half * float(unit))
+    return Times(clock, signals, rate, exact, note, printed)

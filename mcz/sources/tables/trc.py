@@ -18,8 +18,7 @@ from mcz.sources.tables.restore import restore_table
 from mcz.sources.tables.rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.sources.tables.signals import read_columns, table_metadata
 from mcz.sources.tables.source import named_count, names_in, section_of, table_source
-from mcz.sources.tables.times import stated_rate
-from mcz.sources.tables.times_column import Times, read_times
+from mcz.sources.tables.times import Times, read_times, stated_rate
 from mcz.sources.text.layout import FRAME_NUMBER
 from mcz.sources.text.rows import Rows, counted_up
 from mcz.sources.text.source import check_text, text_encoding

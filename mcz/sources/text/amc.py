@@ -20,10 +20,17 @@ from mcz.sources.restore import restore
 from mcz.sources.tables.token_signal import read_signal
 from mcz.sources.text.bones import fit, flat, match_bones, match_names
 from mcz.sources.text.layout import FRAME_NUMBER, Layout, Pattern, runs_of
-from mcz.sources.text.line_by_line import Arriving, Frame, Lines
 from mcz.sources.text.notes import RowNotes
 from mcz.sources.text.rows import Rows, Token, counted_up, line_of, read_rows, tail_end
-from mcz.sources.text.source import check_first_line, check_text, source_of, text_encoding
+from mcz.sources.text.source import (
+    Arriving,
+    Frame,
+    Lines,
+    check_first_line,
+    check_text,
+    source_of,
+    text_encoding,
+)
 
 _BLANK = rb"[\x00-\x09\x0b-\x20]"
 _FIRST_FRAME = re.compile(rb"(?m)^" + _BLANK + rb"*+[-+]?[0-9]++" + _BLANK + rb"*+$")

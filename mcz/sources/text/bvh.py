@@ -16,14 +16,13 @@ import numpy as np
 from mcz.errors import MotionError, SourceError
 from mcz.model.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
 from mcz.model.types import Values
-from mcz.sources.rates import frame_rate, frame_time
 from mcz.sources.restore import restore
+from mcz.sources.tables.times import frame_rate, frame_time
 from mcz.sources.tables.token_signal import read_signal
 from mcz.sources.text.hierarchy import read_hierarchy, write_hierarchy
 from mcz.sources.text.layout import Layout, Pattern, runs_of
-from mcz.sources.text.line_by_line import Arriving, Frame, Lines
 from mcz.sources.text.rows import Token, line_of, read_rows, tail_end
-from mcz.sources.text.source import check_text, source_of, text_encoding
+from mcz.sources.text.source import Arriving, Frame, Lines, check_text, source_of, text_encoding
 
 _FRAMES = re.compile(rb"\s*Frames\s*:\s*([^\s]+)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*Frame\s+Time\s*:\s*([^\s]+)", re.IGNORECASE)

@@ -15,9 +15,8 @@ from math import isfinite
 
 from mcz.errors import MotionError, SourceError
 from mcz.model.motion import ORIGIN, Channel, Joint, Skeleton, Vector
-from mcz.sources.limits import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, check
 from mcz.sources.text.rows import line_of
-from mcz.sources.text.source import text_start
+from mcz.sources.text.source import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, check, text_start
 
 _KINDS = {"position": "t", "rotation": "r", "scale": "s"}
 _NAMES = {f"{k}{a}": f"{a.upper()}{name}" for name, k in _KINDS.items() for a in "xyz"}

@@ -27,7 +27,7 @@ from mcz.model.schema import (
     field,
     parse,
 )
-from mcz.sources.text.text_items import Items
+from mcz.sources.text import Items
 
 FRAME_NUMBER = -1  # the column of the frame number
 MAX_PATTERNS = 1024

@@ -44,8 +44,7 @@ class Notes(Record):
         counted(PatternRun), "patterns of the rows; all rows after them have pattern 0"
     )
     texts: list[NumberText] = field(
-        counted(NumberText),
-        "frame numbers that are not printed as the frame's, in plain decimal",
+        counted(NumberText), "frame numbers that are not printed as the frame's, in plain decimal"
     )
 
 

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.model.motion import Source
+from mcz.model.motion import Skeleton, Source
+from mcz.model.numbers import values_of_texts
 from mcz.sources.text.layout import Layout
 from mcz.sources.text.rows import Rows
 
@@ -70,12 +77,67 @@ def source_of(
     """The source of a file that was read as ``header`` and ``rows``; ``count``: as printed."""
     usual = count in (b"", b"%d" % rows.n_rows)
     layout = Layout(
-        header,
-        rows.patterns,
-        b"" if usual else count,
-        0 if usual else rows.n_rows,
-        rows.ending,
+        header, rows.patterns, b"" if usual else count, 0 if usual else rows.n_rows, rows.ending
     )
     template, detail = layout.build()
     digest = hashlib.sha256(data).digest()
     return Source(format_name, template, detail, rows.notes, size=len(data), sha256=digest)
+
+
+MOST_JOINTS = 2**18
+MOST_CHANNELS = 2**20
+MOST_DEPTH = 4096
+
+
+def check(what: str, number: int, most: int) -> None:
+    """Raise SourceError where a skeleton has more than it may have of ``what``."""
+    if number > most:
+        raise SourceError(f"more than {most:,} {what}; no skeleton is stored with as many")
+
+
+Floats = NDArray[np.float64]
+Frame = tuple[int | None, Floats]  # its number, None where the text has none, and (n_channels,)
+
+
+@dataclass(frozen=True, slots=True)
+class Arriving:
+    """The header of a motion, read up to its first frame, and all of its frames in order.
+
+    Values are NaN where the text has none. ``declared`` is how many frames the header says there
+    are, None where it says nothing that is a number. ``frames`` raises SourceError, with the number
+    of the line, at text that is none of the format.
+    """
+
+    skeleton: Skeleton
+    frames: Iterator[Frame]
+    frame_rate: Fraction | None = None
+    frame_rate_exact: bool = True
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    first_number: int = 1
+    declared: int | None = None
+
+
+class Lines:
+    """Lines as they are read, and the number of the last."""
+
+    def __init__(self, lines: Iterator[bytes]) -> None:
+        self._lines = lines
+        self.number = 0
+
+    def __iter__(self) -> Iterator[bytes]:
+        return self
+
+    def __next__(self) -> bytes:
+        line = next(self._lines)
+        self.number += 1
+        return line
+
+    def error(self, message: str) -> SourceError:
+        return SourceError(message, line=max(1, self.number))
+
+    def numbers(self, texts: Sequence[bytes]) -> Floats:
+        """The values of the words of the last line, or of those that end with it."""
+        values, bad = values_of_texts(texts)
+        if bad.any():
+            raise self.error(f"{texts[int(np.argmax(bad))][:40]!r} is not a number")
+        return values

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from mcz.kernels import eight_bytes, kernel, put_eight_bytes
 from mcz.kernels.types import Bytes, Ints, Ints2
-from mcz.sources.text.text_items import BLANKS, FREE, WORDS, Items
+from mcz.sources.text import BLANKS, FREE, WORDS, Items
 
 BLANK, QUOTE, COMMA, SEMICOLON = 0x20, 0x22, 0x2C, 0x3B
 MINUS, PLUS, HASH, ZERO, NINE, LF = 0x2D, 0x2B, 0x23, 0x30, 0x39, 0x0A

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.exchange.conversion.scenes.keys import Keyed, Keys
-from mcz.exchange.conversion.scenes.nodes import Scene
-from mcz.exchange.conversion.scenes.solids import (
+from mcz.exchange.conversion.scenes.nodes import (
     COLORS,
     MARKER,
     OCTAHEDRON,
     SIDES,
+    Scene,
     Solid,
     knob,
     solid_of,

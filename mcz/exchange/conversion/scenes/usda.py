@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.exchange.conversion.scenes.key_kernels import fill
 from mcz.exchange.conversion.scenes.keys import Keyed, Keys
-from mcz.exchange.conversion.scenes.nodes import Node, Scene
-from mcz.exchange.conversion.scenes.solids import COLORS, MARKER, SIDES, Solid, solid_of
+from mcz.exchange.conversion.scenes.nodes import COLORS, MARKER, SIDES, Node, Scene, Solid, solid_of
 from mcz.kinematics.chain import Floats
 from mcz.model.types import JsonObject
 
@@ -34,7 +33,8 @@ def usda(scene: Scene, keys: Keyed, generator: str, facts: JsonObject) -> bytes:
     name = identifiers([scene.name])[0]
     body = _markers(scene, keys) if scene.is_markers else _skeleton(scene, keys, name)
     kind = "Xform" if scene.is_markers else "SkelRoot"
-    lines = [*_layer(scene, name, generator, facts), f"def {kind} {quoted(name)} (", *_named(scene)]
+    lines = [*_layer(scene, name, generator, facts), f"def {kind} {quoted(name)} ("]
+    lines.append(f"    displayName = {quoted(scene.name)}")
     lines += [")", "{", *_indented(_turned_up(scene)), *_indented(body), "}", ""]
     return "\n".join(lines).encode("utf-8", "replace")
 
@@ -66,10 +66,6 @@ def _layer(scene: Scene, name: str, generator: str, facts: JsonObject) -> Iterat
     yield f'    upAxis = "{"Z" if scene.up_axis == "z" else "Y"}"'
     yield ")"
     yield ""
-
-
-def _named(scene: Scene) -> Iterator[str]:
-    yield f"    displayName = {quoted(scene.name)}"
 
 
 def _turned_up(scene: Scene) -> Iterator[str]:

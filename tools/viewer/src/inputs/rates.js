@@ -1,4 +1,4 @@
-// Frame time as printed -> frames a second: the rule of mcz/sources/rates.py.
+// Frame time as printed -> frames a second: the rule of mcz/sources/tables/times.py.
 
 import { numberOf } from "./lines.js";
 

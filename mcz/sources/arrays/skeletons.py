@@ -1,4 +1,4 @@
-"""Joints of body models: names and parents, as annex ``body_trees.json`` has them, and skeletons.
+"""Skeletons of arrays: of body models (annex ``body_trees.json``), and of what callers name.
 
 How long bones are is not in it: ``body_models`` finds that in a model file of the user's own, or
 in positions that a data set has.
@@ -7,12 +7,12 @@ in positions that a data set has.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.model.annexes import annex_bytes
 from mcz.model.motion import (
     ORIGIN,
@@ -22,9 +22,11 @@ from mcz.model.motion import (
     VECTOR_KINDS,
     Channel,
     Joint,
+    Motion,
     Skeleton,
 )
 from mcz.model.types import Items
+from mcz.sources.robots import N_ROOT, robot_layouts, with_robot_layout
 
 ANNEX = "body_trees.json"
 METER_CM = 100.0
@@ -116,3 +118,67 @@ def body_skeleton(
 
 
 skeleton_of = body_skeleton
+
+
+KINDS = {
+    "positions": ("tx", "ty", "tz"),
+    "rotation-vectors": ("vx", "vy", "vz"),
+    "quaternions-wxyz": ("qw", "qx", "qy", "qz"),
+    "quaternions-xyzw": ("qx", "qy", "qz", "qw"),
+}
+
+
+def kinds_of(name: str) -> tuple[str, ...]:
+    """The channel kinds of a joint, () of a robot; raises OptionError for an unknown name."""
+    if name not in KINDS and name not in robot_layouts():
+        raise OptionError(f"arrays {name!r}: one of {', '.join((*KINDS, *robot_layouts()))}")
+    return KINDS.get(name, ())
+
+
+def with_kinds(motion: Motion, name: str) -> Motion:
+    """``motion``, one of plain numbers, as joints of what ``name`` says, named by their number.
+
+    A robot layout names the columns of tables, too.
+
+    A motion of anything else is returned as it is. Raises OptionError for an unknown name, and
+    MotionError where the numbers of a frame are no such joints.
+    """
+    kinds = kinds_of(name)
+    source, skeleton = motion.source, motion.skeleton
+    if source is None or source.format not in ("npy", "npz", "csv"):
+        return motion
+    if any(channel.kind for channel in skeleton.channels):
+        return motion
+    if not kinds:
+        return _as_robot(motion, name)
+    if source.format == "csv":
+        return motion
+    n_joints, rest = divmod(skeleton.n_channels, len(kinds))
+    odd = {len(joint.channels) for joint in skeleton.joints} - {1, len(kinds)}
+    if rest or odd:
+        each = odd.pop() if odd else skeleton.n_channels
+        raise MotionError(f"{name} are {len(kinds)} numbers a joint, but there are {each}")
+    channels = tuple(map(Channel, kinds))
+    joints = tuple(Joint(str(number), channels=channels) for number in range(n_joints))
+    angle_unit = "rad" if name == "rotation-vectors" else skeleton.angle_unit
+    named = Skeleton(
+        joints,
+        skeleton.name,
+        unit_cm=skeleton.unit_cm,
+        angle_unit=angle_unit,
+        up_axis=skeleton.up_axis,
+        forward_axis=skeleton.forward_axis,
+        handedness=skeleton.handedness,
+    )
+    return replace(motion, skeleton=named)
+
+
+def _as_robot(motion: Motion, name: str) -> Motion:
+    robot = with_robot_layout(motion, name)
+    if robot is None:
+        n = len(robot_layouts()[name].joints)
+        raise MotionError(
+            f"{name} are {n} columns, or {n + N_ROOT} with the root, "
+            f"but there are {motion.skeleton.n_channels}"
+        )
+    return robot

@@ -5,16 +5,26 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import mcz
+from mcz.bench import peers, sweep
+from mcz.bench.cases import find_cases, named, variants_of
 from mcz.bench.sweep import ClipResult, Curve
-from mcz.show.pictures.themes import THEMES, Theme, theme_of
+from mcz.bench.tables import Table
+from mcz.bench.tasks import Runner
+from mcz.model.types import JsonObject
+from mcz.show.pictures.canvases import THEMES, Theme, theme_of
+from mcz.show.pictures.charts import ChartPage, Sheet, data_uri
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+
 
 Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, says what it drew
 
@@ -32,7 +42,7 @@ def can_draw() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def drawn(figures: Iterable[Figures], folder: Path, theme: str) -> list[Path]:
+def draw_all(figures: Iterable[Figures], folder: Path, theme: str) -> list[Path]:
     """Draw all ``figures`` into a folder, in the colors of a theme, "light" or "dark"."""
     from matplotlib import rc_context
 
@@ -186,3 +196,72 @@ def _label_points(axes: Axes, curve: Curve, key: str, published: bool) -> None:
                 fontsize=6.5,
                 alpha=0.8,
             )
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Outcome of a run: clips that were swept, tables, plots and remarks."""
+
+    clips: list[ClipResult] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    figures: list[Figures] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def document(self) -> JsonObject:
+        return {
+            "mcz": mcz.__version__,
+            "clips": [clip.document() for clip in self.clips],
+            "tables": [table.document() for table in self.tables],
+            "notes": self.notes,
+        }
+
+    def markdown(self, plots: Sequence[str]) -> Iterator[str]:
+        yield "# Codecs compared"
+        yield ""
+        yield f"By mcz {mcz.__version__}; its SPEC.md defines sizes, ratios and metrics."
+        yield ""
+        for note in self.notes:
+            yield f"- {note}"
+        if self.notes:
+            yield ""
+        for plot in plots:
+            yield f"![{plot}]({plot})"
+            yield ""
+        for table in self.tables:
+            yield from table.markdown()
+
+    def page(self, plots: Sequence[tuple[Path, Path]]) -> bytes:
+        """One page with all tables and the ``plots``, on light and on dark ground; UTF-8."""
+        known = f"By mcz {mcz.__version__}; its SPEC.md defines sizes, ratios and metrics."
+        page = ChartPage("Codecs compared", [known, *self.notes])
+        for pair in plots:
+            light, dark = (data_uri(plot.read_bytes(), "png") for plot in pair)
+            page.add_picture(pair[0].stem, light, dark)
+        for table in self.tables:
+            page.add_table(Sheet(table.title, table.cells(), table.right, table.caption))
+        return page.html()
+
+
+def bench(
+    paths: Sequence[str],
+    runner: Runner,
+    *,
+    codecs: Sequence[str] = (),
+    with_peers: bool = False,
+    speeds: bool = True,
+    unit: str | None = None,
+) -> Outcome:
+    """Measure the clips of ``paths``; raises OptionError for an unknown codec or no clip at all."""
+    variants = variants_of(codecs)
+    cases = named(find_cases(paths, unit))
+    asked = peers.installed() if with_peers else ()
+    clips = sweep.measured(runner, cases, variants, speeds=speeds, peers=asked)
+    outcome = Outcome(clips, figures=[partial(draw, clips)])
+    for clip in clips:
+        outcome.tables.extend(sweep.tables(clip))
+        outcome.notes.extend(
+            f"{clip.name}, {curve.label}: {curve.error}" for curve in clip.curves if curve.error
+        )
+    if with_peers and peers.missing():
+        outcome.notes.append(f"peers that are not installed: {', '.join(peers.missing())}")
+    return outcome

@@ -1,0 +1,305 @@
+"""``mcz pack``: a folder of motion files to one .mcz file."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mcz.cli.archive_summary import print_file_results
+from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.hints import hinted
+from mcz.cli.options import (
+    check_force_rate,
+    clips_option,
+    copies_option,
+    decoded_option,
+    encoding_options,
+    force_option,
+    force_rate_option,
+    jobs_option,
+    json_option,
+    key_error_option,
+    rate_option,
+    salvage_option,
+    skeleton_option,
+    threads_option,
+    unit_option,
+    where_option,
+)
+from mcz.cli.outputs import TARGETS, file_in
+from mcz.cli.terminal import Progress
+
+if TYPE_CHECKING:
+    from mcz.files.editing.batch_report import Report
+
+
+@click.command(short_help="Pack a folder of motion files into one .mcz.")
+@click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
+@encoding_options
+@rate_option()
+@force_rate_option
+@click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
+@click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="Read and encode on the machines of this Dask scheduler; DIR and OUT.mcz may be URLs.",
+)
+@click.option(
+    "--mtimes",
+    is_flag=True,
+    help="Keep the time of last change of each file; unpack --mtimes sets it.",
+)
+@copies_option("yes")
+@force_option
+@threads_option
+@jobs_option
+@json_option
+def pack_command(
+    folder: str,
+    target: str,
+    keep_all: bool,
+    scheduler: str | None,
+    mtimes: bool,
+    copies: bool | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> Exit:
+    """Pack every motion file below DIR into OUT.mcz, skeletons that are shared only once.
+
+    A file that cannot be parsed is left out, listed at the end, and makes the exit code 1;
+    --verbatim keeps it as an attachment instead.
+    """
+    check_force_rate(options)
+    if scheduler is not None and mtimes:
+        raise Failure("--mtimes are not kept with --scheduler", Exit.USAGE)
+    if "://" not in folder:
+        if Path(folder).is_file():
+            raise Failure(f"is a file: mcz encode {shlex.quote(folder)}", Exit.USAGE, path=folder)
+        target = file_in(target, str(Path(folder).resolve()) + ".mcz")
+    if mtimes:
+        options["mtimes"] = True
+    with about(folder), Progress() as progress:
+        report = _packing(scheduler)(
+            folder,
+            target,
+            keep_all=keep_all,
+            copies=copies is not False,
+            force=force,
+            progress=progress,
+            **options,
+        )
+    return print_file_results(report, target, as_json)
+
+
+def _packing(scheduler: str | None) -> Callable[..., Report]:
+    """The ``pack`` function: local, or on a Dask scheduler."""
+    if scheduler is None:
+        from mcz.files.editing.archive import pack
+
+        return pack
+    from mcz.files.dask import pack as pack_there
+
+    return partial(pack_there, client=scheduler)
+
+
+@click.command(short_help="Add files to an .mcz.")
+@click.argument(
+    "sources", metavar="SRC...", nargs=-1, required=True, type=click.Path(readable=False)
+)
+@click.argument("target", metavar="FILE.mcz", type=click.Path(readable=False))
+@skeleton_option("The ASF of the AMCs, or none.")
+@click.option(
+    "--root",
+    metavar="DIR",
+    type=click.Path(readable=False),
+    help="Store paths relative to DIR. Default: names without folders.",
+)
+@click.option(
+    "--salvage", is_flag=True, help="Keep whole clips at the end of a file that was cut short."
+)
+@click.option(
+    "--force", is_flag=True, help="Drop whole clips at the end of a file that was cut short."
+)
+@click.option(
+    "--rename",
+    is_flag=True,
+    help="Put clips of an .mcz whose name is taken below the name of their file.",
+)
+@click.option(
+    "--skip-identical",
+    is_flag=True,
+    help="Skip clips of an .mcz that are here already, the same under the same name.",
+)
+@click.option("--replace", is_flag=True, help="Replace a file of the same path; rewrites FILE.mcz.")
+@copies_option("where the file has some")
+@encoding_options
+@rate_option()
+@force_rate_option
+@threads_option
+@jobs_option
+@json_option
+def append_command(
+    sources: tuple[str, ...],
+    target: str,
+    skeleton: str | None,
+    root: str | None,
+    salvage: bool,
+    force: bool,
+    rename: bool,
+    skip_identical: bool,
+    replace: bool,
+    copies: bool | None,
+    as_json: bool,
+    **options: Any,
+) -> Exit:
+    """Append SRC... to FILE.mcz; when one of them cannot be added, none is.
+
+    SRC is a motion file, a folder of such files, or an .mcz, of which all is carried over as it is.
+
+    What the file held stays readable at every moment, even if the computer stops in between. After
+    that, the next append takes the file up from its last end; whole clips behind it are named, and
+    --salvage or --force must say what becomes of them.
+    """
+    import mcz
+
+    for path in (*sources, target):
+        if path == target or not Path(path).is_dir():
+            existing(path)
+    check_force_rate(options)
+    if salvage and force:
+        raise Failure("--salvage keeps what --force drops; choose one", Exit.USAGE)
+    if "-" in sources:
+        raise Failure("append reads files, not standard input", Exit.USAGE)
+    with about(target), Progress() as progress:
+        report = mcz.append(
+            sources,
+            target,
+            skeleton=skeleton,
+            root=root,
+            salvage=salvage,
+            force=force,
+            rename=rename,
+            skip_identical=skip_identical,
+            replace=replace,
+            copies=copies,
+            progress=progress,
+            **{key: value for key, value in options.items() if key != "profile"},
+        )
+    return print_file_results(report, target, as_json)
+
+
+@click.command(short_help="Restore every source file of an .mcz.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@clips_option
+@where_option
+@salvage_option
+@click.option(
+    "--names",
+    type=click.Choice(("stored", "portable", "strict")),
+    default="stored",
+    show_default=True,
+    help="Treat names that some systems cannot hold, or not beside another: write them as stored "
+    "if this system can, write portable ones instead, or refuse them.",
+)
+@click.option("--mtimes", is_flag=True, help="Set files to the time in their clips' metadata.")
+@decoded_option
+@force_option
+@threads_option
+@jobs_option
+@json_option
+def unpack_command(
+    file: str,
+    folder: str,
+    clips: tuple[str, ...],
+    where: str | None,
+    names: str,
+    mtimes: bool,
+    salvage: bool,
+    max_decoded: int | None,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
+
+    With --clip or --where those of the clips alone, with their skeletons. No link that lies in DIR
+    is followed, and no file replaces another of FILE.mcz. With --salvage those of a damaged file
+    that are whole are written; each is checked as in a sound one.
+    """
+    import mcz
+
+    existing(file)
+    with about(file), hinted(file, {"salvage": salvage}), Progress() as progress:
+        report = mcz.unpack(
+            file,
+            folder,
+            clips=clips or None,
+            where=where,
+            salvage=salvage,
+            force=force,
+            names=names,
+            mtimes=mtimes,
+            max_decoded=max_decoded,
+            progress=progress,
+        )
+    return print_file_results(report, folder, as_json)
+
+
+@click.command(short_help="Write every clip in another format: NPZ, CSV, BVH, AMC, C3D, GLB, USD.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@click.option("--to", "target", type=click.Choice(TARGETS), required=True, help="Set the format.")
+@clips_option
+@where_option
+@rate_option()
+@unit_option("Length unit of clips that say none.")
+@key_error_option
+@decoded_option
+@force_option
+@threads_option
+@jobs_option
+@json_option
+def export_command(
+    file: str,
+    folder: str,
+    target: str,
+    clips: tuple[str, ...],
+    where: str | None,
+    rate: Fraction | None,
+    unit: str | None,
+    key_error: float | None,
+    max_decoded: int | None,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Write every clip of FILE.mcz below DIR under its name, as numbers or as another format.
+
+    What a format cannot hold fails with the reason, and the other clips are written all the same.
+    With an AMC comes its ASF. mcz unpack gives the original files.
+    """
+    import mcz
+
+    existing(file)
+    with about(file), Progress() as progress:
+        report = mcz.export(
+            file,
+            folder,
+            target,
+            clips=clips or None,
+            where=where,
+            rate=rate,
+            unit=unit,
+            key_error_mm=key_error,
+            force=force,
+            max_decoded=max_decoded,
+            progress=progress,
+        )
+    return print_file_results(report, folder, as_json)
