@@ -125,7 +125,7 @@ def test_a_wheel_has_the_page_unless_told(
     for name in ("pyproject.toml", "README.md", "LICENSE", "tools/build_hook.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / "mcz" / "viewing", tmp_path / "mcz" / "viewing")
+    shutil.copytree(ROOT / "mcz" / "show" / "viewing", tmp_path / "mcz" / "show" / "viewing")
     for name in ("__init__.py", "errors.py"):
         (tmp_path / "mcz" / name).write_bytes((ROOT / "mcz" / name).read_bytes())
     if has_page:
@@ -154,7 +154,7 @@ def test_a_wheel_has_the_page_unless_told(
 def test_an_installed_page_is_found(tmp_path: Path) -> None:
     """An unpacked wheel has its page, without the repository around it."""
     shutil.copytree(ROOT / "mcz", tmp_path / "mcz", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(PAGE, tmp_path / "mcz" / "viewing" / "viewer.html")
+    shutil.copy(PAGE, tmp_path / "mcz" / "show" / "viewing" / "viewer.html")
     code = "from mcz.show.viewing.page import page; print(page().policy)"
     environment = {k: v for k, v in os.environ.items() if k != "MCZ_VIEWER_PAGE"}
     done = subprocess.run(
