@@ -37,7 +37,7 @@ class Only(MetaPathFinder):
         return found
 
 
-def chosen(most: int) -> list[str]:
+def choose_vectors(most: int) -> list[str]:
     """The smallest vectors of each first codec and group, and of those with sources."""
     from tests.broken import answers
 
@@ -55,7 +55,7 @@ def chosen(most: int) -> list[str]:
 def decode_vectors(most: int) -> int:
     from tests.broken import answers
 
-    names = chosen(most) if most else sorted(answers.vectors())
+    names = choose_vectors(most) if most else sorted(answers.vectors())
     faults = {name: answers.fault(answers.vectors()[name]) for name in names}
     wrong = {name: fault for name, fault in faults.items() if fault}
     assert not wrong, wrong

@@ -18,7 +18,7 @@ PYPROJECT = Path(__file__).parents[1] / "pyproject.toml"
 MODULES = {"PyWavelets": "pywt"}  # packages whose module has another name
 
 
-def required() -> set[str]:
+def required_modules() -> set[str]:
     """The modules that ``pip install mcz`` brings."""
     rows = tomllib.loads(PYPROJECT.read_text("utf-8"))["project"]["dependencies"]
     names = [re.match(r"[\w-]+", row)[0] for row in rows]  # type: ignore[index]
@@ -26,7 +26,7 @@ def required() -> set[str]:
 
 
 def main(program: str, *arguments: str) -> int:
-    allowed = OWN | required()
+    allowed = OWN | required_modules()
     sys.meta_path[:] = [Only(finder, allowed) for finder in sys.meta_path]
     if program not in ("mcz", "mcz-info"):
         runpy.run_path(program, run_name="__main__")

@@ -31,7 +31,7 @@ from mcz.codecs.coding.forms.products import DEGREE, of_products
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources.sample import bvh_walk
 from mcz.sources.text import bvh
-from tests.codecs.lossy import markers, rough, saved
+from tests.codecs.lossy import encode_file, markers, rough
 from tests.motions import smooth
 
 VECTORS = Path(__file__).parents[1] / "conformance" / "vectors" / "valid"
@@ -56,7 +56,7 @@ def twin(function: Callable[..., Any]) -> Callable[..., Any]:
         calls[name] += 1
         if calls[name].bit_count() > 1 or spent[name] > SECONDS:  # the 1st, 2nd, 4th, 8th, ...
             return compiled(*arguments)
-        copies = tuple(map(copied, arguments))
+        copies = tuple(map(copy_value, arguments))
         answer = compiled(*arguments)
         start = time.process_time()
         plain.runs = True
@@ -74,11 +74,11 @@ def twin(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def copied(value: Any) -> Any:
+def copy_value(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return np.array(value, order="K")
     if isinstance(value, tuple):
-        items = list(map(copied, value))
+        items = list(map(copy_value, value))
         return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
     return value
 
@@ -130,7 +130,7 @@ def encode_clips() -> None:
         for motion in clips:
             for options in OPTIONS.get(codec.name, ({},)):
                 try:
-                    data = saved(codec.name, motion, **options)
+                    data = encode_file(codec.name, motion, **options)
                 except mcz.MczError:  # some take no gaps, or markers alone
                     continue
                 with mcz.open(data) as file:
@@ -156,7 +156,7 @@ def encode_noise() -> None:
 
 def save_channel(values: Any, grid: Grid) -> None:
     skeleton = Skeleton((Joint("plate", channels=(Channel("", "force", "V"),)),))
-    saved("fast", Motion(skeleton, (Signal(values[:, None], (grid,)),)))
+    encode_file("fast", Motion(skeleton, (Signal(values[:, None], (grid,)),)))
 
 
 def print_numbers() -> None:
@@ -170,7 +170,7 @@ def encode_walk() -> None:
     """The sample as its codec for poses takes it, and the rest that kernels do with poses."""
     walk = bvh_walk().cut(0, 24)
     walk = replace(walk, skeleton=replace(walk.skeleton, unit_cm=1.0))
-    data = saved("posewave", walk)
+    data = encode_file("posewave", walk)
     with mcz.open(data) as file:
         file.only_clip().read()
     mcz.positions(walk)

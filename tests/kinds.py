@@ -35,16 +35,18 @@ def acclaim(folder: Path) -> bytes:
     return target.read_bytes()
 
 
-def described(folder: Path) -> bytes:
+def write_described(folder: Path) -> bytes:
     target = folder / "described.mcz"
-    target.write_bytes(encoded("walk.c3d", effort="best", params={"segment_frames": 60})(folder))
+    target.write_bytes(
+        encode_sample("walk.c3d", effort="best", params={"segment_frames": 60})(folder)
+    )
     mcz.set_metadata(target, {"walk": {"subject": "7"}})
     return target.read_bytes()
 
 
-def protected(folder: Path) -> bytes:
+def write_protected(folder: Path) -> bytes:
     target = folder / "protected.mcz"
-    target.write_bytes(encoded("walk.bvh")(folder))
+    target.write_bytes(encode_sample("walk.bvh")(folder))
     mcz.protect(target, 0.1)
     return target.read_bytes()
 
@@ -52,16 +54,16 @@ def protected(folder: Path) -> bytes:
 def table(folder: Path) -> bytes:
     rows = "".join(f"{row},{row / 4},{row * row}\n" for row in range(200))
     (folder / "table.csv").write_text("frame,a,b\n" + rows)
-    return encoded("table.csv", effort="fast", rate=100)(folder)
+    return encode_sample("table.csv", effort="fast", rate=100)(folder)
 
 
 def arrays(folder: Path) -> bytes:
     angles = np.round(np.random.default_rng(3).normal(size=(60, 12)), 3)
     np.savez(folder / "arrays.npz", poses=angles, trans=np.arange(60))
-    return encoded("arrays.npz", rate=30)(folder)
+    return encode_sample("arrays.npz", rate=30)(folder)
 
 
-def encoded(name: str, **options: Any) -> Callable[[Path], bytes]:
+def encode_sample(name: str, **options: Any) -> Callable[[Path], bytes]:
     def make(folder: Path) -> bytes:
         target = folder / f"{name}.mcz"
         mcz.encode(folder / name, target, force=True, **options)
@@ -71,16 +73,16 @@ def encoded(name: str, **options: Any) -> Callable[[Path], bytes]:
 
 
 KINDS: dict[str, Callable[[Path], bytes]] = {
-    "bvh-fast": encoded("walk.bvh", params={"segment_frames": 60}),
+    "bvh-fast": encode_sample("walk.bvh", params={"segment_frames": 60}),
     "acclaim": acclaim,
-    "c3d-best": described,
-    "posewave": encoded("walk.bvh", codec="posewave", unit="cm"),
-    "mrdwt": encoded("walk.bvh", codec="mrdwt", params={"segment_frames": 50}),
-    "mdtt-archive": encoded("walk.c3d", codec="mdtt", profile="large"),
+    "c3d-best": write_described,
+    "posewave": encode_sample("walk.bvh", codec="posewave", unit="cm"),
+    "mrdwt": encode_sample("walk.bvh", codec="mrdwt", params={"segment_frames": 50}),
+    "mdtt-archive": encode_sample("walk.c3d", codec="mdtt", profile="large"),
     "live": live,
     "csv-normal": table,
     "npz": arrays,
-    "protected": protected,
+    "protected": write_protected,
 }
 
 
@@ -127,7 +129,7 @@ def origin(name: str, whole: Values) -> tuple[str, int]:
     return of, int(span or 0)
 
 
-def kept(repaired: bytes, whole: Values) -> int:
+def count_kept_values(repaired: bytes, whole: Values) -> int:
     """Count the values of a repaired file, each of which must be as it was."""
     count = 0
     for name, signals in values_of(repaired).items():

@@ -20,13 +20,13 @@ ID = 252
 HEADER = b"stairs"
 
 
-def _packed(steps):
+def _pack_steps(steps):
     if not steps.any():
         return b""
     return b"".join(varint(2 * n if n >= 0 else -2 * n - 1) for n in steps.ravel().tolist())
 
 
-def _unpacked(stream, n_frames, n_channels):
+def _unpack_steps(stream, n_frames, n_channels):
     if not stream:
         return np.zeros((n_frames, n_channels), np.int64)
     at, found = 0, []
@@ -57,7 +57,7 @@ class Encoder(LiveEncoder):
         steps = indices if fresh else indices - self.last
         self.last = indices
         self.at += 1
-        return _packed(steps), fresh
+        return _pack_steps(steps), fresh
 
     def change(self, options):
         raise OptionError("stairs: nothing changes")
@@ -71,7 +71,7 @@ class Decoder:
         self.n_channels = layout.n_channels
 
     def push(self, stream, fresh):
-        steps = _unpacked(stream, 1, self.n_channels)[0]
+        steps = _unpack_steps(stream, 1, self.n_channels)[0]
         if fresh:
             self.last = np.zeros(self.n_channels, np.int64)
         if self.last is None:

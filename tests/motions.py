@@ -73,16 +73,16 @@ def rich(n_frames: int = 40) -> Motion:
     )
 
 
-def written(motion: Motion, *codec: str, **params: Any) -> bytes:
+def write_bytes(motion: Motion, *codec: str, **params: Any) -> bytes:
     """The file that ``mcz.write`` makes."""
     out = io.BytesIO()
     mcz.write(motion, out, *codec, **params)
     return out.getvalue()
 
 
-def stored(motion: Motion, **params: Any) -> Motion:
+def write_and_read(motion: Motion, **params: Any) -> Motion:
     """``motion`` after a file."""
-    with mcz.open(written(motion, **params)) as file:
+    with mcz.open(write_bytes(motion, **params)) as file:
         return file.only_clip().motion()
 
 

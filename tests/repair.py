@@ -29,12 +29,12 @@ def parts_of(data: bytes) -> Parts:
     return [(piece, piece.payload) for piece in pieces]
 
 
-def joined(parts: Parts) -> bytes:
+def join_parts(parts: Parts) -> bytes:
     """The file of these chunks, without an index."""
     return repair.joined([*(replace(piece, payload=data) for piece, data in parts), Piece(b"FOOT")])
 
 
-def replaced(parts: Parts, which: int, payload: bytes) -> Parts:
+def replace_payload(parts: Parts, which: int, payload: bytes) -> Parts:
     """``parts`` with one payload exchanged, its table_crc and the ids that name it put right."""
     piece, old = parts[which]
     if piece.type == b"DATA":
@@ -67,13 +67,13 @@ def with_packets(data: bytes, change: Callable[[Packet], Packet]) -> bytes:
     for chunk in scan(source).chunks:
         if chunk.length is None:
             found = list(packets(source, chunk))
-            changed = implying([change(event.packet) for event in found[:-1]])
+            changed = imply_frames([change(event.packet) for event in found[:-1]])
             out += data[at : chunk.payload_offset] + b"".join(map(build_packet, changed))
             at = found[-1].offset
     return out + data[at : FOOT.unpack(data[-FOOT.size :])[2]] + build_foot(0, 0)
 
 
-def implying(packets: Iterable[Packet]) -> list[Packet]:
+def imply_frames(packets: Iterable[Packet]) -> list[Packet]:
     """The packets of an open DATA, those of kind 2 with what they imply."""
     due, mask, found = 0, b"", []
     for packet in packets:
@@ -126,7 +126,7 @@ def flips(size: int, at_most: int, seed: int) -> Iterator[tuple[int, int]]:
     return ((n // 8, n % 8) for n in chosen)
 
 
-def flipped(data: bytes, byte: int, bit: int) -> bytes:
+def flip_bit(data: bytes, byte: int, bit: int) -> bytes:
     changed = bytearray(data)
     changed[byte] ^= 1 << bit
     return bytes(changed)

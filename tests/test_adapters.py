@@ -342,7 +342,7 @@ def test_movement_takes_it_for_its_own(samples: Path, tmp_path: Path) -> None:
 # rerun ----------------------------------------------------------------------------------
 
 
-def logged(path: Path) -> dict[str, list[Any]]:
+def read_log(path: Path) -> dict[str, list[Any]]:
     """By the path of each entity, the chunks of an .rrd as rerun reads it."""
     from rerun.chunk import RrdReader
 
@@ -381,7 +381,7 @@ def test_rerun_has_the_points(samples: Path, take: Path, name: str) -> None:
     motion = mcz.read(samples / name, **facts)
     words = [word for key, fact in facts.items() for word in (f"--{key}", fact)]
     assert view(samples / name, "-o", take, *words) == 0
-    found = logged(take)
+    found = read_log(take)
     points, names = mcz.positions(motion, unit="m"), mcz.point_names(motion)
     clip = (
         "/walk"
@@ -389,7 +389,7 @@ def test_rerun_has_the_points(samples: Path, take: Path, name: str) -> None:
         else next(p for p in found if "/points/" in p).split("/points")[0]
     )
     for point, of in enumerate(names):
-        places = columns(found[f"{clip}/points/{escaped(of)}"], ":positions")
+        places = columns(found[f"{clip}/points/{escape_name(of)}"], ":positions")
         assert list(places) == list(range(1, 241))
         for frame, place in places.items():
             wanted = points[frame - 1, point]
@@ -402,7 +402,7 @@ def test_rerun_has_the_points(samples: Path, take: Path, name: str) -> None:
         assert len(columns(found[f"{clip}/residuals/LFHD"], ":scalars")) == 240
 
 
-def escaped(name: str) -> str:
+def escape_name(name: str) -> str:
     import rerun
 
     return str(rerun.new_entity_path([name])).removeprefix("/")
@@ -428,7 +428,7 @@ def test_rerun_has_samples_between_frames(take: Path, monkeypatch: pytest.Monkey
     recording.save(take)
     assert mcz.to_rerun(motion, recording, entity="day 1/take") is recording
     recording.disconnect()
-    found = logged(take)
+    found = read_log(take)
     values, times = [], []
     for chunk in found["/day\\ 1/take/analog/b\\/c"]:
         rows = chunk.to_record_batch().to_pydict()
@@ -450,16 +450,16 @@ def test_view_logs_several_clips(samples: Path, take: Path, capsys: Any) -> None
     assert view(archive, samples / "walk.bvh", "-o", take, "--json") == 0
     shown = capsys.readouterr().out
     assert '"n_frames": 240' in shown
-    found = logged(take)
+    found = read_log(take)
     assert any(path.startswith("/all.mcz/walk.c3d/points") for path in found)
     assert any(path.startswith("/walk.bvh/walk/points") for path in found)
     assert view(archive, "-o", take) == 2  # it exists
     assert view(archive, "-o", take, "--force", "--codec", "fast") == 2
     assert view(archive, "--rerun", "-o", take.with_suffix(".html")) == 2
     assert view(archive, "-o", take, "--force", "--clip", "nothing") == 2
-    assert logged(take).keys() == found.keys()  # a failure leaves what was there
+    assert read_log(take).keys() == found.keys()  # a failure leaves what was there
     assert view(archive, "-o", take, "--force", "--clip", "walk.c3d") == 0
-    assert any(path.startswith("/walk.c3d/points") for path in logged(take))
+    assert any(path.startswith("/walk.c3d/points") for path in read_log(take))
 
 
 def test_the_viewer_of_rerun_needs_a_screen(

@@ -22,7 +22,7 @@ from mcz.files.editing.stored_files import stored_files
 from mcz.files.editing.unpacking import safe_path
 from mcz.model.motion import joint_columns
 from tests.clocked_files import bvh
-from tests.web_server import Server, served
+from tests.web_server import Server, serve
 
 VECTORS = Path(conformance.__file__).parent / "vectors" / "valid"
 
@@ -198,7 +198,7 @@ def test_remote_archive_costs_few_requests(samples: Path) -> None:
     with fsspec.open("memory://archive.mcz", "wb") as stream:
         stream.write(out.getvalue())
     server = Server(out.getvalue())
-    with served(server):
+    with serve(server):
         for address in ("memory://archive.mcz", server.address):
             a_part_costs_little(address, motion)
     assert len(server.asked) <= 4

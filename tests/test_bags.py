@@ -27,7 +27,7 @@ def archive(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def made(archive: Path, tmp_path: Path) -> Path:
+def bag_path(archive: Path, tmp_path: Path) -> Path:
     (tmp_path / "report.txt").write_text("fine\n")
     return mcz.bag([archive, tmp_path / "report.txt"], tmp_path / "bag", DATE)
 
@@ -51,42 +51,42 @@ def files_of(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_a_bag_is_one_for_others(made: Path, archive: Path) -> None:
-    assert is_valid(made)
-    found = mcz.check_bag(made)
+def test_a_bag_is_one_for_others(bag_path: Path, archive: Path) -> None:
+    assert is_valid(bag_path)
+    found = mcz.check_bag(bag_path)
     assert found.problems == []
     assert (found.version, found.algorithms) == ("1.0", ["sha256", "sha512"])
     assert found.files == ["data/Väsa 100.mcz", "data/report.txt"]
-    assert (made / "data" / archive.name).read_bytes() == archive.read_bytes()
+    assert (bag_path / "data" / archive.name).read_bytes() == archive.read_bytes()
     info = dict(found.info)
     assert info["Payload-Oxum"] == f"{archive.stat().st_size + 5}.2"
     assert info["Bagging-Date"] == "2026-11-24"
 
 
-def test_the_same_files_make_the_same_bag(made: Path, archive: Path, tmp_path: Path) -> None:
+def test_the_same_files_make_the_same_bag(bag_path: Path, archive: Path, tmp_path: Path) -> None:
     again = mcz.bag([tmp_path / "report.txt", archive], tmp_path / "again", DATE)
-    assert files_of(made) == files_of(again)
+    assert files_of(bag_path) == files_of(again)
 
 
-def test_every_change_is_found(made: Path) -> None:
+def test_every_change_is_found(bag_path: Path) -> None:
     """By us and by others: each file changed, longer, or gone; a file too many."""
-    for name, data in files_of(made).items():
+    for name, data in files_of(bag_path).items():
         for change in (data[:-1] + bytes([data[-1] ^ 1]), data + b"\n ", None):
             if change is None and "manifest" in name:
                 continue  # the others are enough
-            path = made / name
+            path = bag_path / name
             path.unlink() if change is None else path.write_bytes(change)
             try:
-                problems = mcz.check_bag(made).problems
+                problems = mcz.check_bag(bag_path).problems
             except mcz.OptionError:  # no bagit.txt
                 problems = ["no bag"]
             assert problems or name.startswith("tagmanifest"), name  # for which nothing vouches
             path.write_bytes(data)
-    (made / "data" / "more.mcz").write_bytes(b"")
-    assert "data/more.mcz is not in manifest-sha256.txt" in mcz.check_bag(made).problems
-    assert not is_valid(made)
-    (made / "data" / "more.mcz").unlink()
-    assert mcz.check_bag(made).problems == []
+    (bag_path / "data" / "more.mcz").write_bytes(b"")
+    assert "data/more.mcz is not in manifest-sha256.txt" in mcz.check_bag(bag_path).problems
+    assert not is_valid(bag_path)
+    (bag_path / "data" / "more.mcz").unlink()
+    assert mcz.check_bag(bag_path).problems == []
 
 
 def test_bags_of_others_are_checked(archive: Path, tmp_path: Path) -> None:
@@ -120,10 +120,10 @@ def test_bags_of_others_are_checked(archive: Path, tmp_path: Path) -> None:
         ("bag-info.txt", "Payload-Oxum: 1.1\n", "Payload-Oxum is 1.1"),
     ],
 )
-def test_what_is_no_sound_bag(made: Path, name: str, text: str, said: str) -> None:
-    (made / name).write_text(text)
-    assert any(said in problem for problem in mcz.check_bag(made).problems)
-    assert name == "manifest-crc99.txt" or not is_valid(made) or name == "fetch.txt"
+def test_what_is_no_sound_bag(bag_path: Path, name: str, text: str, said: str) -> None:
+    (bag_path / name).write_text(text)
+    assert any(said in problem for problem in mcz.check_bag(bag_path).problems)
+    assert name == "manifest-crc99.txt" or not is_valid(bag_path) or name == "fetch.txt"
 
 
 def test_what_cannot_be_a_bag(archive: Path, tmp_path: Path, call: Call) -> None:

@@ -27,7 +27,7 @@ def test_nothing_else_is_needed(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found["vectors"] == len(bare.chosen(2)) > 100
+    assert found["vectors"] == len(bare.choose_vectors(2)) > 100
     assert found["loaded"] == ["conformance", "construct", "mcz", "numpy", "tests"]
     assert found["slow"] == []
 
@@ -35,5 +35,7 @@ def test_nothing_else_is_needed(tmp_path: Path) -> None:
 def test_every_codec_is_among_the_vectors() -> None:
     from tests.broken import answers
 
-    codecs = {name for v in bare.chosen(2) for name in answers.vectors()[v].get("codecs", [])}
+    codecs = {
+        name for v in bare.choose_vectors(2) for name in answers.vectors()[v].get("codecs", [])
+    }
     assert {bitstream_name(codec.id) for codec in CODECS.values()} <= codecs

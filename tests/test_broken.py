@@ -10,7 +10,7 @@ import pytest
 from tests.broken import answers, by_hand, find, marks
 from tools import requirements
 
-FOUND = find.found()
+FOUND = find.read_catches()
 PARTS = 8  # of all vectors by which anything is caught
 LONG = [pytest.param(part, marks=pytest.mark.long) for part in range(2, PARTS)]
 RULES = {rule.id: rule for rule in requirements.rules((marks.ROOT / "SPEC.md").read_text("utf-8"))}

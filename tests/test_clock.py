@@ -20,7 +20,7 @@ from mcz.model.clock import Timeline
 from tests.clocked_files import motive, npz, sto, trc, vicon
 from tests.commands import run
 from tests.formats.c3d_files import Made
-from tests.motions import written
+from tests.motions import write_bytes
 
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
 
@@ -31,8 +31,8 @@ def markers(n: int, rate: Fraction | int | None = 100, **facts: object) -> Motio
     return Motion(skeleton, (Signal(values),), rate and Fraction(rate), **facts)  # type: ignore[arg-type]
 
 
-def stored(motion: Motion) -> Motion:
-    with mcz.open(written(motion)) as file:
+def write_and_read(motion: Motion) -> Motion:
+    with mcz.open(write_bytes(motion)) as file:
         clip = file.only_clip()
         np.testing.assert_array_equal(clip.times, clip.motion().times)
         return clip.motion()
@@ -52,7 +52,7 @@ def test_a_signal_of_times_comes_first() -> None:
     motion = markers(4, first_time=9.0)
     motion = replace(motion, signals=(*motion.signals, times_signal([500, 510, 700, 705], "ms")))
     near(motion.times, [0.5, 0.51, 0.7, 0.705])
-    near(stored(motion).times, motion.times)
+    near(write_and_read(motion).times, motion.times)
 
 
 def test_an_unknown_rate_is_an_error_that_says_what_to_do() -> None:
@@ -93,7 +93,7 @@ def test_a_table_has_the_times_that_it_rounds(tmp_path: Path, digits: int) -> No
     meant = (np.array(NUMBERS) - 1) / 120
     assert motion.frame_rate == 120 and motion.first_time is None
     near(motion.times, meant)
-    near(stored(motion).times, meant)
+    near(write_and_read(motion).times, meant)
     line = motion.timeline
     assert line is not None and line.runs == [(0, 16), (16, 26)] and np.isnan(line.steps).any()
     near(np.diff(line.even)[:15], np.full(15, 1 / 120))
@@ -135,7 +135,7 @@ def test_numbers_that_skip_while_times_do_not_have_a_signal(tmp_path: Path) -> N
     motion = mcz.read(tmp_path / "w.trc")
     assert motion.frame_rate == 50 and motion.frame_numbers is not None
     assert [signal.role for signal in motion.signals[1:]] == ["times"]
-    near(stored(motion).times, np.arange(9) / 50)
+    near(write_and_read(motion).times, np.arange(9) / 50)
 
 
 @pytest.mark.parametrize("numbers", [[1, 1, 2, 3], [7] * 4, [9, 8, 7, 6], [5, 6, 1, 2]])
@@ -162,7 +162,7 @@ def test_the_clock_outlives_the_source(tmp_path: Path) -> None:
         mcz.rename(motion, {"RASI": "B"}),
         mcz.convert(motion, "c3d"),
         mcz.post_filter(motion),
-        stored(motion.without_source()),
+        write_and_read(motion.without_source()),
     ):
         assert np.abs(made.times - motion.times).max() <= 1e-6
         assert made.frame_numbers is not None and made.frame_numbers.tolist() == NUMBERS
@@ -176,7 +176,7 @@ def test_a_decimated_clip_keeps_its_times(tmp_path: Path) -> None:
         clip = file.only_clip()
         thin = clip.motion((3, 60), 1, decimate=True)
         assert np.abs(thin.times - clip.times[3:60:2]).max() <= 1e-6
-        assert np.abs(stored(thin).times - clip.times[3:60:2]).max() <= 1e-6
+        assert np.abs(write_and_read(thin).times - clip.times[3:60:2]).max() <= 1e-6
 
 
 def test_one_missing_frame_is_a_gap_however_few_digits_are_printed() -> None:
@@ -188,7 +188,7 @@ def test_one_missing_frame_is_a_gap_however_few_digits_are_printed() -> None:
     near(Timeline(coarse, Fraction(60), rounding=0.005).steps, np.full(49, 1 / 60))
 
 
-def moving(numbers: list[int], rate: int = 100, **facts: object) -> Motion:
+def accelerating_marker(numbers: list[int], rate: int = 100, **facts: object) -> Motion:
     """One marker that moves at 1 m/s along x and 2 (m/s)/s along y, in mm."""
     seconds = (np.array(numbers) - 1) / rate
     values = np.stack([1000 * seconds, 1000 * seconds**2, 0 * seconds], axis=1)
@@ -200,7 +200,7 @@ GAPPED = [*range(101, 111), *range(300, 310), 400, *range(500, 502)]
 
 
 def test_speeds_take_times_and_no_step_over_a_gap() -> None:
-    motion = moving(GAPPED)
+    motion = accelerating_marker(GAPPED)
     speed = mcz.velocities(motion, unit="m")[:, 0]
     near(np.delete(speed[:, 0], 20), np.ones(22))
     assert np.isnan(speed[20]).all()  # alone between two gaps
@@ -228,14 +228,14 @@ def test_rounded_times_do_not_shake_speeds(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rate", [200, 100, 50, 30])
 def test_resampling_keeps_gaps_and_times(rate: int) -> None:
-    motion = moving(GAPPED)
+    motion = accelerating_marker(GAPPED)
     made = mcz.resample(motion, rate)
     assert np.isfinite(made.values).all()
     near(made.values[:, 0] / 1000, made.times)
     inside = [(1.0, 1.09), (2.99, 3.08), (3.99, 3.99), (4.99, 5.0)]
     wanted = [k for k in range(6 * rate) if any(a <= 1 + k / rate <= b for a, b in inside)]
     near(made.times, 1 + np.array(wanted) / rate)
-    near(stored(made).times, made.times)
+    near(write_and_read(made).times, made.times)
     if rate == 100:
         np.testing.assert_array_equal(made.values, motion.values)
 
@@ -250,13 +250,13 @@ def test_resampling_takes_irregular_times() -> None:
 
 
 def test_resampling_keeps_the_time_of_the_first_frame() -> None:
-    made = mcz.resample(moving(list(range(101, 151))), 37)
+    made = mcz.resample(accelerating_marker(list(range(101, 151))), 37)
     near(made.times[0], 1.0)
     near(mcz.resample(markers(9, first_time=2.5), 33).times[0], 2.5)
 
 
 def test_windows_do_not_span_gaps(tmp_path: Path) -> None:
-    mcz.write(moving(GAPPED), tmp_path / "a.mcz")
+    mcz.write(accelerating_marker(GAPPED), tmp_path / "a.mcz")
     with mcz.open(tmp_path / "a.mcz") as file:
         data = mcz.dataset(file, "positions,velocities", window=5, stride=1, unit="m", dtype="f8")
         assert len(data) == 12
@@ -411,7 +411,7 @@ def in_npz(motion: Motion, folder: Path) -> object:
 
 
 def in_mcz(motion: Motion, folder: Path) -> object:
-    return stored(motion).times
+    return write_and_read(motion).times
 
 
 def in_csv(motion: Motion, folder: Path) -> object:
@@ -503,7 +503,9 @@ def test_a_foot_stands_in_each_part_by_itself() -> None:
 def test_films_last_as_long_as_the_motion(tmp_path: Path) -> None:
     pytest.importorskip("PIL")
     pytest.importorskip("matplotlib")
-    made = mcz.render(moving(GAPPED), tmp_path / "a.gif", fps=10, size=(64, 64), unit="cm", up="y")
+    made = mcz.render(
+        accelerating_marker(GAPPED), tmp_path / "a.gif", fps=10, size=(64, 64), unit="cm", up="y"
+    )
     assert made.n_pictures == 41  # 4.0 s
 
 
@@ -569,7 +571,7 @@ def test_whatever_is_made_of_a_motion_keeps_its_times(samples: Path, start: floa
     motion = replace(walk(samples, WALK), first_time=start)
     for name, made in made_of(motion).items():
         near(made.times, motion.times)
-        near(stored(made).times, motion.times)
+        near(write_and_read(made).times, motion.times)
         assert made.frame_rate == motion.frame_rate, name
 
 
@@ -598,8 +600,8 @@ def test_times_outlive_parts_files_and_steps(
     for stop in (1, len(numbers)):
         part = motion[stop // 2 : stop]
         np.testing.assert_allclose(part.times, wanted[stop // 2 : stop], **exact)  # type: ignore[arg-type]
-        np.testing.assert_allclose(stored(part).times, wanted[stop // 2 : stop], **exact)  # type: ignore[arg-type]
-        np.testing.assert_allclose(stored(part.without_source()).times, part.times, **exact)  # type: ignore[arg-type]
+        np.testing.assert_allclose(write_and_read(part).times, wanted[stop // 2 : stop], **exact)  # type: ignore[arg-type]
+        np.testing.assert_allclose(write_and_read(part.without_source()).times, part.times, **exact)  # type: ignore[arg-type]
 
 
 @given(st.lists(st.floats(0, 10, allow_subnormal=False), min_size=1, max_size=8))
@@ -609,7 +611,7 @@ def test_any_rising_times_outlive_their_signal(times: list[float]) -> None:
         motion = markers(len(times), rate)  # type: ignore[arg-type]
         kept = motion.at_times(Timeline(np.array(times), rate))
         near(kept.times, times)
-        near(stored(kept).times, times)
+        near(write_and_read(kept).times, times)
 
 
 @pytest.mark.parametrize("rate", [Fraction(10) ** 300, Fraction(1, 10**300)])
@@ -624,7 +626,7 @@ def test_absurd_rates_and_times_are_answered(rate: Fraction) -> None:
 
 
 def test_a_rate_that_is_told_makes_gaps_of_frame_numbers(tmp_path: Path) -> None:
-    motion = replace(moving(GAPPED), frame_rate=None)
+    motion = replace(accelerating_marker(GAPPED), frame_rate=None)
     mcz.write(motion, tmp_path / "a.mcz")
     fields = {"fields": "velocities", "window": 5, "stride": 1, "unit": "m", "dtype": "f8"}
     data = mcz.dataset(tmp_path / "a.mcz", source_rate=100, **fields)  # type: ignore[arg-type]

@@ -142,7 +142,7 @@ OURS = f"{sys.executable} -m mcz.cli.conformance"
 @pytest.mark.parametrize(("rule", "kind"), [("RAW-03", "wrongly refused"), ("RAW-04", "accepted")])
 def test_runner_catches_a_broken_decoder(rule: str, kind: str) -> None:
     """Through the command; test_broken.py has all rules, without one."""
-    caught = find.found()[rule][0].vector
+    caught = find.read_catches()[rule][0].vector
     command = f"{sys.executable} -m tests.broken {rule}"
     only = ("--only", caught, "--only", "valid/raw/plain")
     code, shown = runner("--decoder", command, "--serve", *only, "--json")

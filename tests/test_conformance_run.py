@@ -49,7 +49,7 @@ def sources_of(*files: tuple[str, bytes]) -> list[dict[str, Any]]:
     ]
 
 
-def told(code: int, **answers: tuple[list[dict[str, Any]], bytes]) -> dict[str, Any]:
+def vector_content(code: int, **answers: tuple[list[dict[str, Any]], bytes]) -> dict[str, Any]:
     """The content of a vector: exit code, and for each kind of request rows and bytes."""
     plain = {
         key: {"rows": [{k: v for k, v in row.items() if k != "sha256"} for row in rows]}
@@ -71,11 +71,11 @@ VECTORS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
             "expected": {"arrays": ARRAYS},
             "parts": [{"arguments": ["--frames", "1:3"], "arrays": PART}],
         },
-        told(0, arrays=(ARRAYS, b"abcdefghi"), frames=(PART, b"bc")),
+        vector_content(0, arrays=(ARRAYS, b"abcdefghi"), frames=(PART, b"bc")),
     ),
     "valid/mrdwt/plain": (
         {"exit": [0], "codecs": ["mrdwt"], "since": "0.9", "expected": {"arrays": PART}},
-        told(0, arrays=(PART, b"bc")),
+        vector_content(0, arrays=(PART, b"bc")),
     ),
     "valid/sources/bvh": (
         {
@@ -84,15 +84,15 @@ VECTORS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
             "modes": ["arrays", "sources"],
             "expected": {"arrays": PART, "sources": sources_of(("walk.bvh", BVH))},
         },
-        told(0, arrays=(PART, b"bc"), sources=(sources_of(("walk.bvh", BVH)), BVH)),
+        vector_content(0, arrays=(PART, b"bc"), sources=(sources_of(("walk.bvh", BVH)), BVH)),
     ),
     "valid/sources/amc": (
         {"exit": [0], "codecs": [], "modes": ["sources"], "expected": {"sources": FILES}},
-        told(0, sources=(FILES, AMC + ASF)),
+        vector_content(0, sources=(FILES, AMC + ASF)),
     ),
     "uncommon/raw/newer": (
         {"exit": [3], "codecs": [], "expected": {"refusal": "unsupported"}},
-        told(3),
+        vector_content(3),
     ),
     "invalid/raw/bad": (
         {
@@ -102,7 +102,7 @@ VECTORS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
             "effect": "silent loss",
             "expected": {"refusal": "invalid"},
         },
-        told(1, arrays=([], b"")),
+        vector_content(1, arrays=([], b"")),
     ),
 }
 
@@ -411,22 +411,22 @@ def test_invalid_sources_need_every_format_unless_stated() -> None:
 # What is asked
 
 
-def named(*patterns: str) -> set[str]:
+def select_names(*patterns: str) -> set[str]:
     rows = manifest.load_manifest()
     return {row["file"].removesuffix(".mcz") for row in select(rows, patterns)}
 
 
 def test_only() -> None:
-    assert named() == set(VECTORS)
-    assert named("valid") == {name for name in VECTORS if name.startswith("valid/")}
-    assert named("raw") == {"valid/raw/plain", "uncommon/raw/newer", "invalid/raw/bad"}
-    assert named("valid/raw") == {"valid/raw/plain"}
-    assert named("RAW-02") == {"valid/raw/plain", "invalid/raw/bad"}
-    assert named("RAW-*1") == {"valid/raw/plain"}
-    assert named("*/plain") == {"valid/raw/plain", "valid/mrdwt/plain"}
-    assert named("sources/a", "mrdwt") == {"valid/sources/amc", "valid/mrdwt/plain"}
+    assert select_names() == set(VECTORS)
+    assert select_names("valid") == {name for name in VECTORS if name.startswith("valid/")}
+    assert select_names("raw") == {"valid/raw/plain", "uncommon/raw/newer", "invalid/raw/bad"}
+    assert select_names("valid/raw") == {"valid/raw/plain"}
+    assert select_names("RAW-02") == {"valid/raw/plain", "invalid/raw/bad"}
+    assert select_names("RAW-*1") == {"valid/raw/plain"}
+    assert select_names("*/plain") == {"valid/raw/plain", "valid/mrdwt/plain"}
+    assert select_names("sources/a", "mrdwt") == {"valid/sources/amc", "valid/mrdwt/plain"}
     with pytest.raises(ValueError, match="'qbc'"):
-        named("mrdwt", "qbc")
+        select_names("mrdwt", "qbc")
 
 
 @pytest.mark.parametrize(
@@ -498,7 +498,7 @@ sys.exit(code)
 """
 
 
-def encoded(folder: Path, edit: str = "", *more: str) -> tuple[int, dict[str, Any]]:
+def run_encoder(folder: Path, edit: str = "", *more: str) -> tuple[int, dict[str, Any]]:
     encoder = script(folder, ENCODER.format(edit=edit, asf=ASF), "encoder.py")
     return result("--decoder", decoder(folder), "--encoder", encoder, *more)
 
@@ -506,7 +506,7 @@ def encoded(folder: Path, edit: str = "", *more: str) -> tuple[int, dict[str, An
 def test_an_honest_encoder(tmp_path: Path) -> None:
     edit = "assert ('--skeleton' in sys.argv) == (name == 'walk.amc')"
     for more in ((), ("--serve",)):
-        code, document = encoded(tmp_path, edit, *more)
+        code, document = run_encoder(tmp_path, edit, *more)
         assert code == 0
         found = {row["source"]: (row["status"], row["fault"]) for row in document["encoder"]}
         assert found == dict.fromkeys(("walk.bvh", "walk.amc", "walk.asf"), ("restored", None))
@@ -528,14 +528,14 @@ WRONG_ENCODERS = {
 @pytest.mark.parametrize("kind", WRONG_ENCODERS)
 def test_wrong_encoders(tmp_path: Path, kind: str) -> None:
     more = ("--only", "sources/bvh", "--timeout", "3" if kind == "hang" else "60")
-    code, document = encoded(tmp_path, WRONG_ENCODERS[kind], *more)
+    code, document = run_encoder(tmp_path, WRONG_ENCODERS[kind], *more)
     assert (code, document["failed"]) == (1, 0)
     (row,) = document["encoder"]
     assert row["status"] == "failed" and row["fault"].startswith(kind)
 
 
 def test_an_encoder_may_decline(tmp_path: Path) -> None:
-    code, document = encoded(tmp_path, "if name != 'walk.bvh': sys.exit(3)")
+    code, document = run_encoder(tmp_path, "if name != 'walk.bvh': sys.exit(3)")
     assert code == 0
     found = {row["source"]: row["status"] for row in document["encoder"]}
     assert found == {"walk.bvh": "restored", "walk.amc": "declined", "walk.asf": "declined"}

@@ -15,7 +15,7 @@ from mcz.container.writer import Writer
 from mcz.errors import FormatError, MotionError, TruncatedError, UnsupportedError
 from mcz.files.writing.clip_writer import write_clip
 from tests.motions import smooth
-from tests.repair import joined, parts_of
+from tests.repair import join_parts, parts_of
 
 
 def test_clips_are_unique() -> None:
@@ -47,7 +47,7 @@ def test_salvage_goes_on_behind_garbage() -> None:
     writer.finish()
     parts = parts_of(out.getvalue())
     second = [i for i, (c, _) in enumerate(parts) if c.type == b"CLIP"][1]
-    head, rest = joined(parts[:second])[: -FOOT.size], joined(parts[second:])[8:]
+    head, rest = join_parts(parts[:second])[: -FOOT.size], join_parts(parts[second:])[8:]
     with mcz.open(head + b"rubbish, not a chunk" * 9 + rest, salvage=True) as file:
         assert list(file.clips) == ["a", "b"]
         for clip in file.clips.values():

@@ -26,7 +26,7 @@ from mcz.files.writing.write_transaction import WriteTransaction
 from mcz.sources import FORMATS
 from mcz.sources.sample import write_samples
 from tests.commands import run
-from tests.motions import smooth, written
+from tests.motions import smooth, write_bytes
 from tests.repair import use
 
 VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def packed(folder: Path) -> bytes:
+def archive_bytes(folder: Path) -> bytes:
     out = io.BytesIO()
     assert not mcz.pack(folder, out, codec="raw").failures
     return out.getvalue()
@@ -52,7 +52,7 @@ def chunks(data: bytes, *kinds: bytes) -> list[Chunk]:
     return [c for c in scan(open_source(data)).chunks if not kinds or c.type in kinds]
 
 
-def changed(data: bytes, *places: int) -> bytes:
+def change_bytes(data: bytes, *places: int) -> bytes:
     bad = bytearray(data)
     for at in places:
         bad[at] ^= 0x10
@@ -78,25 +78,27 @@ def content(data: bytes, *, salvage: bool = False) -> dict[str, object]:
 # Salvage -----------------------------------------------------------------------
 
 
-def test_a_bad_byte_costs_nothing_that_has_a_copy(packed: bytes) -> None:
-    whole = content(packed)
+def test_a_bad_byte_costs_nothing_that_has_a_copy(archive_bytes: bytes) -> None:
+    whole = content(archive_bytes)
     assert len(whole) == 8  # three clips, a signal more, three files, an ASF
-    for chunk in chunks(packed, *COPIED):
+    for chunk in chunks(archive_bytes, *COPIED):
         for at in (0, 9, 16 + (chunk.length or 0) // 2, chunk.size - 1):
-            bad = changed(packed, chunk.offset + at)
+            bad = change_bytes(archive_bytes, chunk.offset + at)
             with mcz.open(bad, salvage=True) as file:
                 assert re.match(f"{chunk.label}: .*; its copy is used", file.damage[0])
                 assert len(file.damage) == 1
             assert content(bad, salvage=True) == whole, (chunk, at)
 
 
-def test_all_of_them_may_be_bad_at_once(packed: bytes) -> None:
-    every = chunks(packed, *COPIED)
-    bad = changed(packed, *(chunk.offset + 18 for chunk in every), *range(8), len(packed) - 9)
+def test_all_of_them_may_be_bad_at_once(archive_bytes: bytes) -> None:
+    every = chunks(archive_bytes, *COPIED)
+    bad = change_bytes(
+        archive_bytes, *(chunk.offset + 18 for chunk in every), *range(8), len(archive_bytes) - 9
+    )
     with mcz.open(bad, salvage=True) as file:
         used = [line for line in file.damage if line.endswith("its copy is used")]
         assert len(used) == len(every)
-    assert content(bad, salvage=True) == content(packed)
+    assert content(bad, salvage=True) == content(archive_bytes)
 
 
 @pytest.mark.parametrize("codec", ["fast", "raw"])
@@ -110,7 +112,7 @@ def test_bit_rot(folder: Path, codec: str) -> None:
     for number in range(60):
         at = len(data) * number // 60 + draw.randrange(len(data) // 60)
         n_lost = 0
-        bad = changed(data, at)
+        bad = change_bytes(data, at)
         for name, values in signals(bad, salvage=True).items():
             lost = np.isnan(values).all(axis=1) & ~np.isnan(truth[name]).all(axis=1)
             np.testing.assert_array_equal(values[~lost], truth[name][~lost])
@@ -129,51 +131,51 @@ def signals(data: bytes, *, salvage: bool = False) -> dict[tuple[str, int], np.n
         }
 
 
-def test_what_lies_before_the_signature_moves_all_alike(packed: bytes) -> None:
-    (first, *_) = chunks(packed, b"SKEL")
-    bad = b"junk of a mail program" + changed(packed, first.offset + 30)
-    assert content(bad, salvage=True) == content(packed)
+def test_what_lies_before_the_signature_moves_all_alike(archive_bytes: bytes) -> None:
+    (first, *_) = chunks(archive_bytes, b"SKEL")
+    bad = b"junk of a mail program" + change_bytes(archive_bytes, first.offset + 30)
+    assert content(bad, salvage=True) == content(archive_bytes)
 
 
-def test_what_is_sound_is_kept(packed: bytes) -> None:
+def test_what_is_sound_is_kept(archive_bytes: bytes) -> None:
     """A COPY that tells another tale of chunks that are there changes none of them."""
-    skel, *_ = chunks(packed, b"SKEL")
-    (copy,) = chunks(packed, ChunkType.COPY)
+    skel, *_ = chunks(archive_bytes, b"SKEL")
+    (copy,) = chunks(archive_bytes, ChunkType.COPY)
     other = build_chunk(ChunkType.COPY, b"", ChunkFlag.ANCILLARY)
     for offset, size in ((skel.offset, skel.length or 0), (skel.offset + 3, 5), (skel.offset, 9)):
         lie = [Copy(offset, b"SKEL", bytes(size))]
         other = build_chunk(ChunkType.COPY, build_copies(lie, copy.offset), ChunkFlag.ANCILLARY)
-        bad = packed[: copy.offset] + other + packed[copy.offset + copy.size :]
+        bad = archive_bytes[: copy.offset] + other + archive_bytes[copy.offset + copy.size :]
         with mcz.open(bad, salvage=True) as file:
             assert any("is not used: what lies there is sound" in line for line in file.damage)
             assert not any("copy is used" in line for line in file.damage)
-        assert content(bad, salvage=True) == content(packed)
+        assert content(bad, salvage=True) == content(archive_bytes)
         with pytest.raises(FormatError):
             scan(open_source(bad), whole=True)
 
 
-def test_an_archive_within_an_archive(packed: bytes) -> None:
+def test_an_archive_within_an_archive(archive_bytes: bytes) -> None:
     """COPY of an attached file refers to that file, wherever it lies."""
     out = io.BytesIO()
     writer = Writer(out, copies=True)
-    mcz.open(packed).close()
-    noise = random.Random(1).randbytes(len(packed))
+    mcz.open(archive_bytes).close()
+    noise = random.Random(1).randbytes(len(archive_bytes))
     writer.attachment("a.bin", noise)
-    writer.chunk(b"xtra", packed, ChunkFlag.ANCILLARY)
+    writer.chunk(b"xtra", archive_bytes, ChunkFlag.ANCILLARY)
     writer.finish()
     data = out.getvalue()
     extra = next(chunk for chunk in chunks(data) if chunk.type == b"xtra")
-    skel = chunks(packed, b"SKEL")[0]
-    bad = changed(data, extra.offset + 5, extra.payload_offset + skel.offset + 20)
+    skel = chunks(archive_bytes, b"SKEL")[0]
+    bad = change_bytes(data, extra.offset + 5, extra.payload_offset + skel.offset + 20)
     with mcz.open(bad, salvage=True) as file:
         assert file.attachments["a.bin"].read() == noise
         for clip in file.clips.values():
             clip.read()
 
 
-def test_a_salvaged_file_is_pickled_as_it_is(packed: bytes) -> None:
-    skel = chunks(packed, b"SKEL")[0]
-    with mcz.open(changed(packed, skel.offset + 20), salvage=True) as file:
+def test_a_salvaged_file_is_pickled_as_it_is(archive_bytes: bytes) -> None:
+    skel = chunks(archive_bytes, b"SKEL")[0]
+    with mcz.open(change_bytes(archive_bytes, skel.offset + 20), salvage=True) as file:
         again = pickle.loads(pickle.dumps(file))
         assert again.damage == file.damage
         for name, clip in file.clips.items():
@@ -197,7 +199,7 @@ def test_a_skeleton_is_made_again_from_its_asf(
     whole = content(data)
     skel, *_ = chunks(data, b"SKEL")
     for at in (2, 20, skel.size - 1):
-        bad = changed(data, skel.offset + at)
+        bad = change_bytes(data, skel.offset + at)
         with mcz.open(bad, salvage=True) as file:
             how = "header is wrong, and put right" if at == 2 else "made again from its ASF, SRCE"
             assert any(how in line for line in file.damage)
@@ -205,7 +207,7 @@ def test_a_skeleton_is_made_again_from_its_asf(
             assert list(again.clips) == list(file.clips)
             assert again.clips["walk"].skeleton == file.clips["walk"].skeleton
         assert content(bad, salvage=True) == whole
-    both = changed(data, skel.offset + 20, chunks(data, b"SRCE")[0].offset + 20)
+    both = change_bytes(data, skel.offset + 20, chunks(data, b"SRCE")[0].offset + 20)
     with mcz.open(both, salvage=True) as file, pytest.raises(FormatError, match="no SKEL"):
         file.clips["walk"].read()
 
@@ -218,7 +220,7 @@ def test_a_skeleton_that_faces_up_is_made_again_from_the_other(
     both = chunks(data, b"SKEL")
     assert len(both) == 2
     for hit in (both[:1], both[1:], both):
-        bad = changed(data, *(skel.offset + 20 for skel in hit))
+        bad = change_bytes(data, *(skel.offset + 20 for skel in hit))
         with mcz.open(bad, salvage=True) as file:
             assert file.clips["walk"].skeleton.up_axis == "z"
         assert content(bad, salvage=True) == content(data)
@@ -229,9 +231,9 @@ def test_another_skeleton_is_not_taken_for_it(folder: Path, tmp_path: Path) -> N
     skeleton = FORMATS["asf"].read((folder / "walk.asf").read_bytes(), "walk")
     odd = replace(skeleton, up_axis="z")
     motion = FORMATS["amc"].read((folder / "walk.amc").read_bytes(), "walk", skeleton)
-    data = written(replace(motion, skeleton=odd, source=None), codec="raw")
+    data = write_bytes(replace(motion, skeleton=odd, source=None), codec="raw")
     skel, *_ = chunks(data, b"SKEL")
-    with mcz.open(changed(data, skel.offset + 20), salvage=True) as file:
+    with mcz.open(change_bytes(data, skel.offset + 20), salvage=True) as file:
         assert not any("made again" in line for line in file.damage)
         with pytest.raises(FormatError, match="no SKEL"):
             file.clips["walk"].read()
@@ -242,11 +244,11 @@ def test_another_chunk_of_the_same_bytes_will_do() -> None:
     whole = content(data)
     for kind in (b"SKEL", b"SRCE"):
         for chunk in chunks(data, kind):
-            assert content(changed(data, chunk.offset + 20), salvage=True) == whole
+            assert content(change_bytes(data, chunk.offset + 20), salvage=True) == whole
     for path in sorted((VECTORS / "valid/online").glob("repeat-[oe][na]c*.mcz")):
         data = path.read_bytes()
         skel, *_ = chunks(data, b"SKEL")
-        assert content(changed(data, skel.offset + 20), salvage=True) == content(data)
+        assert content(change_bytes(data, skel.offset + 20), salvage=True) == content(data)
 
 
 def test_a_rept_changes_nothing_in_a_sound_file() -> None:
@@ -261,12 +263,12 @@ def test_a_rept_changes_nothing_in_a_sound_file() -> None:
 # Repair ----------------------------------------------------------------------
 
 
-def test_repair_loses_nothing_that_has_a_copy(packed: bytes, tmp_path: Path) -> None:
+def test_repair_loses_nothing_that_has_a_copy(archive_bytes: bytes, tmp_path: Path) -> None:
     bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
-    whole = content(packed)
-    kinds = {chunk.type: chunk for chunk in chunks(packed, *COPIED, ChunkType.COPY)}
+    whole = content(archive_bytes)
+    kinds = {chunk.type: chunk for chunk in chunks(archive_bytes, *COPIED, ChunkType.COPY)}
     for number, chunk in enumerate(kinds.values()):
-        bad.write_bytes(changed(packed, chunk.offset + (2, 17)[number % 2]))
+        bad.write_bytes(change_bytes(archive_bytes, chunk.offset + (2, 17)[number % 2]))
         found = mcz.repair(bad, sound, force=True)
         assert found.damage
         assert not found.lost
@@ -325,7 +327,7 @@ def test_what_an_append_has_not_yet_copied(folder: Path, tmp_path: Path) -> None
     mcz.append([late], path, codec="raw", copies=True)
     data = path.read_bytes()
     for chunk in chunks(data, b"HEAD", b"SKEL", b"SRCE", b"CLIP", b"CEND"):
-        bad = changed(data, chunk.offset + 18)
+        bad = change_bytes(data, chunk.offset + 18)
         assert content(bad, salvage=True) == content(data), chunk
 
 
@@ -335,7 +337,7 @@ def test_a_file_without_clips(folder: Path, tmp_path: Path) -> None:
     assert n_copies(path) == 1
     data = path.read_bytes()
     skel, *_ = chunks(data, b"SKEL")
-    assert content(changed(data, skel.offset + 18), salvage=True) == content(data)
+    assert content(change_bytes(data, skel.offset + 18), salvage=True) == content(data)
     mcz.append([folder / "walk.bvh"], path, codec="raw")
     assert n_copies(path) == 1  # those before any clip belong to none
     assert len(chunks(path.read_bytes(), ChunkType.COPY)) == 2
@@ -391,11 +393,11 @@ def test_a_model_is_copied_where_it_is_small_beside_the_rest(size: int, copied: 
 
 def test_the_same_with_every_byte_cut_or_changed() -> None:
     """No byte string is too odd for a reader, and a strict one takes no false copy."""
-    data = written(smooth(3), codec="raw", copies=True)
+    data = write_bytes(smooth(3), codec="raw", copies=True)
     (copy,) = chunks(data, ChunkType.COPY)
     for at in range(copy.offset, copy.offset + copy.size):
-        use(changed(data, at), salvage=True)
-        assert mcz.verify(changed(data, at))
+        use(change_bytes(data, at), salvage=True)
+        assert mcz.verify(change_bytes(data, at))
     payload = data[copy.payload_offset :][: copy.length]
     for size in range(len(payload)):
         other = build_chunk(ChunkType.COPY, payload[:size], ChunkFlag.ANCILLARY)
@@ -429,24 +431,24 @@ def test_the_commands_say_it(
 ) -> None:
     path, bvh = str(tmp_path / "a.mcz"), str(folder / "walk.bvh")
 
-    def told(*arguments: str) -> str:
+    def read_output(*arguments: str) -> str:
         assert run(*arguments) == 0
         return capsys.readouterr().out
 
-    told("encode", bvh, "-o", path, "--copies", "--codec", "raw")
+    read_output("encode", bvh, "-o", path, "--copies", "--codec", "raw")
     with mcz.open(path) as file:
         size = info(file)["copy_bytes"]
-    assert re.search(rf"copies +{size:,} ", told("info", path))
-    assert "COPY payload" in told("info", "--layout", path)
-    told("encode", bvh, "-o", path, "--force", "--codec", "raw")
-    assert "copies" not in told("info", path)
-    told("pack", str(folder), path, "--no-copies", "--force", "--codec", "raw")
-    assert "copies" not in told("info", path)
-    told("append", "--copies", "--root", str(folder.parent), "--codec", "raw", bvh, path)
-    assert "copies" in told("info", path)
+    assert re.search(rf"copies +{size:,} ", read_output("info", path))
+    assert "COPY payload" in read_output("info", "--layout", path)
+    read_output("encode", bvh, "-o", path, "--force", "--codec", "raw")
+    assert "copies" not in read_output("info", path)
+    read_output("pack", str(folder), path, "--no-copies", "--force", "--codec", "raw")
+    assert "copies" not in read_output("info", path)
+    read_output("append", "--copies", "--root", str(folder.parent), "--codec", "raw", bvh, path)
+    assert "copies" in read_output("info", path)
     out = str(tmp_path / "b.mcz")
-    told("extract", path, out, "--clip", "walk", "--no-copies")
-    assert "copies" not in told("info", out)
+    read_output("extract", path, out, "--clip", "walk", "--no-copies")
+    assert "copies" not in read_output("info", out)
 
 
 @cache

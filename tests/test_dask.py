@@ -41,13 +41,13 @@ def folder(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def packed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
+def expected_pack(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
     """One process's archive of the folder, and its report."""
     target = tmp_path_factory.mktemp("packed") / "all.mcz"
-    return target, said(mcz.pack(folder, target))
+    return target, report_rows(mcz.pack(folder, target))
 
 
-def said(report: mcz.Report) -> list[Any]:
+def report_rows(report: mcz.Report) -> list[Any]:
     return [(o.path, o.result, o.size, o.message, o.notes) for o in report.outcomes]
 
 
@@ -77,25 +77,28 @@ class Client:
 
 
 def test_pack_has_the_bytes_of_one_process(
-    folder: Path, packed: tuple[Path, list[Any]], tmp_path: Path
+    folder: Path, expected_pack: tuple[Path, list[Any]], tmp_path: Path
 ) -> None:
     pytest.importorskip("distributed")
     report = pack(folder, tmp_path / "all.mcz", Client())
-    assert said(report) == packed[1]
-    assert (tmp_path / "all.mcz").read_bytes() == packed[0].read_bytes()
+    assert report_rows(report) == expected_pack[1]
+    assert (tmp_path / "all.mcz").read_bytes() == expected_pack[0].read_bytes()
 
 
-def test_clips_are_read_in_order(packed: tuple[Path, list[Any]]) -> None:
+def test_clips_are_read_in_order(expected_pack: tuple[Path, list[Any]]) -> None:
     pytest.importorskip("distributed")
-    assert verify(packed[0], Client()) == []
-    lengths = map_clips(packed[0], lambda clip: (clip.name, clip.n_frames), Client())
-    with mcz.open(packed[0]) as file:
+    assert verify(expected_pack[0], Client()) == []
+    lengths = map_clips(expected_pack[0], lambda clip: (clip.name, clip.n_frames), Client())
+    with mcz.open(expected_pack[0]) as file:
         assert lengths == [(clip.name, clip.n_frames) for clip in file]
-    some = map_clips(packed[0], lambda clip: clip.name, Client(), where="name == 'amc/walk'")
+    some = map_clips(expected_pack[0], lambda clip: clip.name, Client(), where="name == 'amc/walk'")
     assert some == ["amc/walk"]
     with pytest.raises(ZeroDivisionError):
-        map_clips(packed[0], lambda clip: 1 / 0, Client())
-    with packed[0].open("rb") as stream, pytest.raises(mcz.OptionError, match="cannot|can open"):
+        map_clips(expected_pack[0], lambda clip: 1 / 0, Client())
+    with (
+        expected_pack[0].open("rb") as stream,
+        pytest.raises(mcz.OptionError, match="cannot|can open"),
+    ):
         map_clips(stream, lambda clip: 1, Client())
 
 
@@ -122,7 +125,9 @@ def test_which_skeletons_go_along() -> None:
     assert skeletons_beside("a/07.bvh", skeletons) == ()
 
 
-def test_sources_from_a_store(folder: Path, packed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+def test_sources_from_a_store(
+    folder: Path, expected_pack: tuple[Path, list[Any]], tmp_path: Path
+) -> None:
     pytest.importorskip("distributed")
     import fsspec
 
@@ -130,7 +135,7 @@ def test_sources_from_a_store(folder: Path, packed: tuple[Path, list[Any]], tmp_
     store.put(str(folder), "/takes", recursive=True)
     try:
         report = pack("memory://takes", "memory://out/all.mcz", Client())
-        assert store.cat_file("/out/all.mcz") == packed[0].read_bytes()
+        assert store.cat_file("/out/all.mcz") == expected_pack[0].read_bytes()
         failed = [o.message for o in report.failures]
         assert len(failed) == 1
         assert failed[0].startswith("memory://takes/more/broken.bvh: ")
@@ -160,12 +165,12 @@ def cluster() -> Iterator[Any]:
 @pytest.mark.cluster
 @on_a_cluster
 def test_a_cluster_packs_and_verifies(
-    cluster: Any, folder: Path, packed: tuple[Path, list[Any]], tmp_path: Path
+    cluster: Any, folder: Path, expected_pack: tuple[Path, list[Any]], tmp_path: Path
 ) -> None:
     target = tmp_path / "all.mcz"
     words = ["pack", str(folder), str(target), "--scheduler", cluster.scheduler_address]
     assert run(*words) == 1  # broken.bvh
-    assert target.read_bytes() == packed[0].read_bytes()
+    assert target.read_bytes() == expected_pack[0].read_bytes()
     assert verify(target, cluster.scheduler_address) == []
     assert map_clips(target, lambda clip: clip.n_frames, cluster.scheduler_address)
 
@@ -231,7 +236,10 @@ def test_a_file_that_ends_its_workers_is_reported(
 @pytest.mark.cluster
 @on_a_cluster
 def test_an_object_store(
-    cluster: Any, folder: Path, packed: tuple[Path, list[Any]], monkeypatch: pytest.MonkeyPatch
+    cluster: Any,
+    folder: Path,
+    expected_pack: tuple[Path, list[Any]],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """An S3 server on this machine, which the test starts: sources and target lie in it."""
     pytest.importorskip("s3fs")
@@ -259,12 +267,12 @@ def test_an_object_store(
             client.run(configure, settings)
             report = pack("s3://takes/in", "s3://takes/all.mcz", client)
             assert [o.path for o in report.failures] == ["more/broken.bvh"]
-            assert store.cat_file("takes/all.mcz") == packed[0].read_bytes()
+            assert store.cat_file("takes/all.mcz") == expected_pack[0].read_bytes()
             assert verify("s3://takes/all.mcz", client) == []
             names = map_clips("s3://takes/all.mcz", lambda clip: clip.name, client)
-            with mcz.open(packed[0]) as file:
+            with mcz.open(expected_pack[0]) as file:
                 assert names == list(file.clips)
-            interrupted(client, store)
+            check_interrupted_pack(client, store)
     finally:
         server.stop()
 
@@ -273,7 +281,7 @@ def configure(settings: dict[str, str]) -> None:
     os.environ.update(settings)
 
 
-def interrupted(client: Any, store: Any) -> None:
+def check_interrupted_pack(client: Any, store: Any) -> None:
     """A pack that is given up leaves nothing in the store."""
 
     def stop(done: int, total: int, what: str) -> None:

@@ -44,7 +44,7 @@ def motions(folder: Path) -> list[mcz.Motion]:
 ALL = ",".join(FIELDS)
 
 
-def wanted(motion: mcz.Motion, name: str, unit: str | None = None) -> np.ndarray:
+def expected_field(motion: mcz.Motion, name: str, unit: str | None = None) -> np.ndarray:
     """Expected values of a field, from the functions for whole motions."""
     if name == "channels":
         return motion.values
@@ -70,7 +70,7 @@ def test_windows_are_parts_of_the_clips(archive: Path, rate: int | None) -> None
         assert window.stop - window.start == 32
         motion = names[window.clip]
         for name in data.fields:
-            part = wanted(motion, name, "cm")[window.start : window.stop]
+            part = expected_field(motion, name, "cm")[window.start : window.stop]
             assert arrays[name].shape[1:] == data.shapes[name]
             if name.endswith("quat"):  # a window begins with w >= 0
                 part = part * np.where(part[:1, :, :1] < 0, -1, 1)

@@ -30,7 +30,7 @@ from mcz.model.schema import EXTENDED, parse
 from tests import overlap_codec
 from tests.commands import run
 from tests.motions import rich, smooth
-from tests.repair import flipped, flips, joined, parts_of, replaced, use
+from tests.repair import flip_bit, flips, join_parts, parts_of, replace_payload, use
 from tools.records import built, update
 
 JOINTS = ("hips", "spine", "fixed", "knee")
@@ -59,13 +59,13 @@ def extra_codecs() -> Any:
         del codecs.CODECS[codec.name]
 
 
-def written(motion: mcz.Motion, codec: str = "raw", length: int = 7) -> bytes:
+def write_bytes(motion: mcz.Motion, codec: str = "raw", length: int = 7) -> bytes:
     out = io.BytesIO()
     mcz.write(motion, out, codec, **{LENGTH.get(codec, "segment_frames"): length})
     return out.getvalue()
 
 
-def extracted(data: bytes, **how: Any) -> bytes:
+def extract_clips(data: bytes, **how: Any) -> bytes:
     out = io.BytesIO()
     mcz.extract(data, out, **how)
     return out.getvalue()
@@ -136,10 +136,10 @@ def requests(draw: st.DrawFn) -> tuple[str, int, list[dict[str, Any]]]:
 @given(requests())
 def test_any_cut_shows_what_was_asked_for(request: tuple[str, int, list[dict[str, Any]]]) -> None:
     codec, length, cuts = request
-    whole = part = written(motion_for(codec), codec, length)
+    whole = part = write_bytes(motion_for(codec), codec, length)
     start, stop, joints, resolution = 0, 40, None, 0
     for how in cuts:
-        part = extracted(part, **how)
+        part = extract_clips(part, **how)
         a, b = how.get("frames", (0, None))
         start, stop = start + a, stop if b is None else start + b
         joints, resolution = how.get("joints", joints), resolution + how.get("resolution", 0)
@@ -158,9 +158,9 @@ def streams_of(data: bytes) -> list[bytes]:
 
 @pytest.mark.parametrize("codec", CODECS)
 def test_streams_are_copied_byte_for_byte(codec: str) -> None:
-    whole = written(motion_for(codec), codec)
+    whole = write_bytes(motion_for(codec), codec)
     for how in ({"frames": (10, 20)}, {"joints": ["hips", "spine"]}, {"frames": (3, 4)}):
-        streams = streams_of(extracted(whole, **how))
+        streams = streams_of(extract_clips(whole, **how))
         assert streams
         assert set(streams) <= set(streams_of(whole))
         assert len(streams) < len(streams_of(whole))
@@ -176,21 +176,24 @@ def segments_of(data: bytes, signal: int = 0) -> list[tuple[int, int, int, bool]
 
 
 def test_segments_that_bear_upon_the_frames_are_kept() -> None:
-    data = written(motion_for("overlap"), "overlap", 10)
+    data = write_bytes(motion_for("overlap"), "overlap", 10)
     assert segments_of(data)[1] == (10, 20, 1, True)
     # Frame 19 hangs on the segment after it, frame 18 does not; the first lead is cut to 0.
-    assert segments_of(extracted(data, frames=(12, 20))) == [(0, 10, 0, True), (10, 20, 1, True)]
-    assert segments_of(extracted(data, frames=(12, 19))) == [(0, 10, 0, True)]
-    with mcz.open(extracted(data, frames=(12, 19))) as file:
+    assert segments_of(extract_clips(data, frames=(12, 20))) == [
+        (0, 10, 0, True),
+        (10, 20, 1, True),
+    ]
+    assert segments_of(extract_clips(data, frames=(12, 19))) == [(0, 10, 0, True)]
+    with mcz.open(extract_clips(data, frames=(12, 19))) as file:
         info = file.clips["smooth"].signals[0]
         assert (info.skip, info.spare, info.layout.n_frames) == (2, 1, 10)
 
 
 def test_segments_that_are_needed_are_kept() -> None:
-    data = written(motion_for("running"), "running", 5)
-    part = extracted(data, frames=(31, 33))  # in segment 6, which is fresh
+    data = write_bytes(motion_for("running"), "running", 5)
+    part = extract_clips(data, frames=(31, 33))  # in segment 6, which is fresh
     assert segments_of(part) == [(0, 5, 0, True)]
-    part = extracted(data, frames=(11, 12))  # in segment 2, which needs 1 and 0
+    part = extract_clips(data, frames=(11, 12))  # in segment 2, which needs 1 and 0
     assert [s[3] for s in segments_of(part)] == [True, False, False]
 
 
@@ -202,15 +205,15 @@ def test_every_signal_is_cut_at_its_own_segments() -> None:
     writer.finish()
     with mcz.open(out.getvalue()) as file:
         assert [len(s.rows) for s in file.clips["smooth"].signals] == [2, 1]
-    part = extracted(out.getvalue(), frames=(25, 30))
+    part = extract_clips(out.getvalue(), frames=(25, 30))
     check(out.getvalue(), part, 25, 30, None, 0)
     with mcz.open(part) as file:
         assert [(s.skip, s.spare) for s in file.clips["smooth"].signals] == [(5, 10), (25, 10)]
 
 
 def test_copies_of_a_joint_that_goes_are_coded_anew() -> None:
-    whole = written(motion_for("fast"), "fast")
-    check(whole, extracted(whole, joints=["knee"]), 0, 40, ["knee"], 0)
+    whole = write_bytes(motion_for("fast"), "fast")
+    check(whole, extract_clips(whole, joints=["knee"]), 0, 40, ["knee"], 0)
 
 
 @pytest.mark.parametrize(
@@ -226,33 +229,33 @@ def test_copies_of_a_joint_that_goes_are_coded_anew() -> None:
     ],
 )
 def test_what_cannot_be_cut(tmp_path: Path, how: dict[str, Any], message: str) -> None:
-    whole = written(motion_for("overlap"), "overlap")
+    whole = write_bytes(motion_for("overlap"), "overlap")
     with pytest.raises(mcz.OptionError, match=message):
         mcz.extract(whole, tmp_path / "a.mcz", **how)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_joints_that_cannot_be_cut() -> None:
-    whole = written(motion_for("raw"), "one")
+    whole = write_bytes(motion_for("raw"), "one")
     with pytest.raises(mcz.OptionError, match="joint spine cannot be cut out, its channels are"):
-        extracted(whole, joints=["spine"])
-    check(whole, extracted(whole, joints=["hips", "spine", "knee"]), 0, 40, None, 0)
+        extract_clips(whole, joints=["spine"])
+    check(whole, extract_clips(whole, joints=["hips", "spine", "knee"]), 0, 40, None, 0)
     with pytest.raises(mcz.MotionError, match="no joint 'elbow'"):
-        extracted(whole, joints=["elbow"])
+        extract_clips(whole, joints=["elbow"])
     signal = replace(
         smooth(4).signals[0], channels=tuple(mcz.Channel("", f"c{i}") for i in range(10))
     )
     with pytest.raises(mcz.OptionError, match="channels of its own, no joints"):
-        extracted(written(replace(smooth(4), signals=(signal,))), joints=["spine"])
+        extract_clips(write_bytes(replace(smooth(4), signals=(signal,))), joints=["spine"])
 
 
 def test_damage_is_found_and_not_copied() -> None:
-    whole = bytearray(written(rich()))
+    whole = bytearray(write_bytes(rich()))
     with mcz.open(bytes(whole)) as file:
         row = file.clips["smooth"].signals[0].rows[3]
     whole[row.offset + row.size - 1] ^= 1
     with pytest.raises(mcz.ChecksumError, match="crc of chunk DATA"):
-        extracted(bytes(whole), frames=(20, 30), joints=["hips"])
+        extract_clips(bytes(whole), frames=(20, 30), joints=["hips"])
 
 
 def test_an_uncut_clip_is_copied_as_it_is() -> None:
@@ -289,7 +292,7 @@ def test_all_clips_are_cut_alike_and_the_rest_is_kept() -> None:
     for name in ("a", "b"):
         write_clip(writer, replace(rich(), name=name), codecs.codec_by_name("raw"), {})
     writer.finish()
-    part = extracted(out.getvalue(), frames=(3, 9))
+    part = extract_clips(out.getvalue(), frames=(3, 9))
     with mcz.open(part) as file:
         assert validate(file) == []
         assert file.container.directory.head.endswith(b"later")
@@ -302,10 +305,10 @@ def test_all_clips_are_cut_alike_and_the_rest_is_kept() -> None:
 
 def test_listed_groups_and_extensions() -> None:
     """Groups of kind 3 are those that are left; what is not known is kept."""
-    whole = written(rich())
+    whole = write_bytes(rich())
     listed = {"kind": payloads.GROUP_LISTED, "sizes": [6, 3, 1]}
     data = clip_with(whole, groups=listed, extended=b"of a signal")
-    part = extracted(data, joints=["hips", "knee"], frames=(5, 30))
+    part = extract_clips(data, joints=["hips", "knee"], frames=(5, 30))
     check(whole, part, 5, 30, ["hips", "knee"], 0)
     fields = clip_fields_of(part)
     assert list(fields.signals[0].groups.sizes) == [6, 1]
@@ -316,7 +319,7 @@ def test_extensions_are_kept_in_what_is_cut() -> None:
     whole = (
         Path(__file__).parents[1] / "conformance/vectors/valid/extensions/all.mcz"
     ).read_bytes()
-    part = extracted(whole, frames=(1, 2))
+    part = extract_clips(whole, frames=(1, 2))
     found = [(chunk.type, payload.count(b"later version")) for chunk, payload in parts_of(part)]
     for type_, n in ((b"HEAD", 1), (b"SRCE", 1), (b"MODL", 1), (b"ATTA", 1), (b"QUAL", 1)):
         assert (type_, n) in found
@@ -326,8 +329,8 @@ def test_extensions_are_kept_in_what_is_cut() -> None:
 
 
 def test_an_open_clip_is_closed() -> None:
-    whole = written(rich())
-    part = extracted(clip_with(whole, flags=1, n_frames=0), frames=(5, 30))
+    whole = write_bytes(rich())
+    part = extract_clips(clip_with(whole, flags=1, n_frames=0), frames=(5, 30))
     check(whole, part, 5, 30, None, 0)
     assert clip_fields_of(part).flags == payloads.HAS_TIME_BASE
 
@@ -347,13 +350,13 @@ def test_ancillary_chunks_inside_a_clip_are_kept() -> None:
     write_clip(writer, rich(), codecs.codec_by_name("raw"), {})
     writer.finish()
     for how in ({"frames": (3, 9)}, {"clip": "smooth"}):
-        kinds = [chunk.type for chunk, _ in parts_of(extracted(out.getvalue(), **how))]
+        kinds = [chunk.type for chunk, _ in parts_of(extract_clips(out.getvalue(), **how))]
         assert kinds.index(b"CLIP") < kinds.index(b"abCD") < kinds.index(b"CEND")
 
 
 def test_skeleton_of_joints_keeps_the_tree() -> None:
-    whole = written(rich())
-    with mcz.open(whole) as old, mcz.open(extracted(whole, joints=["knee", "fixed"])) as new:
+    whole = write_bytes(rich())
+    with mcz.open(whole) as old, mcz.open(extract_clips(whole, joints=["knee", "fixed"])) as new:
         before, after = old.clips["smooth"].skeleton, new.clips["smooth"].skeleton
         assert [j.name for j in after.joints] == list(JOINTS)
         assert [len(j.channels) for j in after.joints] == [0, 0, 0, 1]
@@ -371,9 +374,9 @@ def quality(data: bytes) -> dict[str, str]:
 
 def test_quality_says_what_was_cut() -> None:
     motion = replace(smooth(40), signals=(Signal(smooth(40).signals[0].values),))
-    whole = written(motion, "overlap")
+    whole = write_bytes(motion, "overlap")
     assert quality(whole)["param.length"] == "7"
-    part = extracted(whole, frames=(10, 30), joints=["hips", "knee"], resolution=1)
+    part = extract_clips(whole, frames=(10, 30), joints=["hips", "knee"], resolution=1)
     found = quality(part)
     assert found["cut-frames"] == "10:30"
     assert found["cut-joints"] == "hips,knee"
@@ -381,10 +384,10 @@ def test_quality_says_what_was_cut() -> None:
     assert found["param.length"] == "7"
     assert found["uncut_mse"] == quality(whole)["mse"]
     assert "mse" not in found
-    again = quality(extracted(part, frames=(3, 5), joints=["knee"]))
+    again = quality(extract_clips(part, frames=(3, 5), joints=["knee"]))
     assert again == found | {"cut-frames": "13:15", "cut-joints": "knee"}
-    assert quality(extracted(part, clip="smooth")) == found
-    assert quality(extracted(written(rich()), frames=(1, 2))) == {"cut-frames": "1:2"}
+    assert quality(extract_clips(part, clip="smooth")) == found
+    assert quality(extract_clips(write_bytes(rich()), frames=(1, 2))) == {"cut-frames": "1:2"}
 
 
 @pytest.mark.parametrize("suffix", ["amc", "bvh", "c3d"])
@@ -467,7 +470,7 @@ def test_resolution_beside_a_signal_without_any() -> None:
     write_clip(writer, replace(motion, name="raw"), codecs.codec_by_name("raw"), {})
     writer.finish()
     with pytest.raises(mcz.OptionError, match="clip 'raw': the 1 finest"):
-        extracted(out.getvalue(), resolution=1)
+        extract_clips(out.getvalue(), resolution=1)
     found = mcz.extract(out.getvalue(), io.BytesIO(), resolution=1, clip="smooth")
     assert found.clips[0].data_bytes < 0.6 * found.clips[0].data_bytes_before
 
@@ -477,7 +480,7 @@ def test_resolution_beside_a_signal_without_any() -> None:
 
 def test_motion_at_a_resolution() -> None:
     motion = replace(smooth(45), frame_numbers=np.arange(45) + 3)
-    with mcz.open(written(motion, "overlap")) as file:
+    with mcz.open(write_bytes(motion, "overlap")) as file:
         clip = file.clips["smooth"]
         coarse = clip.motion((4, 40), 1)
         np.testing.assert_array_equal(coarse.values, clip.read((4, 40), resolution=1))
@@ -550,31 +553,33 @@ def clip_with(
         cend = parse(payloads.Cend, parts[end][1], "CEND")
         cend.missing, fields.time_base.missing = fields.time_base.missing, []
         assert cend.missing
-        parts = replaced(parts, end, built(payloads.Cend, cend, "CEND"))
-    return joined(replaced(parts, which, built(payloads.Clip, fields, "CLIP")))
+        parts = replace_payload(parts, end, built(payloads.Cend, cend, "CEND"))
+    return join_parts(replace_payload(parts, which, built(payloads.Clip, fields, "CLIP")))
 
 
 def test_a_clip_without_an_end_shows_what_is_there() -> None:
-    part = extracted(written(rich()), frames=(9, 30))
+    part = extract_clips(write_bytes(rich()), frames=(9, 30))
     parts = [p for p in parts_of(part) if p[0].type != b"CEND"]
-    with mcz.open(joined(parts), salvage=True) as file:
+    with mcz.open(join_parts(parts), salvage=True) as file:
         clip = file.clips["smooth"]
         assert clip.n_frames == 21
         with mcz.open(part) as whole:
             np.testing.assert_array_equal(clip.read(), whole.clips["smooth"].read())
     data = [i for i, p in enumerate(parts) if p[0].type == b"DATA"]
-    with mcz.open(joined([p for i, p in enumerate(parts) if i not in data[1:]]), salvage=True) as f:
+    with mcz.open(
+        join_parts([p for i, p in enumerate(parts) if i not in data[1:]]), salvage=True
+    ) as f:
         assert f.clips["smooth"].n_frames == 5
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_flipped_bits_of_a_cut_file(seed: int) -> None:
-    data = extracted(written(motion_for("fast"), "fast"), frames=(9, 30), joints=JOINTS[:2])
+    data = extract_clips(write_bytes(motion_for("fast"), "fast"), frames=(9, 30), joints=JOINTS[:2])
     parts = parts_of(data)
     for which, (_, payload) in enumerate(parts):
         for byte, bit in flips(len(payload), 40, seed=seed * 100 + which):
-            changed = joined(replaced(parts, which, flipped(payload, byte, bit)))
-            for act in (use, lambda file: extracted(file, frames=(1, 4), joints=["hips"])):
+            changed = join_parts(replace_payload(parts, which, flip_bit(payload, byte, bit)))
+            for act in (use, lambda file: extract_clips(file, frames=(1, 4), joints=["hips"])):
                 try:
                     act(changed)
                 except mcz.MczError as error:

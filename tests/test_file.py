@@ -21,12 +21,12 @@ from mcz.files.reading.report import info
 from mcz.files.writing.write_transaction import METADATA_KEYS
 from mcz.model.annexes import annex_bytes
 from mcz.model.numbers import Grid, GridKind
-from tests.motions import motions, skeleton, smooth, written
+from tests.motions import motions, skeleton, smooth, write_bytes
 
 
 @given(motions())
 def test_any_motion_comes_back(motion: mcz.Motion) -> None:
-    with mcz.open(written(motion)) as file:
+    with mcz.open(write_bytes(motion)) as file:
         back = file.clips[motion.name].motion()
     assert back.skeleton == motion.skeleton
     assert (back.name, back.frame_rate) == (motion.name, motion.frame_rate)
@@ -42,7 +42,7 @@ def test_any_motion_comes_back(motion: mcz.Motion) -> None:
 
 def test_joints_by_name_and_index() -> None:
     motion = smooth(20)
-    with mcz.open(written(motion)) as file:
+    with mcz.open(write_bytes(motion)) as file:
         clip = file.clips["smooth"]
         np.testing.assert_array_equal(clip.read(joints=["knee"]), motion.values[:, 9:])
         np.testing.assert_array_equal(
@@ -55,7 +55,7 @@ def test_joints_by_name_and_index() -> None:
 
 @pytest.mark.parametrize("frames", [(-1, 3), (3, 2), (0, 21)])
 def test_range_outside_the_clip(frames: tuple[int, int]) -> None:
-    with mcz.open(written(smooth(20))) as file, pytest.raises(mcz.OptionError):
+    with mcz.open(write_bytes(smooth(20))) as file, pytest.raises(mcz.OptionError):
         file.clips["smooth"].read(frames)
 
 
@@ -63,7 +63,7 @@ def test_values_off_their_grid_become_exceptions() -> None:
     motion = smooth(10)
     values = motion.values.copy()
     values[4, 1], values[5, 9] = 1 / 3, np.nan
-    with mcz.open(written(motion.with_values(values))) as file:
+    with mcz.open(write_bytes(motion.with_values(values))) as file:
         clip = file.clips["smooth"]
         np.testing.assert_array_equal(clip.read(), values)
         np.testing.assert_array_equal(clip.read((5, 7), ["knee"]), values[5:7, 9:])
@@ -73,7 +73,7 @@ def test_values_off_their_grid_become_exceptions() -> None:
 def test_values_off_a_binary_grid_are_refused() -> None:
     signal = Signal(np.full((2, 10), 1 / 3), (Grid(GridKind.BINARY32),) * 10)
     with pytest.raises(mcz.MotionError, match="row 0 of a segment, channel 0"):
-        written(replace(smooth(2), signals=(signal,)))
+        write_bytes(replace(smooth(2), signals=(signal,)))
 
 
 def test_grid_changes_begin_a_segment() -> None:
@@ -82,7 +82,7 @@ def test_grid_changes_begin_a_segment() -> None:
     values[8:] = np.round(values[8:], 1)
     changes = tuple((8, c, Grid(GridKind.FIXED, 1)) for c in range(10))
     signal = replace(motion.signals[0], values=values, grid_changes=changes)
-    with mcz.open(written(replace(motion, signals=(signal,)))) as file:
+    with mcz.open(write_bytes(replace(motion, signals=(signal,)))) as file:
         clip = file.clips["smooth"]
         assert [row.header.first for row in clip.signals[0].rows] == [0, 8]
         np.testing.assert_array_equal(clip.read(), values)
@@ -99,11 +99,11 @@ def test_bad_frame_numbers(numbers: list[int]) -> None:
 
 
 def test_usual_frame_numbers_cost_nothing() -> None:
-    assert written(replace(smooth(8), frame_numbers=np.arange(1, 9))) == written(smooth(8))
+    assert write_bytes(replace(smooth(8), frame_numbers=np.arange(1, 9))) == write_bytes(smooth(8))
 
 
 def test_output_limit() -> None:
-    with mcz.open(written(smooth(100)), max_decoded=1000) as file:
+    with mcz.open(write_bytes(smooth(100)), max_decoded=1000) as file:
         with pytest.raises(mcz.LimitError, match="limit of 1000"):
             file.clips["smooth"].read()
         assert file.clips["smooth"].read((0, 12)).shape == (12, 10)
@@ -125,8 +125,8 @@ def test_limits_of_the_profile() -> None:
     bones = mcz.Skeleton(joints)
     motion = mcz.Motion(bones, (Signal(np.zeros((1, 4097))),))
     with pytest.raises(mcz.LimitError, match="joints: 4097"):
-        written(motion)
-    with mcz.open(written(motion, profile="large")) as file:
+        write_bytes(motion)
+    with mcz.open(write_bytes(motion, profile="large")) as file:
         assert file.header["profile"] == "large"
         assert file.clips["motion"].read().shape == (1, 4097)
 
@@ -173,14 +173,14 @@ def test_unit_and_rate_are_taken_not_guessed(tmp_path: Path) -> None:
 
 def test_skeleton_comes_back_to_the_bit() -> None:
     motion = mcz.Motion(skeleton(), (Signal(np.zeros((0, 10))),), frame_rate=Fraction(30000, 1001))
-    with mcz.open(written(motion)) as file:
+    with mcz.open(write_bytes(motion)) as file:
         back = file.clips["motion"].motion()
     assert repr(back.skeleton.joints[0].offset) == "(0.0, 1.0, -0.0)"
     assert back.frame_rate == Fraction(30000, 1001)
 
 
 def test_reading_a_closed_file() -> None:
-    file = mcz.open(written(smooth(20)))
+    file = mcz.open(write_bytes(smooth(20)))
     clip = file.clips["smooth"]
     file.close()
     with pytest.raises(mcz.OptionError, match="closed"):

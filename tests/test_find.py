@@ -48,14 +48,14 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def packed(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
+def archive_path(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
     """The sample files, of three formats."""
     folder = tmp_path_factory.mktemp("packed")
     mcz.pack(samples, folder / "p.mcz", rate=120)
     return folder / "p.mcz"
 
 
-def found(path: Path, where: object) -> list[str]:
+def find_names(path: Path, where: object) -> list[str]:
     with mcz.open(path) as file:
         return [clip.name for clip in file.find(where)]  # type: ignore[arg-type]
 
@@ -86,7 +86,7 @@ def found(path: Path, where: object) -> list[str]:
     ],
 )
 def test_clips_are_found(archive: Path, where: object, names: list[str]) -> None:
-    assert found(archive, where) == names
+    assert find_names(archive, where) == names
 
 
 @pytest.mark.parametrize(
@@ -101,12 +101,12 @@ def test_clips_are_found(archive: Path, where: object, names: list[str]) -> None
         ("unit_cm > 5", ["walk"]),
     ],
 )
-def test_clips_with_sources_are_found(packed: Path, where: str, names: list[str]) -> None:
-    assert found(packed, where) == names
+def test_clips_with_sources_are_found(archive_path: Path, where: str, names: list[str]) -> None:
+    assert find_names(archive_path, where) == names
 
 
 def test_bytes_are_those_of_info(
-    archive: Path, packed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    archive: Path, archive_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All that ``mcz info`` counts to a clip but the template, which clips may share."""
     monkeypatch.setitem(CODECS, live_codec.CODEC.name, live_codec.CODEC)
@@ -117,7 +117,7 @@ def test_bytes_are_those_of_info(
     ):
         for row in smooth(100).signals[0].values:
             live.push(row)
-    for path in (archive, packed, tmp_path / "lossy.mcz", tmp_path / "live.mcz"):
+    for path in (archive, archive_path, tmp_path / "lossy.mcz", tmp_path / "live.mcz"):
         with mcz.open(path) as file:
             for told in info(file)["clips"]:
                 clip = file[told["name"]]
@@ -151,14 +151,14 @@ def test_a_codec_that_is_unknown_is_not_called_lossless(archive: Path) -> None:
 )
 def test_what_cannot_be_found(archive: Path, where: object, said: str) -> None:
     with pytest.raises(OptionError, match=said):
-        found(archive, where)
+        find_names(archive, where)
 
 
 def test_a_file_without_clips_has_none_to_find(tmp_path: Path, samples: Path) -> None:
     mcz.encode(samples / "walk.asf", tmp_path / "a.mcz")
-    assert found(tmp_path / "a.mcz", "anything == 5") == []
+    assert find_names(tmp_path / "a.mcz", "anything == 5") == []
     with pytest.raises(OptionError, match="column 9"):
-        found(tmp_path / "a.mcz", "anything")
+        find_names(tmp_path / "a.mcz", "anything")
     with mcz.open(tmp_path / "a.mcz") as file:
         assert not len(file) and bool(file) and list(file) == []
 
@@ -176,8 +176,8 @@ def test_a_file_is_of_clips(archive: Path) -> None:
         assert [clip.name for clip in pickle.loads(pickle.dumps(file))] == list(file.clips)
 
 
-def test_names_mean_clips_as_elsewhere(packed: Path) -> None:
-    with mcz.open(packed) as file:
+def test_names_mean_clips_as_elsewhere(archive_path: Path) -> None:
+    with mcz.open(archive_path) as file:
         assert file["walk.amc"].name == "walk"
         assert "walk.amc" in file and "walk.asf" not in file
 
@@ -215,11 +215,11 @@ def test_metadata_of_clips_are_read_once(archive: Path, monkeypatch: pytest.Monk
     """Also where the clips are others by then, and for a key that nobody has."""
     calls: list[str] = []
 
-    def counted(record: Any, payload: bytes, where: str, before: str) -> Any:
+    def count_parse(record: Any, payload: bytes, where: str, before: str) -> Any:
         calls.append(where)
         return parse_until(record, payload, where, before)
 
-    monkeypatch.setattr("mcz.container.metadata.parse_until", counted)
+    monkeypatch.setattr("mcz.container.metadata.parse_until", count_parse)
     for most in (2**20, 0):  # bytes that are kept
         monkeypatch.setattr("mcz.container.metadata.MOST_KEPT", most)
         calls.clear()
@@ -243,13 +243,13 @@ def test_damage_is_no_unknown(archive: Path) -> None:
             file.find("subject == 5")
 
 
-def test_parts_of_a_file(archive: Path, packed: Path, tmp_path: Path) -> None:
+def test_parts_of_a_file(archive: Path, archive_path: Path, tmp_path: Path) -> None:
     done = mcz.extract(archive, tmp_path / "e.mcz", where="subject == 5", frames=(0, 10))
     assert [clip.name for clip in done.clips] == ["05_01", "05_02"]
     with mcz.open(tmp_path / "e.mcz") as file:
         assert [clip.name for clip in file.find("subject == 5")] == list(file.clips)
         assert not file.attachments
-    report = mcz.unpack(packed, tmp_path / "out", where=lambda clip: clip.n_channels == 62)
+    report = mcz.unpack(archive_path, tmp_path / "out", where=lambda clip: clip.n_channels == 62)
     assert sorted(o.path for o in report.outcomes) == ["walk.amc", "walk.asf"]
 
 
@@ -301,26 +301,28 @@ def test_verify_what_is_damaged_and_what_is_not(archive: Path) -> None:
         mcz.verify(archive, where="n_frames > 100")
 
 
-def test_verify_some(call: Call, archive: Path, packed: Path) -> None:
+def test_verify_some(call: Call, archive: Path, archive_path: Path) -> None:
     code, out, _ = call("verify", archive, "--where", "subject == 5")
     assert code == 0 and out.endswith("verified, every chunk checked, 1 skeleton, 2 clips\n")
-    code, out, _ = call("verify", packed, "--where", "format == 'bvh'")
+    code, out, _ = call("verify", archive_path, "--where", "format == 'bvh'")
     assert code == 0 and out.endswith("verified, every chunk checked, 1 skeleton, 1 clip\n")
 
 
-def test_decode_unpack_extract(call: Call, packed: Path, tmp_path: Path) -> None:
+def test_decode_unpack_extract(call: Call, archive_path: Path, tmp_path: Path) -> None:
     where = ("--where", "format in ('bvh', 'c3d')")
-    assert call("decode", packed, *where, "-o", f"{tmp_path}/d/")[0] == 0
-    assert call("unpack", packed, tmp_path / "u", *where)[0] == 0
+    assert call("decode", archive_path, *where, "-o", f"{tmp_path}/d/")[0] == 0
+    assert call("unpack", archive_path, tmp_path / "u", *where)[0] == 0
     for folder in ("d", "u"):
         held = sorted(path.name for path in (tmp_path / folder).iterdir())
         assert held == ["walk.bvh", "walk.c3d"]
-    assert call("decode", packed, *where, "-o", tmp_path / "one.bvh")[0] == 2  # one file for two
-    assert call("extract", packed, tmp_path / "e.mcz", *where)[0] == 0
-    assert found(tmp_path / "e.mcz", "n_frames > 0") == ["walk.bvh", "walk.c3d"]
+    assert (
+        call("decode", archive_path, *where, "-o", tmp_path / "one.bvh")[0] == 2
+    )  # one file for two
+    assert call("extract", archive_path, tmp_path / "e.mcz", *where)[0] == 0
+    assert find_names(tmp_path / "e.mcz", "n_frames > 0") == ["walk.bvh", "walk.c3d"]
 
 
-def test_diff(call: Call, archive: Path, packed: Path, samples: Path) -> None:
+def test_diff(call: Call, archive: Path, archive_path: Path, samples: Path) -> None:
     code, out, _ = call("diff", archive, archive, "--where", "subject == 5", "--json")
     document = json.loads(out)
     assert [clip["name_a"] for clip in document["clips"]] == ["05_01", "05_02"]
@@ -328,12 +330,12 @@ def test_diff(call: Call, archive: Path, packed: Path, samples: Path) -> None:
     names = ("--clip", "05_01", "--clip", "16_01")
     code, out, _ = call("diff", archive, archive, *names, "--where", "subject == 5", "--json")
     assert [clip["name_a"] for clip in json.loads(out)["clips"]] == ["05_01"]
-    code, out, err = call("diff", samples / "walk.bvh", packed, "--where", "format == 'bvh'")
+    code, out, err = call("diff", samples / "walk.bvh", archive_path, "--where", "format == 'bvh'")
     assert code == 0 and "walk.bvh" in out, err
     bvh = samples / "walk.bvh"
     code, _, err = call("diff", bvh, bvh, "--where", "n_frames > 0")
     assert code == 2 and "--where chooses among the clips of an .mcz" in err
-    code, _, err = call("diff", archive, packed, "--where", "n_frames > 0")
+    code, _, err = call("diff", archive, archive_path, "--where", "n_frames > 0")
     assert code == 2 and "no clip in common" in err
 
 

@@ -145,7 +145,7 @@ def test_readers_properties_can_break(monkeypatch: pytest.MonkeyPatch) -> None:
         readers.check_bvh(data)
 
 
-def raising(error: BaseException) -> object:
+def raise_error(error: BaseException) -> object:
     def check(data: bytes) -> bool:
         raise error
 
@@ -155,10 +155,10 @@ def raising(error: BaseException) -> object:
 def test_findings_are_kept_and_refusals_counted(tmp_path: Path) -> None:
     record = Record("bvh", tmp_path, tmp_path / "figures.json")
     record.run(lambda data: True, b"fine")
-    record.run(raising(mcz.SourceError("bad")), b"refused")  # type: ignore[arg-type]
+    record.run(raise_error(mcz.SourceError("bad")), b"refused")  # type: ignore[arg-type]
     for n in range(5):
-        record.run(raising(BrokenError("it differs")), bytes((n,)))  # type: ignore[arg-type]
-    record.run(raising(MemoryError()), b"large")  # type: ignore[arg-type]
+        record.run(raise_error(BrokenError("it differs")), bytes((n,)))  # type: ignore[arg-type]
+    record.run(raise_error(MemoryError()), b"large")  # type: ignore[arg-type]
     assert (record.executions, record.decoded) == (8, 1)
     assert record.refused == {"SourceError": 1}
     assert sorted(record.findings.values()) == [1, 5]

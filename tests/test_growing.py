@@ -226,12 +226,12 @@ def test_pack_says_what_it_left_out(folder: Path, monkeypatch: pytest.MonkeyPatc
     os.mkfifo(folder / "pipe.bvh")
     scandir = os.scandir
 
-    def guarded(path: Any) -> Any:
+    def guard_scandir(path: Any) -> Any:
         if str(path).endswith("closed"):
             raise PermissionError(errno.EACCES, "Permission denied", str(path))
         return scandir(path)
 
-    monkeypatch.setattr(os, "scandir", guarded)
+    monkeypatch.setattr(os, "scandir", guard_scandir)
     report = mcz.pack(folder, folder / "all.mcz")
     found = results(report)
     assert [o.path for o in report.failures] == ["closed"]

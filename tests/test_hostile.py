@@ -12,14 +12,14 @@ import pytest
 
 import mcz
 from conformance.run import VECTORS
-from tests.motions import rich, written
+from tests.motions import rich, write_bytes
 from tests.repair import (
-    flipped,
+    flip_bit,
     flips,
-    joined,
+    join_parts,
     memory_below,
     parts_of,
-    replaced,
+    replace_payload,
     use,
     with_index_content,
 )
@@ -30,7 +30,7 @@ MEMORY = 64 * 2**20
 
 SOURCES = VECTORS / "valid" / "sources"
 FILES = {
-    "rich": written(rich(12), segment_frames=5),
+    "rich": write_bytes(rich(12), segment_frames=5),
     "bvh": (SOURCES / "bvh-odd.mcz").read_bytes(),
     "amc": (SOURCES / "amc.mcz").read_bytes(),
 }
@@ -53,7 +53,7 @@ def outcome(data: bytes, **how: bool) -> str:
 def test_unharmed_files_are_used_whole(data: bytes) -> None:
     use(data)
     use(data, salvage=True)
-    use(joined(parts_of(data)))
+    use(join_parts(parts_of(data)))
 
 
 def test_every_cut_is_truncated(data: bytes) -> None:
@@ -68,7 +68,7 @@ def test_verify_finds_every_flipped_bit(data: bytes) -> None:
 
     for byte, bit in flips(len(data), POSITIONS, seed=2):
         try:
-            with mcz.open(flipped(data, byte, bit)) as file:
+            with mcz.open(flip_bit(data, byte, bit)) as file:
                 assert validate(file), f"bit {bit} of byte {byte}"
         except mcz.MczError:
             pass
@@ -78,14 +78,14 @@ def test_flipped_bits_behind_repaired_checksums(data: bytes) -> None:
     parts = parts_of(data)
     for which, (_chunk, payload) in enumerate(parts):
         for byte, bit in flips(len(payload), POSITIONS, seed=which):
-            outcome(joined(replaced(parts, which, flipped(payload, byte, bit))))
+            outcome(join_parts(replace_payload(parts, which, flip_bit(payload, byte, bit))))
 
 
 def test_memory_stays_bounded(data: bytes) -> None:
     parts = parts_of(data)
     for which, (_chunk, payload) in enumerate(parts):
-        bad = [flipped(payload, *at) for at in flips(len(payload), 40, seed=100 + which)]
-        files = [joined(replaced(parts, which, changed)) for changed in bad]
+        bad = [flip_bit(payload, *at) for at in flips(len(payload), 40, seed=100 + which)]
+        files = [join_parts(replace_payload(parts, which, changed)) for changed in bad]
         with memory_below(MEMORY):
             for file in files:
                 outcome(file)
@@ -95,21 +95,25 @@ def test_cut_payloads_behind_repaired_checksums(data: bytes) -> None:
     parts = parts_of(data)
     for which, (_chunk, payload) in enumerate(parts):
         for size in range(0, len(payload), max(1, len(payload) // 40)):
-            outcome(joined(replaced(parts, which, payload[:size])))
-            outcome(joined(replaced(parts, which, payload[:size] + b"\0\x01" + payload[size:])))
+            outcome(join_parts(replace_payload(parts, which, payload[:size])))
+            outcome(
+                join_parts(
+                    replace_payload(parts, which, payload[:size] + b"\0\x01" + payload[size:])
+                )
+            )
 
 
 def test_chunks_dropped_doubled_and_swapped(data: bytes) -> None:
     parts = parts_of(data)
     for which in range(len(parts)):
-        outcome(joined(parts[:which] + parts[which + 1 :]))
-        outcome(joined([*parts[:which], parts[which], *parts[which:]]))
+        outcome(join_parts(parts[:which] + parts[which + 1 :]))
+        outcome(join_parts([*parts[:which], parts[which], *parts[which:]]))
         if which:
             before, here = parts[which - 1], parts[which]
-            outcome(joined([*parts[: which - 1], here, before, *parts[which + 1 :]]))
+            outcome(join_parts([*parts[: which - 1], here, before, *parts[which + 1 :]]))
 
 
 def test_flipped_bits_of_the_index() -> None:
     for byte, bit in flips(600, POSITIONS, seed=3):
-        flip = lambda content, at=byte, of=bit: flipped(content, at % len(content), of)  # noqa: E731
+        flip = lambda content, at=byte, of=bit: flip_bit(content, at % len(content), of)  # noqa: E731
         outcome(with_index_content(FILES["rich"], flip))

@@ -16,24 +16,24 @@ import mcz
 from mcz import AccessError
 from mcz.container import http, http_connections
 from tests.commands import run
-from tests.motions import smooth, written
-from tests.web_server import Answering, Server, ranged, served
+from tests.motions import smooth, write_bytes
+from tests.web_server import Answering, Server, answer_range, serve
 
 
 @pytest.fixture(scope="module")
 def data() -> bytes:
-    return written(smooth(2000), "raw")
+    return write_bytes(smooth(2000), "raw")
 
 
 @pytest.fixture
-def server(data: bytes, waited: list[float]) -> Iterator[Server]:
+def server(data: bytes, retry_delays: list[float]) -> Iterator[Server]:
     found = Server(data)
-    with served(found):
+    with serve(found):
         yield found
 
 
 @pytest.fixture
-def waited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+def retry_delays(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The seconds that a reader would have waited between attempts."""
     found: list[float] = []
     monkeypatch.setattr(http_connections, "sleep", found.append)
@@ -77,15 +77,15 @@ def whole(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -
 
 def short(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
     """The connection is cut."""
-    ranged(handler, data, start, stop, body=data[start : max(start, stop - 1)])
+    answer_range(handler, data, start, stop, body=data[start : max(start, stop - 1)])
 
 
-def moved(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
-    ranged(handler, data, start, stop, said=f"bytes {start + 1}-{stop}/{len(data)}")
+def answer_shifted(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
+    answer_range(handler, data, start, stop, said=f"bytes {start + 1}-{stop}/{len(data)}")
 
 
 def nonsense(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
-    ranged(handler, data, start, stop, said="bytes a-b/c")
+    answer_range(handler, data, start, stop, said="bytes a-b/c")
 
 
 def silent(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
@@ -98,11 +98,11 @@ def no_http(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int)
 
 
 def other_file(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
-    ranged(handler, data, start, stop, tag='"2"')
+    answer_range(handler, data, start, stop, tag='"2"')
 
 
 def longer_file(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
-    ranged(handler, data, start, stop, said=f"bytes {start}-{stop - 1}/{len(data) + 7}")
+    answer_range(handler, data, start, stop, said=f"bytes {start}-{stop - 1}/{len(data) + 7}")
 
 
 def endless(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
@@ -119,7 +119,7 @@ FAILURES = {
     "the server answers 403": status(403),
     "so it gives no parts; download the file first": whole,
     "bytes are announced|IncompleteRead": short,
-    "are asked for, it gives": moved,
+    "are asked for, it gives": answer_shifted,
     "does not say which range": nonsense,
     "closed connection|Connection|RemoteDisconnected": silent,
     "no http|BadStatusLine": no_http,
@@ -194,26 +194,30 @@ def test_errors_of_any_file_system_are_access_errors(
 # A file that changes -------------------------------------------------------------
 
 
-def saying(tag: str = "", **more: str) -> Answering:
+def answer_with_tag(tag: str = "", **more: str) -> Answering:
     """A sound answer that says this of the file."""
     named = {name.replace("_", "-"): value for name, value in more.items()}
-    return lambda handler, data, start, stop: ranged(
+    return lambda handler, data, start, stop: answer_range(
         handler, data, start, stop, tag=tag, more=named
     )
 
 
 OLD, NEW = "Mon, 23 Nov 2026 10:00:00 GMT", "Mon, 23 Nov 2026 10:00:01 GMT"
 IDENTITIES = {
-    "strong": (saying('"a"'), saying('"b"'), {"If-Match": '"a"'}),
-    "weak": (saying('W/"a"'), saying('W/"b"'), {}),
-    "tag-goes": (saying('"a"'), saying(), {"If-Match": '"a"'}),
+    "strong": (answer_with_tag('"a"'), answer_with_tag('"b"'), {"If-Match": '"a"'}),
+    "weak": (answer_with_tag('W/"a"'), answer_with_tag('W/"b"'), {}),
+    "tag-goes": (answer_with_tag('"a"'), answer_with_tag(), {"If-Match": '"a"'}),
     "date": (
-        saying(Last_Modified=OLD),
-        saying(Last_Modified=NEW),
+        answer_with_tag(Last_Modified=OLD),
+        answer_with_tag(Last_Modified=NEW),
         {"If-Unmodified-Since": OLD},
     ),
-    "412": (saying('"a"'), lambda handler, *_: handler.send_error(412), {"If-Match": '"a"'}),
-    "shorter": (saying(), lambda handler, *_: handler.send_error(416), {}),
+    "412": (
+        answer_with_tag('"a"'),
+        lambda handler, *_: handler.send_error(412),
+        {"If-Match": '"a"'},
+    ),
+    "shorter": (answer_with_tag(), lambda handler, *_: handler.send_error(416), {}),
 }
 
 
@@ -238,13 +242,13 @@ def test_a_change_between_requests_is_noticed(
 # Tried again ---------------------------------------------------------------------
 
 
-def failing(times: int, wrong: Answering) -> Answering:
+def fail_first(times: int, wrong: Answering) -> Answering:
     """So many answers are wrong, and all others sound."""
     left = [times]
 
     def answer(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
         left[0] -= 1
-        (wrong if left[0] >= 0 else ranged)(handler, data, start, stop)
+        (wrong if left[0] >= 0 else answer_range)(handler, data, start, stop)
 
     return answer
 
@@ -267,48 +271,50 @@ def busy(code: int, after: str = "") -> Answering:
     ids=["429", "502", "503", "504", "short", "silent"],
 )
 def test_what_may_pass_is_tried_three_times(
-    server: Server, waited: list[float], wrong: Answering
+    server: Server, retry_delays: list[float], wrong: Answering
 ) -> None:
-    server.wrong = failing(2, wrong)
+    server.wrong = fail_first(2, wrong)
     with mcz.open(server.address) as file:
         assert file.size == len(server.data)
     assert len(server.asked) == 3
-    assert waited == [0.5, 1.0]
-    server.wrong = failing(3, wrong)
+    assert retry_delays == [0.5, 1.0]
+    server.wrong = fail_first(3, wrong)
     with pytest.raises(AccessError, match="tried 3 times"):
         mcz.open(server.address)
 
 
-@pytest.mark.parametrize("wrong", [status(500), status(404), whole, moved, nonsense])
+@pytest.mark.parametrize("wrong", [status(500), status(404), whole, answer_shifted, nonsense])
 def test_what_will_not_pass_is_tried_once(
-    server: Server, waited: list[float], wrong: Answering
+    server: Server, retry_delays: list[float], wrong: Answering
 ) -> None:
     server.wrong = wrong
     with pytest.raises(AccessError) as found:
         mcz.open(server.address)
-    assert waited == []
+    assert retry_delays == []
     assert "tried" not in str(found.value)
 
 
-def test_a_server_may_ask_to_wait(server: Server, waited: list[float]) -> None:
-    server.wrong = failing(1, busy(503, "7"))
+def test_a_server_may_ask_to_wait(server: Server, retry_delays: list[float]) -> None:
+    server.wrong = fail_first(1, busy(503, "7"))
     mcz.open(server.address).close()
-    assert waited == [7.0]
+    assert retry_delays == [7.0]
     server.wrong = busy(429, "3600")
     with pytest.raises(AccessError, match="429 .* and asks to wait 3600 s"):
         mcz.open(server.address)
-    server.wrong = failing(1, busy(503, "Mon, 23 Nov 2020 10:00:00 GMT"))  # long past
+    server.wrong = fail_first(1, busy(503, "Mon, 23 Nov 2020 10:00:00 GMT"))  # long past
     mcz.open(server.address).close()
-    server.wrong = failing(1, busy(503, "soon"))
+    server.wrong = fail_first(1, busy(503, "soon"))
     mcz.open(server.address).close()
-    assert waited == [7.0, 0.5, 0.5]
+    assert retry_delays == [7.0, 0.5, 0.5]
 
 
-def test_a_connection_that_was_closed_is_made_anew(server: Server, waited: list[float]) -> None:
+def test_a_connection_that_was_closed_is_made_anew(
+    server: Server, retry_delays: list[float]
+) -> None:
     """A server closes what is idle: that is no failure."""
 
     def once(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
-        ranged(handler, data, start, stop)
+        answer_range(handler, data, start, stop)
         handler.close_connection = True  # unsaid
 
     server.wrong = once
@@ -316,14 +322,14 @@ def test_a_connection_that_was_closed_is_made_anew(server: Server, waited: list[
     stream._tail = b""
     assert stream.read_at(0, 8) == server.data[:8]
     assert stream.read_at(8, 8) == server.data[8:16]
-    assert (server.n_connections, waited) == (3, [])
+    assert (server.n_connections, retry_delays) == (3, [])
     stream.close()
 
 
 # Redirects, proxies, threads, processes ------------------------------------------
 
 
-def leading(to: str, code: int = 302) -> Answering:
+def redirect_to(to: str, code: int = 302) -> Answering:
     def answer(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
         if handler.path == "/a.mcz":
             handler.send_response(code)
@@ -331,20 +337,20 @@ def leading(to: str, code: int = 302) -> Answering:
             handler.send_header("Content-Length", "0")
             handler.end_headers()
         else:
-            ranged(handler, data, start, stop)
+            answer_range(handler, data, start, stop)
 
     return answer
 
 
 @pytest.mark.parametrize("code", [301, 302, 303, 307, 308])
 def test_later_requests_go_where_the_first_was_led(server: Server, code: int) -> None:
-    server.wrong = leading("b%20b.mcz?key=1", code)
+    server.wrong = redirect_to("b%20b.mcz?key=1", code)
     stream = http.HttpFile(server.address)
     stream._tail = b""
     assert stream.read_at(4, 4) == server.data[4:8]
     assert server.paths == ["/a.mcz", "/b%20b.mcz?key=1", "/b%20b.mcz?key=1"]
     server.wrong = lambda handler, *rest: (  # that address has expired
-        leading("/c.mcz")(handler, *rest) if "key" not in handler.path else status(403)(handler)
+        redirect_to("/c.mcz")(handler, *rest) if "key" not in handler.path else status(403)(handler)
     )
     assert stream.read_at(4, 4) == server.data[4:8]
     assert server.paths[3:] == ["/b%20b.mcz?key=1", "/a.mcz", "/c.mcz"]
@@ -353,7 +359,7 @@ def test_later_requests_go_where_the_first_was_led(server: Server, code: int) ->
 
 @pytest.mark.parametrize("to", ["ftp://127.0.0.1/a", "https://127.0.0.1:x/", "http://"])
 def test_bad_redirects_are_refused(server: Server, to: str) -> None:
-    server.wrong = leading(to)
+    server.wrong = redirect_to(to)
     with pytest.raises(AccessError):
         mcz.open(server.address)
 
@@ -408,11 +414,11 @@ CERTIFICATE = Path(__file__).parent / "https" / "server.pem"
 
 
 @pytest.fixture
-def secure(data: bytes, waited: list[float]) -> Iterator[Server]:
+def secure(data: bytes, retry_delays: list[float]) -> Iterator[Server]:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(CERTIFICATE)
     found = Server(data)
-    with served(found, context):
+    with serve(found, context):
         yield found
 
 
@@ -426,10 +432,10 @@ def test_https(secure: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     assert secure.n_connections == 1
 
 
-def test_a_certificate_that_nobody_vouches_for(secure: Server, waited: list[float]) -> None:
+def test_a_certificate_that_nobody_vouches_for(secure: Server, retry_delays: list[float]) -> None:
     with pytest.raises(AccessError, match="the certificate of 127.0.0.1 is not accepted: self"):
         mcz.open(secure.address)
-    assert waited == []
+    assert retry_delays == []
     assert secure.asked == []
 
 
@@ -437,10 +443,10 @@ def test_https_does_not_lead_to_http(
     secure: Server, server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SSL_CERT_FILE", str(CERTIFICATE))
-    secure.wrong = leading(server.address)
+    secure.wrong = redirect_to(server.address)
     with pytest.raises(AccessError, match="leads from https to http"):
         mcz.open(secure.address)
-    server.wrong = leading(secure.address.replace("a.mcz", "b.mcz"))
+    server.wrong = redirect_to(secure.address.replace("a.mcz", "b.mcz"))
     with mcz.open(server.address) as file:
         assert file.size == len(server.data)
     assert secure.paths[-1] == "/b.mcz"

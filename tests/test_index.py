@@ -24,7 +24,7 @@ from mcz.model.schema import Table, build, columns, field, parse
 from mcz.model.schema.records import Record
 from mcz.model.schema.types import SIZED, TEXT, UVARINT, Exactly
 from tests.motions import smooth
-from tests.web_server import Server, served
+from tests.web_server import Server, serve
 
 VECTORS = Path(conformance.__file__).parent / "vectors" / "valid"
 
@@ -126,7 +126,7 @@ def test_four_requests_open_a_file_of_many_appends(monkeypatch: pytest.MonkeyPat
             directory = file.container.directory
     assert len(directory.indexes) == 4
     server = Server(sink.getvalue())
-    with served(server), mcz.open(server.address) as file:
+    with serve(server), mcz.open(server.address) as file:
         assert list(file.clips) == [f"clip {number}" for number in range(10)]
         assert len(server.asked) <= 4
 

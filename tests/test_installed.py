@@ -13,7 +13,7 @@ import pytest
 
 import mcz
 from mcz.show.pictures.canvases import EXTRAS
-from tests.installed import PYPROJECT, required
+from tests.installed import PYPROJECT, required_modules
 
 ROOT = PYPROJECT.parent
 
@@ -31,7 +31,7 @@ assert mcz.verify("wavelet.mcz") == []
 """
 
 
-def installed(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+def run_installed(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "tests.installed", *words],
         cwd=folder,
@@ -52,12 +52,12 @@ def test_readme_runs(tmp_path: Path) -> None:
     commands = re.sub(r" && (cmp|echo).*", "", blocks("sh")[0]).splitlines()[1:]
     assert [line.split()[0] for line in commands] == ["mcz", "mcz", "mcz-info", "mcz"]
     for line in [*commands, "mcz decode samples/walk.mcz --to glb -o walk.glb"]:
-        done = installed(tmp_path, *line.split())
+        done = run_installed(tmp_path, *line.split())
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "restored.bvh").read_bytes() == (tmp_path / "samples/walk.bvh").read_bytes()
     (python,) = blocks("python")
     (tmp_path / "readme.py").write_text(python + MORE, "utf-8")
-    done = installed(tmp_path, "readme.py")
+    done = run_installed(tmp_path, "readme.py")
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -77,7 +77,7 @@ def test_what_needs_an_extra_names_it(
     samples: Path, tmp_path: Path, command: str, extra: str
 ) -> None:
     (tmp_path / "walk.bvh").write_bytes((samples / "walk.bvh").read_bytes())
-    done = installed(tmp_path, "mcz", *command.split())
+    done = run_installed(tmp_path, "mcz", *command.split())
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
     assert re.fullmatch(rf"mcz: .*not installed \(pip install 'mcz\[{extra}\]'\)\n", done.stderr), (
@@ -96,4 +96,4 @@ def test_every_extra_that_a_message_names_is_one() -> None:
 
 def test_an_installation_is_small() -> None:
     """pyproject.toml says what each costs; together they are to stay below 120 MB."""
-    assert required() <= {"numpy", "construct", "pywt", "click"}
+    assert required_modules() <= {"numpy", "construct", "pywt", "click"}

@@ -25,7 +25,7 @@ from mcz.files.reading import parallel_clips
 from mcz.files.reading.faults import validate
 from mcz.sources.sample import write_samples
 from tests.commands import run
-from tests.worker_functions import dies, dies_once, fails, joined
+from tests.worker_functions import dies, dies_once, fails, join_state
 
 
 @pytest.fixture(autouse=True)
@@ -45,16 +45,16 @@ def here(
         if item is None:
             return None
         try:
-            result = copied(function)(copied(state), copied(item))
+            result = pickle_copy(function)(pickle_copy(state), pickle_copy(item))
         except mcz.MczError as caught:
-            error = copied(caught)
+            error = pickle_copy(caught)
             return lambda: fail(error)
-        return lambda: copied(result)
+        return lambda: pickle_copy(result)
 
     yield map(answer, list(items))  # all are asked for before the first is joined
 
 
-def copied(thing: Any) -> Any:
+def pickle_copy(thing: Any) -> Any:
     return pickle.loads(pickle.dumps(thing))
 
 
@@ -194,7 +194,7 @@ def pool() -> Iterator[Pool]:
 
 def test_answers_come_in_order(pool: Pool) -> None:
     items = [0, None, 1, None, 2, 3, 4, 5, 6]
-    found = [answer and answer() for answer in pool.in_order(joined, items)]
+    found = [answer and answer() for answer in pool.in_order(join_state, items)]
     assert found == [None if item is None else ("state", item) for item in items]
     assert len(pool.pids) == 2
 
@@ -207,7 +207,7 @@ def test_few_items_are_taken_ahead(pool: Pool) -> None:
             taken.append(item)
             yield item
 
-    found = pool.in_order(joined, items())
+    found = pool.in_order(join_state, items())
     assert next(found) is not None
     assert len(taken) <= 6
 
@@ -308,10 +308,10 @@ def is_alive(pid: int) -> bool:
 def test_an_interrupt_leaves_nothing(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(*args: object) -> None:
+    def interrupt(*args: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(coded_parts, "join_part", interrupted)
+    monkeypatch.setattr(coded_parts, "join_part", interrupt)
     words = ["pack", str(folder), str(tmp_path / "all.mcz"), "--jobs", "2"]
     assert run(*words) == 130
     assert list(tmp_path.iterdir()) == []

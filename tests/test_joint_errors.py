@@ -17,7 +17,7 @@ from tests.commands import run
 
 
 @pytest.fixture(scope="module")
-def converted(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
+def converted_path(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
     """The walk's AMC, as BVH."""
     path = tmp_path_factory.mktemp("converted") / "walk.bvh"
     motion = mcz.convert(mcz.read(samples / "walk.amc", rate=120), "bvh")
@@ -28,14 +28,14 @@ def converted(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
 
 
 def test_an_amc_and_its_bvh_are_compared(
-    samples: Path, converted: Path, capsys: pytest.CaptureFixture[str]
+    samples: Path, converted_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     amc = str(samples / "walk.amc")
     capsys.readouterr()
-    assert run("diff", amc, converted, "--unit", "cm") == 0
+    assert run("diff", amc, converted_path, "--unit", "cm") == 0
     text = capsys.readouterr().out
     assert "31 joints of the same name: mean " in text and "alone" not in text
-    assert run("diff", amc, converted, "--json") == 0
+    assert run("diff", amc, converted_path, "--json") == 0
     found = json.loads(capsys.readouterr().out)["clips"][0]["joints"]
     assert len(found["joints"]) == 31 and found["greatest"] < 1e-3
     assert found["greatest_cm"] is None and found["only_in_a"] == found["only_in_b"] == []

@@ -38,14 +38,14 @@ class Own(np.ndarray):
 # How a clean array is laid out otherwise; each returns the array, and the memory that it is in.
 
 
-def unaligned(clean: Array) -> tuple[Array, Array]:
+def unaligned_copy(clean: Array) -> tuple[Array, Array]:
     memory = np.full(clean.nbytes + 17, GUARD, np.uint8)
     found = np.ndarray(clean.shape, clean.dtype, memory.data, offset=1)
     found[...] = clean
     return found, memory
 
 
-def packed(clean: Array) -> tuple[Array, Array]:
+def packed_copy(clean: Array) -> tuple[Array, Array]:
     record = np.dtype([("head", "u1"), ("values", clean.dtype), ("tail", "u2")])
     memory = np.full(clean.size * record.itemsize, GUARD, np.uint8)
     found = np.ndarray(clean.shape, record, memory.data)["values"]
@@ -63,7 +63,7 @@ def fortran(clean: Array) -> tuple[Array, Array]:
     return found, found.T.view(np.uint8).reshape(-1)
 
 
-def strided(clean: Array) -> tuple[Array, Array]:
+def strided_copy(clean: Array) -> tuple[Array, Array]:
     rows, columns = clean.shape
     memory = np.full((rows * 3, columns * 2 * clean.itemsize), GUARD, np.uint8).view(clean.dtype)
     found = memory[1::3, ::2]
@@ -76,7 +76,7 @@ def backward(clean: Array) -> tuple[Array, Array]:
     return memory[::-1, ::-1], memory.view(np.uint8).reshape(-1)
 
 
-def masked(clean: Array) -> tuple[Array, Array]:
+def masked_copy(clean: Array) -> tuple[Array, Array]:
     memory = clean.copy()
     return np.ma.masked_array(memory, memory > 1), memory.view(np.uint8).reshape(-1)
 
@@ -86,7 +86,7 @@ def own(clean: Array) -> tuple[Array, Array]:
     return memory.view(Own), memory.view(np.uint8).reshape(-1)
 
 
-def mapped(clean: Array) -> tuple[Array, Array]:
+def mapped_copy(clean: Array) -> tuple[Array, Array]:
     with tempfile.TemporaryFile() as file:
         file.write(bytes(7) + clean.tobytes())
         file.flush()
@@ -95,22 +95,22 @@ def mapped(clean: Array) -> tuple[Array, Array]:
     return found, np.asarray(whole)
 
 
-def transposed(clean: Array) -> tuple[Array, Array]:
+def transposed_copy(clean: Array) -> tuple[Array, Array]:
     memory = np.ascontiguousarray(clean.T)
     return memory.T, memory.view(np.uint8).reshape(-1)
 
 
 LAYOUTS = (
-    unaligned,
-    packed,
+    unaligned_copy,
+    packed_copy,
     big_endian,
     fortran,
-    strided,
+    strided_copy,
     backward,
-    masked,
+    masked_copy,
     own,
-    mapped,
-    transposed,
+    mapped_copy,
+    transposed_copy,
 )
 SHAPES = st.tuples(st.integers(1, 4), st.integers(1, 4))
 MODE = st.sampled_from(MODES)

@@ -25,10 +25,10 @@ FLOATS = st.floats() | st.sampled_from([0.0, -0.0, math.nan, math.inf, -math.inf
 SMALL = st.integers(-5, 15)
 
 
-def wrapped(answer: Any) -> Any:
+def wrap_integers(answer: Any) -> Any:
     """Integers as 64 bits hold them."""
     if isinstance(answer, tuple):
-        return tuple(map(wrapped, answer))
+        return tuple(map(wrap_integers, answer))
     if type(answer) is int:
         return (answer - LEAST) % 2**64 + LEAST
     return answer
@@ -50,7 +50,7 @@ def agree(name: str, *arguments: Any) -> Any:
     plain = getattr(kernel_samples, name)
     own = [np.copy(a) if isinstance(a, np.ndarray) else a for a in arguments]
     with np.errstate(all="ignore"):
-        answer = wrapped(plain(*own))
+        answer = wrap_integers(plain(*own))
     for mode in MODES:
         theirs = [np.copy(a) if isinstance(a, np.ndarray) else a for a in arguments]
         found = sample(name, mode)(*theirs)

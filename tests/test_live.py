@@ -42,7 +42,7 @@ from mcz.files.reading.sizes import layout
 from mcz.files.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth
-from tests.repair import flipped, parts_of, use, with_packets
+from tests.repair import flip_bit, parts_of, use, with_packets
 
 ROOT = Path(mcz.__file__).parent.parent
 
@@ -106,16 +106,16 @@ def test_numbers_of_missing_frames_come_with_the_end() -> None:
     assert [n for n, _, _ in live_frames(io.BytesIO(data))] == list(range(9))
     losses = FramesWithLosses(io.BytesIO(data), "missing", False, StreamSummary())
     assert [frame.state for frame in losses.frames()] == ["decoded"] * 9
-    for target in (data, extracted(data)):
+    for target in (data, extract_clips(data)):
         with mcz.open(target) as file:
             clip = file.clips["live"]
             assert clip.frame_numbers.tolist() == wanted
             np.testing.assert_array_equal(clip.times, (np.array(wanted) - 1) / 4)
-    with mcz.open(extracted(data, frames=(2, 7))) as file:
+    with mcz.open(extract_clips(data, frames=(2, 7))) as file:
         assert file.clips["live"].frame_numbers.tolist() == wanted[2:7]
 
 
-def extracted(data: bytes, **how: Any) -> bytes:
+def extract_clips(data: bytes, **how: Any) -> bytes:
     out = io.BytesIO()
     mcz.extract(data, out, **({"clip": "live"} | how))
     return out.getvalue()
@@ -304,7 +304,7 @@ def test_flipped_bits_are_found() -> None:
         assert row.cend is not None
         places = range(row.clip.offset + row.clip.size, row.cend.offset)
     for byte in places:
-        bad = flipped(data, byte, byte % 8)
+        bad = flip_bit(data, byte, byte % 8)
         assert mcz.verify(bad) != [], byte
         with pytest.raises(mcz.MczError):
             list(live_frames(io.BytesIO(bad)))
@@ -315,12 +315,12 @@ def with_body(data: bytes, frame: int, change: Callable[[bytes], bytes]) -> byte
     """The file, without an index, with another body of a packet, and the check of that."""
     number = -1
 
-    def changed(packet: Packet) -> Packet:
+    def change_packet(packet: Packet) -> Packet:
         nonlocal number
         number += 1
         return replace(packet, body=change(packet.body)) if number == frame else packet
 
-    return with_packets(data, changed)
+    return with_packets(data, change_packet)
 
 
 def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
@@ -328,7 +328,7 @@ def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
     for frame in range(13):
         for at in range(1, 160, 8):
             for change in (
-                lambda body, at=at: flipped(body, at // 8 % len(body), at % 8) if body else b"x",
+                lambda body, at=at: flip_bit(body, at // 8 % len(body), at % 8) if body else b"x",
                 lambda body, at=at: body[: at % max(1, len(body))] if body else b"\0",
             ):
                 bad = with_body(data, frame, change)
@@ -371,12 +371,12 @@ def test_many_frames(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     pushes = 0
     plain = live_codec.Decoder.push
 
-    def counted(self, stream, fresh):
+    def count_push(self, stream, fresh):
         nonlocal pushes
         pushes += 1
         return plain(self, stream, fresh)
 
-    monkeypatch.setattr(live_codec.Decoder, "push", counted)
+    monkeypatch.setattr(live_codec.Decoder, "push", count_push)
     with mcz.open(data) as file:
         np.testing.assert_array_equal(file.clips["live"].read(), values)
         assert pushes == n

@@ -51,7 +51,7 @@ def archive(tmp_path: Path) -> Path:
     return tmp_path / "a.mcz"
 
 
-def said(path: Path, *records: Record) -> Path:
+def append_metadata(path: Path, *records: Record) -> Path:
     """The file, to which these are appended, each in a META and a body of its own."""
     for record in records:
         with mcz.open(path) as file:
@@ -98,7 +98,7 @@ def test_a_changed_payload_is_read_or_refused(records: list[Record], data: st.Da
 
 
 def test_the_last_one_wins(archive: Path) -> None:
-    said(
+    append_metadata(
         archive,
         Record("walk", {"subject": "05", "place": "lab"}),
         Record("walk", {"subject": "06"}, ("place",)),
@@ -115,8 +115,8 @@ def test_a_key_that_is_said_behind_costs_one_read(archive: Path) -> None:
     """However many clips there are: no CLIP is read where a META has the last word."""
     with mcz.open(archive) as file:
         names = list(file.clips)
-    said(archive, *(Record(name, {"subject": "05", "x-mood": "good"}) for name in names))
-    said(archive, Record("walk", {}, ("subject",)))
+    append_metadata(archive, *(Record(name, {"subject": "05", "x-mood": "good"}) for name in names))
+    append_metadata(archive, Record("walk", {}, ("subject",)))
     with mcz.open(archive) as file:
         source = file.container.source
         before = source.n_requests
@@ -127,7 +127,9 @@ def test_a_key_that_is_said_behind_costs_one_read(archive: Path) -> None:
 
 
 def test_it_goes_along(archive: Path, tmp_path: Path) -> None:
-    said(archive, Record("walk", {"subject": "05"}), Record("walk.c3d", {"subject": "Ada"}))
+    append_metadata(
+        archive, Record("walk", {"subject": "05"}), Record("walk.c3d", {"subject": "Ada"})
+    )
     mcz.rename_clips(archive, {"walk": "first"})
     assert metadata(archive)["first"] == {"subject": "05"}
     assert mcz.extract(archive, tmp_path / "b.mcz", clip="first", frames=(0, 9)).clips
@@ -142,7 +144,9 @@ def test_it_goes_along(archive: Path, tmp_path: Path) -> None:
 
 
 def test_what_is_said_of_a_deleted_clip_is_gone(archive: Path) -> None:
-    said(archive, Record("walk", {"subject": "Ada Lovelace", "contact": "ada@example.org"}))
+    append_metadata(
+        archive, Record("walk", {"subject": "Ada Lovelace", "contact": "ada@example.org"})
+    )
     assert b"Ada" in archive.read_bytes() or b"ada@" in archive.read_bytes()
     mcz.delete_clips(archive, "walk")
     assert b"Ada" not in archive.read_bytes()
@@ -304,7 +308,7 @@ def readable(data: bytes) -> bytes:
     return b"\n".join(found)
 
 
-def purged(path: Path, words: list[str]) -> bytes:
+def check_purge(path: Path, words: list[str]) -> bytes:
     """The file without the consent of anything; ``words`` are what was said of it."""
     assert [word for word in words if word.encode() not in readable(path.read_bytes())] == []
     with mcz.open(path) as file:
@@ -330,7 +334,7 @@ def test_nothing_of_what_was_withdrawn_is_left(tmp_path: Path, samples: Path) ->
     mcz.set_metadata(path, {"walk": {"consent": in_meta}, "": {"consent": of_file}})
     mcz.protect(path, 0.2)
     mcz.set_metadata(path, {"walk": {"consent": last, "place": "hall 4"}})
-    after = purged(path, [in_clip, in_meta, of_file, last])
+    after = check_purge(path, [in_clip, in_meta, of_file, last])
     with mcz.open(path) as file:
         clip = file.only_clip()
         found = [clip.metadata[key] for key in ("subject", "place")]
@@ -343,7 +347,7 @@ def test_nothing_of_what_was_withdrawn_is_left(tmp_path: Path, samples: Path) ->
     options = {"params": {"gof": 4, "step": 0.5}, "metadata": {"consent": of_live}}
     live.write_bytes(b"".join(mcz.stream_encode(motion.values[:40, :6], ["a", "b"], **options)))
     assert live.read_bytes().count(of_live.encode()) > 1
-    purged(live, [of_live])
+    check_purge(live, [of_live])
 
 
 def test_what_is_purged_may_be_said_of_the_file(archive: Path, call: Call) -> None:

@@ -19,7 +19,7 @@ from mcz.codecs.contract import Encoded, Segment
 from mcz.files.writing.quality import LEFT_OUT, quality_entries
 from mcz.kinematics.angles import Unwrapper, turns, unwrap
 from tests import overlap_codec
-from tests.motions import POSITIONS, motions, skeleton, smooth, written
+from tests.motions import POSITIONS, motions, skeleton, smooth, write_bytes
 
 TURNS = st.lists(st.integers(-3, 3), min_size=50, max_size=50)
 
@@ -378,7 +378,7 @@ def test_records_without_channels_frames_or_units(lossy: None) -> None:
     empty = Motion(Skeleton(()), (Signal(np.empty((0, 0))),), frame_rate=Fraction(30), name="none")
     bare = replace(smooth(0), skeleton=replace(skeleton(), unit_cm=None))
     for motion in (empty, bare):
-        with mcz.open(written(motion, codec="overlap")) as file:
+        with mcz.open(write_bytes(motion, codec="overlap")) as file:
             quality = file.clips[motion.name].quality
         assert quality is not None
         assert quality["frames"] == "0"
@@ -395,7 +395,7 @@ def test_a_codec_that_gives_nan_is_seen(monkeypatch: pytest.MonkeyPatch) -> None
 
     codec = replace(overlap_codec.CODEC, encode=encode, decode=decode)
     monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, codec)
-    with mcz.open(written(smooth(5), codec="overlap")) as file:
+    with mcz.open(write_bytes(smooth(5), codec="overlap")) as file:
         quality = file.clips["smooth"].quality
     assert quality is not None
     assert quality["mismatched_values"] == "50"

@@ -28,7 +28,7 @@ def sha256(data: bytes) -> str:
 ROOT = Path(mcz.__file__).parent.parent
 
 
-def migrated(old: Path, *options: str) -> Path:
+def migrate_file(old: Path, *options: str) -> Path:
     new = old.with_name(f"new-{old.name}")
     words = ["--python-0-9", sys.executable, "--path-0-9", str(ROOT), str(old), str(new)]
     migration.main([*options, *words])
@@ -36,7 +36,7 @@ def migrated(old: Path, *options: str) -> Path:
     return new
 
 
-def unpacked(path: Path) -> dict[str, str]:
+def unpack_hashes(path: Path) -> dict[str, str]:
     """Name and SHA-256 of every file that comes out."""
     folder = path.with_suffix("")
     mcz.unpack(path, folder)
@@ -77,7 +77,7 @@ def test_times_of_a_table_without_a_signal_are_kept(tmp_path: Path) -> None:
     for codec in ("raw", "dwt"):
         old = tmp_path / f"{codec}.mcz"
         mcz.encode(tmp_path / "a.csv", old, codec=codec)
-        with mcz.open(migrated(old)) as file:
+        with mcz.open(migrate_file(old)) as file:
             clip = file.only_clip()
             assert clip.frame_numbers.tolist() == [4, 5, 6, 9]
             assert np.abs(clip.times - [0.08, 0.1, 0.12, 0.18]).max() < 1e-9
@@ -112,9 +112,9 @@ def test_an_archive(tmp_path: Path, samples: Path) -> None:
     mcz.rename_clips(old, {"walk.c3d": "markers/one"})
     mcz.set_metadata(old, {"": {"licence": "CC0-1.0"}, "walk": {"subject": "05"}})
     mcz.protect(old, 0.1)
-    new = migrated(old)
+    new = migrate_file(old)
     assert facts(new) == facts(old)
-    assert unpacked(new) == unpacked(old) and len(unpacked(old)) == 6
+    assert unpack_hashes(new) == unpack_hashes(old) and len(unpack_hashes(old)) == 6
     with mcz.open(new) as file:
         assert dict(file.metadata) == {"licence": "CC0-1.0"}
         assert {clip.codec for clip in file} == {"fast"}
@@ -128,9 +128,9 @@ def test_lossy_clips_keep_their_decoded_values(
 ) -> None:
     old = tmp_path / "old.mcz"
     mcz.encode(samples / "walk.bvh", old, codec="lossy", unit="cm")
-    new = migrated(old)
+    new = migrate_file(old)
     assert "walk.bvh is an attachment: decoded values are kept exactly" in capsys.readouterr().err
-    assert facts(new) == facts(old) and unpacked(new) == unpacked(old)
+    assert facts(new) == facts(old) and unpack_hashes(new) == unpack_hashes(old)
     with mcz.open(new) as file:
         assert file.only_clip().codec == "fast" and list(file.attachments) == ["walk.bvh"]
 
@@ -159,8 +159,8 @@ def test_motions_without_a_source(tmp_path: Path) -> None:
     )
     (tmp_path / "live.mcz").write_bytes(b"".join(live))
     mcz.merge([tmp_path / "one.mcz", tmp_path / "live.mcz"], tmp_path / "old.mcz")
-    assert facts(migrated(tmp_path / "old.mcz")) == facts(tmp_path / "old.mcz")
-    new = migrated(tmp_path / "one.mcz", "--codec", "raw")
+    assert facts(migrate_file(tmp_path / "old.mcz")) == facts(tmp_path / "old.mcz")
+    new = migrate_file(tmp_path / "one.mcz", "--codec", "raw")
     assert facts(new) == facts(tmp_path / "one.mcz")
     with mcz.open(new) as file:
         assert file.only_clip().codec == "raw" and file.header["profile"] != "base"
@@ -224,5 +224,5 @@ def test_a_damaged_file_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[
     data[len(data) // 2] ^= 1
     old.write_bytes(data)
     with pytest.raises(SystemExit, match="package 0.9 does not read it"):
-        migrated(old)
+        migrate_file(old)
     assert "old.mcz" in capfd.readouterr().err and not (tmp_path / "new-old.mcz").exists()

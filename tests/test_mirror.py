@@ -15,7 +15,7 @@ from mcz import Channel, Exceptions, Joint, Motion, MotionError, OptionError, Si
 from mcz.kinematics import origins_of, points_of, reach
 from mcz.kinematics.retargeting.sides import counterparts
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
-from tests.motions import POSITIONS, ROTATIONS, smooth, written
+from tests.motions import POSITIONS, ROTATIONS, smooth, write_bytes
 from tests.skeletons import joints as random_joints
 from tests.skeletons import skeletons, values_for
 
@@ -32,7 +32,9 @@ def without_scalars(skeleton: Skeleton) -> Skeleton:
     )
 
 
-def missed(motion: Motion, mirrored: Motion, axis: str = "x", pairs: dict | None = None) -> float:
+def mirror_error(
+    motion: Motion, mirrored: Motion, axis: str = "x", pairs: dict | None = None
+) -> float:
     """Distance of points from the mirrored points of their counterparts."""
     others = counterparts(motion.skeleton.joint_names, pairs)
     numbers = iter(range(10**6))
@@ -74,7 +76,7 @@ def test_positions_are_the_mirrored_ones(skeleton: Skeleton, axis: str) -> None:
     mirrored = mcz.mirror(motion, axis)
     assert mirrored.skeleton.joint_names == skeleton.joint_names
     assert mirrored.skeleton.parents.tolist() == skeleton.parents.tolist()
-    assert missed(motion, mirrored, axis) < 1e-9
+    assert mirror_error(motion, mirrored, axis) < 1e-9
     twice = mcz.mirror(mirrored, axis)
     assert np.abs(mcz.positions(twice) - mcz.positions(motion)).max(initial=0.0) < 1e-9
     assert twice.skeleton == replace(skeleton, source=None)
@@ -85,10 +87,10 @@ def test_positions_are_the_mirrored_ones(skeleton: Skeleton, axis: str) -> None:
 def test_the_walk_in_the_mirror_is_a_file_again(form: str) -> None:
     motion = replace(WALKS[form], signals=WALKS[form].signals[:1])
     mirrored = mcz.mirror(motion)
-    assert missed(motion, mirrored) < 1e-9 * reach(motion.skeleton) + 1e-12
+    assert mirror_error(motion, mirrored) < 1e-9 * reach(motion.skeleton) + 1e-12
     assert mirrored.source is None
     assert not np.signbit(mirrored.signals[0].values[mirrored.signals[0].values == 0]).any()
-    with mcz.open(written(mirrored)) as file:
+    with mcz.open(write_bytes(mirrored)) as file:
         again = file.only_clip("walk").motion()
     assert np.array_equal(again.values, mirrored.values, equal_nan=True)
     assert again.skeleton == mirrored.skeleton
@@ -195,7 +197,7 @@ def test_real_clips_in_the_mirror(data: Path) -> None:
         motion = mcz.read(path)
         mirrored = mcz.mirror(motion)
         size = reach(motion.skeleton)
-        greatest = max(greatest, missed(motion, mirrored) / size)
+        greatest = max(greatest, mirror_error(motion, mirrored) / size)
         others = counterparts(motion.skeleton.joint_names)
         there = origins_of(motion.skeleton, motion.values)[:, others, 1]
         here = origins_of(mirrored.skeleton, mirrored.values)[:, :, 1]

@@ -87,14 +87,14 @@ def test_printed_with_17_digits(numbers: list[float], places: int) -> None:
         assert len(text.replace(b".", b"").lstrip(b"0").rstrip(b"0")) <= max(17, 1)
 
 
-def trimmed(text: str, end: str = "") -> str:
+def trim_zeros(text: str, end: str = "") -> str:
     """``text`` without the zeros at the end of its fraction; ``end`` if it had nothing else."""
     head, point, fraction = text.partition(".")
     fraction = fraction.rstrip("0")
     return f"{head}.{fraction}" if point and fraction else head + end
 
 
-def restyled(text: str, flags: int) -> str:
+def restyle_number(text: str, flags: int) -> str:
     """A number as C's %g prints it, in the style of ``flags``, POINT and EXPONENT1 left out."""
     head, e, exponent = text.partition("e")
     if flags & GridFlag.NO_ZERO and "." in head and abs(float(head)) < 1:
@@ -117,7 +117,7 @@ def test_fixed_is_printf(values: list[float], digits: int) -> None:
     st.lists(st.floats(-99999, 99999), min_size=1), st.integers(1, 10), st.sampled_from((0, 1, 2))
 )
 def test_trimmed_is_printf_without_zeros(values: list[float], digits: int, flags: int) -> None:
-    texts = [trimmed(f"{value:.{digits}f}", ("", ".0", ".")[flags]) for value in values]
+    texts = [trim_zeros(f"{value:.{digits}f}", ("", ".0", ".")[flags]) for value in values]
     check_printed(Grid(GridKind.TRIMMED, digits, flags), texts)
 
 
@@ -128,7 +128,7 @@ def test_trimmed_is_printf_without_zeros(values: list[float], digits: int, flags
 )
 def test_general_is_printf_g(values: list[float], digits: int, chosen: set[GridFlag]) -> None:
     flags = sum(chosen)
-    texts = [restyled(f"{value:.{digits}g}", flags) for value in values]
+    texts = [restyle_number(f"{value:.{digits}g}", flags) for value in values]
     check_printed(Grid(GridKind.GENERAL, digits, flags), texts)
 
 
@@ -421,7 +421,7 @@ def test_choose_grid(texts: str, grid: Grid) -> None:
 
 def test_choose_grid_counts_exceptions() -> None:
     """One stray token does not give a whole channel 14 decimals; a preferred grid wins ties."""
-    texts = [trimmed(f"{k / 1000:.3f}") for k in range(1001, 3000)]
+    texts = [trim_zeros(f"{k / 1000:.3f}") for k in range(1001, 3000)]
     tokens = tokens_of(*texts, "-0.00709999999999")
     assert choose_grid(tokens) == Grid(GridKind.TRIMMED, 3)
     general = Grid(GridKind.GENERAL, 6)

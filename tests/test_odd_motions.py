@@ -23,7 +23,7 @@ N_FRAMES, N_CHANNELS = 6, 10
 CODECS = ("fast", "best", "raw")
 
 
-def written(motion: mcz.Motion, codec: str = "fast", **params: Any) -> mcz.Motion:
+def write_and_read(motion: mcz.Motion, codec: str = "fast", **params: Any) -> mcz.Motion:
     """The motion that a file of ``motion`` holds, which is sound by every check."""
     target = io.BytesIO()
     mcz.write(motion, target, codec, **params)
@@ -33,7 +33,7 @@ def written(motion: mcz.Motion, codec: str = "fast", **params: Any) -> mcz.Motio
         return file.only_clip().motion()
 
 
-def unaligned(array: np.ndarray) -> np.ndarray:
+def unaligned_copy(array: np.ndarray) -> np.ndarray:
     memory = np.zeros(array.nbytes + 1, np.uint8)
     odd = memory[1:].view(array.dtype).reshape(array.shape)
     odd[...] = array
@@ -46,7 +46,7 @@ def of_a_packed_record(array: np.ndarray) -> np.ndarray:
     return record["values"]
 
 
-def repeated(array: np.ndarray) -> np.ndarray:
+def repeat_first(array: np.ndarray) -> np.ndarray:
     return np.broadcast_to(array[:1], array.shape)
 
 
@@ -54,16 +54,16 @@ class Metres(np.ndarray):
     """A subclass whose results are of the class, too."""
 
 
-def mapped(array: np.ndarray) -> np.ndarray:
+def read_only_copy(array: np.ndarray) -> np.ndarray:
     array = np.ascontiguousarray(array)
     return np.frombuffer(array.tobytes(), array.dtype).reshape(array.shape)  # read-only
 
 
 SHAPES: list[Callable[[np.ndarray], Any]] = [
-    unaligned,
+    unaligned_copy,
     of_a_packed_record,
-    repeated,
-    mapped,
+    repeat_first,
+    read_only_copy,
     np.asfortranarray,
     lambda a: a[::-1, ::-1],
     lambda a: np.repeat(np.repeat(a, 2, 0), 3, 1)[::2, ::3],
@@ -116,7 +116,7 @@ def test_values_of_any_array(
     try:
         signal = mcz.Signal(given_values)
         motion = mcz.Motion(skeleton(), (signal,), frame_rate=100, name="odd")
-        found = written(motion, codec)
+        found = write_and_read(motion, codec)
     except mcz.MczError:
         return
     expected = np.ma.asarray(given_values)
@@ -186,7 +186,7 @@ def test_things_in_wrong_places(kind: type, name: str) -> None:
         try:
             part = replace(SAMPLES[kind], **{name: thing})
             motion = PARTS[kind](part)
-            found = written(motion)
+            found = write_and_read(motion)
         except mcz.MczError:
             continue
         except Exception as error:
@@ -305,11 +305,11 @@ def odd_motions(draw: st.DrawFn) -> mcz.Motion:
 def test_motions_come_back_or_are_refused(data: st.DataObject, codec: str) -> None:
     try:
         motion = data.draw(odd_motions())
-        found = written(motion, codec)
+        found = write_and_read(motion, codec)
     except mcz.MczError:
         return
     same(found, motion)
-    again = written(found, codec)
+    again = write_and_read(found, codec)
     same(again, motion)
 
 
@@ -351,17 +351,17 @@ def test_a_replaced_signal_has_a_source_of_its_own(
                 assert (clip.source_bytes() == read.read_bytes()) == same_file
             lossy = clip.motion()
         if name != "walk.c3d" or codec != "dwt":  # a grid of binary32 does not hold these
-            assert len(written(lossy, "fast")) == len(lossy)
+            assert len(write_and_read(lossy, "fast")) == len(lossy)
 
 
 def test_a_replaced_skeleton_has_no_file_of_its_own(samples: Path) -> None:
     bones = mcz.read_skeleton(samples / "walk.asf")
     zeros = mcz.Signal(np.zeros((3, bones.n_channels)))
     motion = mcz.Motion(bones, (zeros,), frame_rate=120)
-    assert written(motion).skeleton.source is not None
+    assert write_and_read(motion).skeleton.source is not None
     longer = replace(bones.joints[1], tails=((0.0, 9.0, 0.0),))
     other = replace(bones, joints=(bones.joints[0], longer, *bones.joints[2:]))
-    assert written(replace(motion, skeleton=other)).skeleton.source is None
+    assert write_and_read(replace(motion, skeleton=other)).skeleton.source is None
 
 
 @pytest.mark.parametrize("arguments", [

@@ -17,25 +17,25 @@ from tests.motions import POSITIONS, skeleton, smooth
 SCALARS = tuple(mcz.Channel("", f"c{number}", "V") for number in range(4))
 
 
-def sampled(motion: mcz.Motion, per_frame: int) -> mcz.Motion:
+def set_samples_per_frame(motion: mcz.Motion, per_frame: int) -> mcz.Motion:
     values = np.repeat(motion.signals[0].values, per_frame, axis=0)
     return replace(motion, signals=(mcz.Signal(values, samples_per_frame=per_frame),))
 
 
-def masked(motion: mcz.Motion) -> mcz.Motion:
+def mask_all(motion: mcz.Motion) -> mcz.Motion:
     signal = motion.signals[0]
     nothing = np.zeros(signal.values.shape, bool)
     return replace(motion, signals=(replace(signal, mask=nothing),))
 
 
-def moving(bones: mcz.Skeleton, values: Any, **arguments: Any) -> mcz.Motion:
+def odd_motion(bones: mcz.Skeleton, values: Any, **arguments: Any) -> mcz.Motion:
     return mcz.Motion(bones, (mcz.Signal(values, **arguments),), frame_rate=100, name="odd")
 
 
 def shapes() -> dict[str, mcz.Motion]:
     plain = smooth(8)
     points = [mcz.Joint(f"m{n}", channels=POSITIONS, adds_to_offset=False) for n in range(3)]
-    markers = moving(mcz.Skeleton(tuple(points), unit_cm=0.1), np.arange(72.0).reshape(8, 9))
+    markers = odd_motion(mcz.Skeleton(tuple(points), unit_cm=0.1), np.arange(72.0).reshape(8, 9))
     scalars = mcz.Skeleton(tuple(mcz.Joint(c.name, channels=(c,)) for c in SCALARS))
     still = mcz.Skeleton((mcz.Joint("a"), mcz.Joint("b", 0, (0, 1, 0))))
     analog = mcz.Signal(
@@ -48,20 +48,20 @@ def shapes() -> dict[str, mcz.Motion]:
     bones = plain.skeleton
     found = {
         "plain": plain,
-        "two samples": sampled(plain, 2),
-        "three samples of markers": sampled(markers, 3),
+        "two samples": set_samples_per_frame(plain, 2),
+        "three samples of markers": set_samples_per_frame(markers, 3),
         "markers": markers,
-        "no joints": moving(mcz.Skeleton(()), np.zeros((8, 0))),
-        "own channels": moving(skeleton(), np.zeros((8, 4)), channels=SCALARS),
-        "all masked": masked(plain),
-        "all masked markers": masked(markers),
+        "no joints": odd_motion(mcz.Skeleton(()), np.zeros((8, 0))),
+        "own channels": odd_motion(skeleton(), np.zeros((8, 4)), channels=SCALARS),
+        "all masked": mask_all(plain),
+        "all masked markers": mask_all(markers),
         "analog": replace(plain, signals=(plain.signals[0], analog)),
-        "scalars": moving(scalars, np.zeros((8, 4))),
-        "two samples of scalars": sampled(moving(scalars, np.zeros((8, 4))), 2),
-        "no channels": moving(still, np.zeros((8, 0))),
-        "NaN": moving(bones, np.full((8, 10), np.nan)),
-        "huge": moving(bones, np.full((8, 10), 1e308)),
-        "integers": moving(mcz.Skeleton(tuple(points[:1])), np.ones((8, 3), np.int64)),
+        "scalars": odd_motion(scalars, np.zeros((8, 4))),
+        "two samples of scalars": set_samples_per_frame(odd_motion(scalars, np.zeros((8, 4))), 2),
+        "no channels": odd_motion(still, np.zeros((8, 0))),
+        "NaN": odd_motion(bones, np.full((8, 10), np.nan)),
+        "huge": odd_motion(bones, np.full((8, 10), 1e308)),
+        "integers": odd_motion(mcz.Skeleton(tuple(points[:1])), np.ones((8, 3), np.int64)),
         "no rate": replace(plain, frame_rate=None),
         "fast markers": replace(markers, frame_rate=Fraction(10) ** 300),
         "late": replace(plain, frame_numbers=2**52 - np.arange(8, 0, -1)),
@@ -82,19 +82,19 @@ PLOTTED = ["plain", "two samples", "no joints", "all masked", "NaN", "huge", "ga
 PLOTTED += ["plain, 0 frames", "plain, 1 frames", "huge, 1 frames"]
 
 
-def kept(motion: mcz.Motion, folder: Path) -> Path:
+def write_clip(motion: mcz.Motion, folder: Path) -> Path:
     mcz.write(motion, folder / "a.mcz", force=True)
     return folder / "a.mcz"
 
 
 def windows(motion: mcz.Motion, folder: Path, **arguments: Any) -> None:
-    data = mcz.dataset(kept(motion, folder), **arguments)
+    data = mcz.dataset(write_clip(motion, folder), **arguments)
     assert len(list(data)) == len(data)
     repr(data), data.shapes, data.names
 
 
 def clip_arrays(motion: mcz.Motion, folder: Path) -> None:
-    with mcz.open(kept(motion, folder)) as file:
+    with mcz.open(write_clip(motion, folder)) as file:
         clip = file.only_clip()
         for name in ("positions", "rotations", "root", "velocities", "accelerations", "contacts"):
             try:
@@ -137,7 +137,7 @@ USES: dict[str, Callable[[mcz.Motion, Path], Any]] = {
     "a clip": clip_arrays,
     **{
         f"export {to}": lambda m, folder, to=to: mcz.export(
-            kept(m, folder), folder / to, to=to, force=True
+            write_clip(m, folder), folder / to, to=to, force=True
         )
         for to in ("bvh", "amc", "c3d", "trc", "mot", "sto", "csv", "npz", "glb", "usda")
     },

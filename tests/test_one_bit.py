@@ -10,8 +10,8 @@ import pytest
 
 import mcz
 from tests.commands import run
-from tests.kinds import KINDS, Values, body_of, chunks_of, files, kept, values_of
-from tests.repair import flipped
+from tests.kinds import KINDS, Values, body_of, chunks_of, count_kept_values, files, values_of
+from tests.repair import flip_bit
 
 # What a bit in the payload of a chunk may cost of the values; all else that it costs is said.
 COSTS_VALUES = {"CLIP", "DATA", "MODL"}
@@ -20,7 +20,7 @@ OF_A_TYPE = 2  # chunks of each type in a file
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[bytes, Values]]:
+def file_values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[bytes, Values]]:
     found = files(tmp_path_factory.mktemp("kinds"))
     return {name: (data, values_of(data)) for name, data in found.items()}
 
@@ -31,18 +31,18 @@ def sizes(values: Values) -> int:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bit_in_a_payload(
-    kind: str, made: dict[str, tuple[bytes, Values]], tmp_path: Path
+    kind: str, file_values: dict[str, tuple[bytes, Values]], tmp_path: Path
 ) -> None:
-    data, whole = made[kind]
+    data, whole = file_values[kind]
     seen: Counter[str] = Counter()
     for of, at, size in chunks_of(data):
         seen[of] += 1
         if seen[of] > OF_A_TYPE:
             continue
-        found = mcz.repair(flipped(data, body_of(of, at, size), 3), tmp_path / "o.mcz", force=True)
+        found = mcz.repair(flip_bit(data, body_of(of, at, size), 3), tmp_path / "o.mcz", force=True)
         repaired = (tmp_path / "o.mcz").read_bytes()
         assert not [p for p in mcz.verify(repaired) if p.heading != "Codecs"], of
-        count = kept(repaired, whole)
+        count = count_kept_values(repaired, whole)
         assert found.damage
         if kind == "protected":
             assert (found.restored, repaired) == (True, data), of
@@ -58,31 +58,31 @@ def test_a_bit_in_a_payload(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bit_in_a_header_costs_nothing(
-    kind: str, made: dict[str, tuple[bytes, Values]], tmp_path: Path
+    kind: str, file_values: dict[str, tuple[bytes, Values]], tmp_path: Path
 ) -> None:
-    data, whole = made[kind]
+    data, whole = file_values[kind]
     seen: Counter[str] = Counter()
     for of, at, _ in chunks_of(data):
         seen[of] += 1
         if seen[of] == 1:
             bit = 8 * (at % 16) + at % 8
-            bad = flipped(data, at + bit // 8, bit % 8)
+            bad = flip_bit(data, at + bit // 8, bit % 8)
             found = mcz.repair(bad, tmp_path / "o.mcz", force=True)
             assert found.lost == [], of
-            assert kept((tmp_path / "o.mcz").read_bytes(), whole) == sizes(whole), of
+            assert count_kept_values((tmp_path / "o.mcz").read_bytes(), whole) == sizes(whole), of
 
 
 @pytest.mark.parametrize("kind", ["bvh-fast", "acclaim", "c3d-best", "mdtt-archive"])
 def test_salvage_reads_all_that_repair_writes(
-    kind: str, made: dict[str, tuple[bytes, Values]], tmp_path: Path
+    kind: str, file_values: dict[str, tuple[bytes, Values]], tmp_path: Path
 ) -> None:
     """With a template or skeleton lost every command gives the values, and says what is lost."""
-    data, whole = made[kind]
+    data, whole = file_values[kind]
     for of, at, size in chunks_of(data):
         if of not in ("SRCE", "SKEL", "CEND"):
             continue
         path, out = tmp_path / f"{of}{at}.mcz", tmp_path / f"{of}{at}"
-        path.write_bytes(flipped(data, body_of(of, at, size), 3))
+        path.write_bytes(flip_bit(data, body_of(of, at, size), 3))
         assert kept_in_salvage(path.read_bytes(), whole) == sizes(whole)
         name = next(iter(whole))
         for arguments in (

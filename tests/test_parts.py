@@ -27,7 +27,7 @@ Read = Callable[[mcz.Clip], NDArray[Any]]
 
 
 @cache
-def encoded(codec: str) -> bytes:
+def encode_walk(codec: str) -> bytes:
     """The walk in several segments."""
     motion, out = bvh_walk(), io.BytesIO()
     skeleton = replace(motion.skeleton, unit_cm=1.0)
@@ -59,7 +59,7 @@ def places(data: bytes, n: int) -> list[int]:
 
 @pytest.mark.parametrize("codec", CODECS)
 def test_a_flipped_byte_is_found_or_does_not_matter(codec: str) -> None:
-    data = encoded(codec)
+    data = encode_walk(codec)
     with mcz.open(data) as file:
         (name,) = file.clips
         right = {what: (read, read(file.clips[name])) for what, read in reads(file.clips[name])}
@@ -96,7 +96,7 @@ def test_unverified_parts_are_counted() -> None:
 def test_the_command_says_what_is_unverified(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "walk.mcz").write_bytes(encoded("raw"))
+    (tmp_path / "walk.mcz").write_bytes(encode_walk("raw"))
     arguments = ["decode", str(tmp_path / "walk.mcz"), "--to", "csv", "--joints", "0", "--force"]
     assert run(cli, "mcz", [*arguments, "--json"]) == 0
     out, err = capsys.readouterr()

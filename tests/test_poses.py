@@ -24,13 +24,13 @@ from tests.skeletons import skeletons, values_for
 FORM_NAMES = st.sampled_from(sorted(FORMS))
 
 
-def moving(skeleton: Skeleton, n_frames: int = 7, rate: int | None = 100) -> Motion:
+def motion_of(skeleton: Skeleton, n_frames: int = 7, rate: int | None = 100) -> Motion:
     return Motion(skeleton, (Signal(values_for(skeleton, n_frames)),), frame_rate=rate)
 
 
 @given(skeletons())
 def test_rotations_are_those_of_the_chain(skeleton: Skeleton) -> None:
-    motion = moving(skeleton)
+    motion = motion_of(skeleton)
     chain = Chain(skeleton)
     ((_, _, pose),) = chain.poses(motion.values)
     world = mcz.rotations(motion, "matrix", space="world")
@@ -46,7 +46,7 @@ def test_rotations_are_those_of_the_chain(skeleton: Skeleton) -> None:
 
 @given(skeletons(), FORM_NAMES, st.sampled_from(["XYZ", "zxy", "ZYZ"]))
 def test_every_form_leads_back(skeleton: Skeleton, form: str, order: str) -> None:
-    motion = moving(skeleton)
+    motion = motion_of(skeleton)
     found = mcz.rotations(motion, form, order=order)
     back = to_matrices(found, form, order)
     np.testing.assert_allclose(back, mcz.rotations(motion, "matrix"), atol=1e-7)
@@ -198,7 +198,7 @@ def test_differences_stop_at_gaps() -> None:
 
 @given(skeletons(), st.sampled_from([30, 50, 100, 250, Fraction(30000, 1001)]))
 def test_resampled_turns_are_slerps(skeleton: Skeleton, rate: Fraction | int) -> None:
-    motion = moving(skeleton, 6)
+    motion = motion_of(skeleton, 6)
     other = mcz.resample(motion, rate)
     times = np.arange(other.n_frames) / float(rate)
     assert other.n_frames == int(Fraction(5, 100) * rate) + 1 and other.frame_rate == rate

@@ -21,7 +21,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.files.reading.post_filtering import filtered_motion, filtered_part
 from mcz.model.motion import Channel, Motion, Signal
 from mcz.sources.sample import acclaim_walk, marker_walk
-from tests.motions import written
+from tests.motions import write_bytes
 from tests.plain_post_filter import plain_rows, plain_taps
 
 ROOT = Path(__file__).parents[1]
@@ -66,7 +66,7 @@ def same(one: np.ndarray, other: np.ndarray) -> bool:
     )
 
 
-def streamed(stream: PostFilter, rows: np.ndarray) -> np.ndarray:
+def filter_stream(stream: PostFilter, rows: np.ndarray) -> np.ndarray:
     out = [stream.push(row) for row in rows]
     assert [row is None for row in out] == [n < DELAY for n in range(len(rows))]
     return np.concatenate([*(row[None] for row in out if row is not None), stream.finish()])
@@ -83,9 +83,9 @@ def test_row_by_row_is_the_same(
     rows: np.ndarray, more: np.ndarray, settings: tuple[float, float]
 ) -> None:
     stream = PostFilter(rows.shape[1], *settings)
-    assert same(streamed(stream, rows), filter_rows(rows, *settings))
+    assert same(filter_stream(stream, rows), filter_rows(rows, *settings))
     more = np.resize(more, (len(more), rows.shape[1])) if more.size else rows[:3]
-    assert same(streamed(stream, more), filter_rows(more, *settings))  # it is as new
+    assert same(filter_stream(stream, more), filter_rows(more, *settings))  # it is as new
 
 
 def test_each_filter_is_used() -> None:
@@ -183,7 +183,7 @@ def test_parts_are_cut_out_of_the_whole() -> None:
     motion = walk()
     whole = mcz.post_filter(motion)
     rows = whole.signals[0].values
-    with mcz.open(written(motion)) as file:
+    with mcz.open(write_bytes(motion)) as file:
         clip = next(iter(file.clips.values()))
         values, mask = filtered_part(clip, (9, 30), [2, 0])
         columns = [6, 7, 8, 0, 1, 2]
@@ -203,7 +203,7 @@ def test_resolutions_are_filtered_before_they_are_thinned() -> None:
     values = motion.signals[0].values[:, 3:12]
     bones = replace(motion.skeleton, joints=motion.skeleton.joints[1:4])
     plain = replace(motion, skeleton=bones, signals=(Signal(values),), frame_numbers=None)
-    with mcz.open(written(plain, codec="mrdwt", T_g=1.0)) as file:
+    with mcz.open(write_bytes(plain, codec="mrdwt", T_g=1.0)) as file:
         clip = next(iter(file.clips.values()))
         meant = mcz.post_filter(replace(clip.motion(resolution=2), source=None))
         made = filtered_motion(clip, (4, 40), 2, decimate=True)

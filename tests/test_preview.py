@@ -21,7 +21,7 @@ from mcz.files.reading.signal_info import SignalInfo
 from mcz.model.motion import Motion, Signal
 from tests import overlap_codec
 from tests.commands import run
-from tests.motions import skeleton, smooth, written
+from tests.motions import skeleton, smooth, write_bytes
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +31,7 @@ def overlap(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @given(st.integers(0, 400), st.integers(1, 90), st.integers(1, 200))
 def test_marks_are_what_they_decode_to(n_frames: int, delta: int, length: int) -> None:
-    data = written(smooth(n_frames), "qbc", delta=delta, segment_frames=length)
+    data = write_bytes(smooth(n_frames), "qbc", delta=delta, segment_frames=length)
     with mcz.open(data) as file:
         clip = file.only_clip()
         frames, values = clip.preview()
@@ -42,7 +42,7 @@ def test_marks_are_what_they_decode_to(n_frames: int, delta: int, length: int) -
 
 
 def test_joints_in_their_order() -> None:
-    with mcz.open(written(smooth(300), "qbc", segment_frames=80)) as file:
+    with mcz.open(write_bytes(smooth(300), "qbc", segment_frames=80)) as file:
         clip = file.only_clip()
         frames, values = clip.preview(["knee", "hips"])
         assert np.array_equal(values, clip.read(joints=["knee", "hips"])[frames])
@@ -50,7 +50,7 @@ def test_joints_in_their_order() -> None:
 
 def test_the_coarsest_resolution_where_no_frame_is_exact() -> None:
     for codec, step in (("mrdwt", 16), ("overlap", 2)):
-        with mcz.open(written(smooth(301), codec)) as file:
+        with mcz.open(write_bytes(smooth(301), codec)) as file:
             clip = file.only_clip()
             frames, values = clip.preview()
             resolution = step.bit_length() - 1
@@ -61,7 +61,7 @@ def test_the_coarsest_resolution_where_no_frame_is_exact() -> None:
 
 def test_one_resolution_has_no_preview() -> None:
     with (
-        mcz.open(written(smooth(30), "fast")) as file,
+        mcz.open(write_bytes(smooth(30), "fast")) as file,
         pytest.raises(OptionError, match="codec fast has stored it in one resolution"),
     ):
         file.only_clip().preview()
@@ -95,7 +95,7 @@ def test_what_is_invalid_is_nan() -> None:
     mask = np.ones(motion.values.shape, bool)
     mask[70:130, 4] = False
     motion = replace(motion, signals=(replace(motion.signals[0], mask=mask),))
-    with mcz.open(written(motion, "qbc", delta=40)) as file:
+    with mcz.open(write_bytes(motion, "qbc", delta=40)) as file:
         clip = file.only_clip()
         frames, values = clip.preview()
         assert np.array_equal(values, clip.read()[frames], equal_nan=True)
@@ -105,16 +105,16 @@ def test_what_is_invalid_is_nan() -> None:
 
 def test_as_a_motion_at_a_lower_rate() -> None:
     motion = smooth(201, metadata={"subject": "x"})
-    with mcz.open(written(motion, "qbc", delta=40)) as file:
+    with mcz.open(write_bytes(motion, "qbc", delta=40)) as file:
         found = preview_motion(file.only_clip())
         assert found.frame_rate == 3
         assert found.frame_numbers.tolist() == [1, 41, 81, 121, 161, 201]
         assert found.metadata == {"subject": "x"} and found.source is None
-    with mcz.open(written(smooth(190), "qbc", delta=40)) as file:
+    with mcz.open(write_bytes(smooth(190), "qbc", delta=40)) as file:
         found = preview_motion(file.only_clip())  # the last frame is nearer: it does not fit a rate
         assert found.frame_numbers.tolist() == [1, 41, 81, 121, 161]
         assert not file.only_clip().previewed().is_regular
-    with mcz.open(written(smooth(0), "qbc")) as file:
+    with mcz.open(write_bytes(smooth(0), "qbc")) as file:
         assert preview_motion(file.only_clip()).n_frames == 0
 
 
@@ -150,7 +150,7 @@ def long_motion(n_frames: int = 20_000) -> Motion:
 
 @pytest.mark.parametrize("codec", ["qbc", "mrdwt"])
 def test_details_are_not_read(codec: str) -> None:
-    data = written(long_motion(), codec)
+    data = write_bytes(long_motion(), codec)
     stream = Watched(data)
     with mcz.open(stream, unverified=True) as file:
         clip = file.only_clip()

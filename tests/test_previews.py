@@ -39,7 +39,7 @@ def walk(samples: Path, tmp_path: Path) -> Path:
     return tmp_path / "walk.mcz"
 
 
-def stepping(n_frames: int, at: int) -> Motion:
+def step_motion(n_frames: int, at: int) -> Motion:
     """Stands still but from frame ``at`` to the next."""
     values = np.zeros((n_frames, 10))
     values[at + 1 :, 0] = 6.0
@@ -49,7 +49,7 @@ def stepping(n_frames: int, at: int) -> Motion:
 @given(st.integers(2, 400), st.data())
 def test_energy_is_where_it_moves(n_frames: int, data: st.DataObject) -> None:
     at = data.draw(st.integers(0, n_frames - 2))
-    found = motion_energy(stepping(n_frames, at))
+    found = motion_energy(step_motion(n_frames, at))
     assert found is not None
     assert len(found) == min(CELLS, n_frames - 1)
     edges = np.linspace(0, n_frames - 1, len(found) + 1).astype(int)
@@ -86,11 +86,11 @@ def test_of_a_long_clip_few_segments_are_decoded(
     read: list[int] = []
     before = SignalReader.read
 
-    def counted(self: SignalReader, start: int, stop: int) -> Any:
+    def count_read(self: SignalReader, start: int, stop: int) -> Any:
         read.append(stop - start)
         return before(self, start, stop)
 
-    monkeypatch.setattr(SignalReader, "read", counted)
+    monkeypatch.setattr(SignalReader, "read", count_read)
     with mcz.open(tmp_path / "a.mcz") as file:
         found = motion_energy(file.only_clip())
     assert read == [2] * CELLS

@@ -31,22 +31,24 @@ def twins() -> Motion:
     return replace(plain, skeleton=replace(plain.skeleton, joints=joints, unit_cm=1.0))
 
 
-def opened(motion: Motion, codec: str, **params: object) -> mcz.Clip:
+def encode_clip(motion: Motion, codec: str, **params: object) -> mcz.Clip:
     out = io.BytesIO()
     mcz.write(motion, out, codec, **params)  # type: ignore[arg-type]
     return mcz.open(out.getvalue()).only_clip()
 
 
-def stored(clip: mcz.Clip) -> dict[str, str]:
+def stored_quality(clip: mcz.Clip) -> dict[str, str]:
     return clip.stored_quality or {}
 
 
 def test_figures_name_points_and_joints_by_index() -> None:
-    clip = opened(twins(), "mrdwt")
-    point, shown = stored(clip)["max_position_error_point"], clip.quality or {}
+    clip = encode_clip(twins(), "mrdwt")
+    point, shown = stored_quality(clip)["max_position_error_point"], clip.quality or {}
     assert shown["max_position_error_point"] == point_names(clip.skeleton)[int(point)]
     assert all(
-        value.isdigit() for key, value in stored(clip).items() if key.endswith(("_joint", "_point"))
+        value.isdigit()
+        for key, value in stored_quality(clip).items()
+        if key.endswith(("_joint", "_point"))
     )
 
 
@@ -56,24 +58,24 @@ def test_joints_stay_themselves_in_a_cut(tmp_path: Path) -> None:
     mcz.extract(whole, part, joints=["bone#3", "bone"], frames=(10, 50))
     with mcz.open(part) as file:
         clip = file.only_clip()
-        assert stored(clip)["cut-joints"] == "0,3"
+        assert stored_quality(clip)["cut-joints"] == "0,3"
         assert (clip.quality or {})["cut-joints"] == "bone,bone#3"
     values = np.zeros((40, len(twins().skeleton.columns(3))))
     mcz.replace(part, None, "bone#3", values, edited)
     with mcz.open(edited) as file:
         clip = file.only_clip()
-        assert stored(clip)["edit-joints"] == "3"
+        assert stored_quality(clip)["edit-joints"] == "3"
         assert (clip.quality or {})["edit-joints"] == "bone#3"
-        assert stored(clip)["cut-joints"] == "0,3"
+        assert stored_quality(clip)["cut-joints"] == "0,3"
 
 
 def test_settings_name_joints_by_index_and_groups_by_word() -> None:
     foot = WALK.skeleton.find("LeftFoot")
-    clip = opened(WALK, "posewave", quality="feet=3cm,Head=3cm", lossless="LeftFoot")
+    clip = encode_clip(WALK, "posewave", quality="feet=3cm,Head=3cm", lossless="LeftFoot")
     head = WALK.skeleton.find("Head")
-    assert stored(clip)["param.lossless"] == str(foot)
-    assert stored(clip)["param.quality"] == f"feet=3.0cm,{head}=3.0cm"
-    assert {f"quality_reached.{head}", "quality_reached.feet"} <= set(stored(clip))
+    assert stored_quality(clip)["param.lossless"] == str(foot)
+    assert stored_quality(clip)["param.quality"] == f"feet=3.0cm,{head}=3.0cm"
+    assert {f"quality_reached.{head}", "quality_reached.feet"} <= set(stored_quality(clip))
     shown = clip.quality or {}
     assert shown["param.quality"] == "feet=3.0cm,Head=3.0cm"
     assert "quality_reached.Head" in shown and shown["param.lossless"] == "LeftFoot"

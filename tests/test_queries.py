@@ -248,12 +248,12 @@ likes = st.builds(Like, operands, patterns)
 leaves = equalities | orders | lists | likes | st.builds(Missing, names)
 
 
-def joined(nodes: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+def join_nodes(nodes: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     several = st.lists(nodes, min_size=2, max_size=3).map(tuple)
     return st.builds(Not, nodes) | st.builds(And, several) | st.builds(Or, several)
 
 
-trees = st.recursive(leaves, joined, max_leaves=8)
+trees = st.recursive(leaves, join_nodes, max_leaves=8)
 
 
 @given(trees)
@@ -298,7 +298,7 @@ def reference(node: Any, clip: dict[str, Value]) -> float:
         case In(operand, choices):
             return max(reference(Compare(operand, "==", each), clip) for each in choices)
         case Compare(left, sign, right):
-            return compared(value_of(left, clip), sign, value_of(right, clip))
+            return compare_in_sql(value_of(left, clip), sign, value_of(right, clip))
     raise AssertionError(node)
 
 
@@ -306,7 +306,7 @@ def value_of(operand: Any, clip: dict[str, Value]) -> Value:
     return clip[operand.name] if isinstance(operand, Name) else operand.value
 
 
-def compared(a: Any, sign: str, b: Any) -> float:
+def compare_in_sql(a: Any, sign: str, b: Any) -> float:
     kinds = {"bool" if isinstance(x, bool) else type(x).__name__ for x in (a, b)}
     if "NoneType" in kinds:
         return 0.5

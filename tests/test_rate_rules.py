@@ -162,7 +162,7 @@ SOURCES = {  # a file, where its rate stands, and that at 50 a second
 }
 
 
-def corrected(suffix: str, tmp_path: Path, **options: Any) -> tuple[Path, bytes]:
+def write_corrected(suffix: str, tmp_path: Path, **options: Any) -> tuple[Path, bytes]:
     """A clip of 50 frames a second whose source states another rate, and the source."""
     data = SOURCES[suffix][0]
     path, target = tmp_path / (suffix if "." in suffix else f"a.{suffix}"), tmp_path / "a.mcz"
@@ -171,7 +171,7 @@ def corrected(suffix: str, tmp_path: Path, **options: Any) -> tuple[Path, bytes]
     return target, data
 
 
-def stated(suffix: str, data: bytes) -> bytes:
+def stated_rate(suffix: str, data: bytes) -> bytes:
     found = re.search(SOURCES[suffix][1], data)
     assert found is not None
     return found[1]
@@ -179,14 +179,14 @@ def stated(suffix: str, data: bytes) -> bytes:
 
 @pytest.mark.parametrize("suffix", SOURCES)
 def test_parts_state_a_corrected_rate(suffix: str, tmp_path: Path) -> None:
-    target, data = corrected(suffix, tmp_path)
+    target, data = write_corrected(suffix, tmp_path)
     wanted = SOURCES[suffix][2]
     with mcz.open(target) as file:
         clip = file.only_clip()
         assert clip.source_bytes() == data
         assert clip.source_bytes((0, clip.n_frames)) == data
         part = clip.source_bytes((3, 9))
-        assert stated(suffix, part) == wanted
+        assert stated_rate(suffix, part) == wanted
         times = clip.times
         assert np.allclose(np.diff(times), 0.02, atol=1e-9)
     cut = tmp_path / "cut.mcz"
@@ -202,9 +202,9 @@ def test_parts_state_a_corrected_rate(suffix: str, tmp_path: Path) -> None:
 
 
 def test_lossy_copies_state_a_corrected_rate(tmp_path: Path) -> None:
-    target, _ = corrected("bvh", tmp_path, codec="mrdwt")
+    target, _ = write_corrected("bvh", tmp_path, codec="mrdwt")
     with mcz.open(target) as file:
-        assert stated("bvh", file.only_clip().source_bytes()) == b"0.02"
+        assert stated_rate("bvh", file.only_clip().source_bytes()) == b"0.02"
 
 
 def test_a_c3d_states_a_corrected_rate(tmp_path: Path) -> None:

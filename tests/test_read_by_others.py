@@ -164,16 +164,16 @@ def test_blender_puts_the_joints_of_a_bvh_there(samples: Path, tmp_path: Path, n
 # What is left out -----------------------------------------------------------------------
 
 
-def told(motion: Motion, to: str) -> str:
+def losses_text(motion: Motion, to: str) -> str:
     return "; ".join(mcz.left_out(motion, to))
 
 
 def test_other_signals_are_named(samples: Path) -> None:
     motion = mcz.read(samples / "walk.c3d")
     for to in ("csv", "npz", "trc", "sto", "mot", "glb", "usda"):
-        assert "left out: signal residuals" in told(motion, to)
-    assert told(motion, "c3d") == ""
-    assert told(mcz.read(samples / "walk.bvh"), "trc") == ""
+        assert "left out: signal residuals" in losses_text(motion, to)
+    assert losses_text(motion, "c3d") == ""
+    assert losses_text(mcz.read(samples / "walk.bvh"), "trc") == ""
 
 
 def test_plain_scalars_frame_numbers_and_names_are_named(samples: Path) -> None:
@@ -183,26 +183,29 @@ def test_plain_scalars_frame_numbers_and_names_are_named(samples: Path) -> None:
     skeleton = replace(motion.skeleton, joints=(hips, *motion.skeleton.joints[1:]))
     values = np.insert(motion.values, 6, 1.0, axis=1)
     odd = Motion(skeleton, (Signal(values),), 60)
-    assert "left out: smile, which move nothing" in told(odd, "trc")
-    assert "left out: smile, which move nothing" in told(odd, "glb")
-    assert told(odd, "bvh") == told(odd, "sto") == ""
+    assert "left out: smile, which move nothing" in losses_text(odd, "trc")
+    assert "left out: smile, which move nothing" in losses_text(odd, "glb")
+    assert losses_text(odd, "bvh") == losses_text(odd, "sto") == ""
     later = replace(motion, frame_numbers=np.arange(5, 245))
     start = "the time of the first frame, 0.0333333 s: BVH begins at 0 s"
-    assert told(later, "bvh") == f"left out: frame numbers, which begin with 5; left out: {start}"
-    assert told(later, "c3d") == told(later, "trc") == ""
+    assert (
+        losses_text(later, "bvh")
+        == f"left out: frame numbers, which begin with 5; left out: {start}"
+    )
+    assert losses_text(later, "c3d") == losses_text(later, "trc") == ""
     with_a_hole = np.arange(5, 245) + (np.arange(240) > 99)
     holed = replace(motion, frame_numbers=with_a_hole)
-    assert "frame numbers but the first, 5" in told(holed, "c3d")
-    assert "'Hips' is called root" in told(motion, "amc")
+    assert "frame numbers but the first, 5" in losses_text(holed, "c3d")
+    assert "'Hips' is called root" in losses_text(motion, "amc")
     renamed = mcz.rename(motion, {"Head": "the head"})
-    assert "cannot hold the joint names 'the head'" in told(renamed, "amc")
+    assert "cannot hold the joint names 'the head'" in losses_text(renamed, "amc")
 
 
 @pytest.mark.real
 def test_events_and_platforms_are_named(data: Path) -> None:
     motion = mcz.read(data / "other/btk-data/Analysis.c3d")
     for to in ("npz", "trc", "c3d"):
-        assert "left out: 6 events" in told(motion, to)
+        assert "left out: 6 events" in losses_text(motion, to)
 
 
 @pytest.mark.parametrize("name", ["", " LFHD", "RFHD "])

@@ -30,7 +30,7 @@ POSITIONS: dict[str, dict[str, Any]] = {
 CODECS = {**CHANNELS, **POSITIONS}
 
 
-def written(motions: list[mcz.Motion], codec: str) -> bytes:
+def write_bytes(motions: list[mcz.Motion], codec: str) -> bytes:
     out = io.BytesIO()
     writer = Writer(out)
     for one in motions:
@@ -55,7 +55,7 @@ def columns(held: Any, *joints: str) -> list[int]:
 
 @pytest.mark.parametrize("codec", CODECS)
 def test_joints_are_extracted(codec: str) -> None:
-    whole, out = written([motion()], codec), io.BytesIO()
+    whole, out = write_bytes([motion()], codec), io.BytesIO()
     with pytest.raises(OptionError, match="coded in one group .* recode"):
         mcz.extract(whole, io.BytesIO(), joints=["hips"])
     found = mcz.extract(whole, out, joints=["knee", "hips"], frames=(5, 30), recode=True)
@@ -77,7 +77,7 @@ def test_joints_are_extracted(codec: str) -> None:
 
 @pytest.mark.parametrize("codec", CODECS)
 def test_a_joint_is_replaced(codec: str) -> None:
-    whole, out = written([motion("other"), motion()], codec), io.BytesIO()
+    whole, out = write_bytes([motion("other"), motion()], codec), io.BytesIO()
     before = clip(whole)
     own = columns(before, "knee")
     given = before.values[:, own] + 0.5
@@ -126,7 +126,7 @@ def test_a_lossless_clip_is_coded_anew_without_an_error() -> None:
 
 
 def test_an_edit_of_an_edit_remembers_both() -> None:
-    data = written([motion()], "posewave")
+    data = write_bytes([motion()], "posewave")
     for joint in ("knee", "spine"):
         out = io.BytesIO()
         given = clip(data).values[:, columns(clip(data), joint)]
@@ -164,7 +164,7 @@ def test_what_cannot_be_coded_anew() -> None:
     assert copied.getvalue() == plain.getvalue()  # nothing had to be coded anew
 
 
-def stored(data: bytes) -> list[int]:
+def stored_frames(data: bytes) -> list[int]:
     """The frames that each signal of a clip stores."""
     return [sum(row.header.n_frames for row in info.rows) for info in clip(data).signals]
 
@@ -209,7 +209,7 @@ def test_exact_joints_stay_exact_where_frames_are_cut() -> None:
     knee = columns(clip(out.getvalue()), "knee")
     wanted = clip(out.getvalue()).values[5:30][:, knee]
     assert clip(part.getvalue()).values[:][:, knee].tobytes() == wanted.tobytes()
-    assert stored(part.getvalue()) == [25]
+    assert stored_frames(part.getvalue()) == [25]
 
 
 def test_settings_are_read_as_they_are_recorded() -> None:
@@ -235,7 +235,7 @@ def test_contacts_are_left_out_where_joints_are() -> None:
 
 def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole, part, table = tmp_path / "a.mcz", tmp_path / "b.mcz", tmp_path / "knee.csv"
-    whole.write_bytes(written([motion()], "posewave"))
+    whole.write_bytes(write_bytes([motion()], "posewave"))
     assert run("extract", whole, part, "--joints", "knee") == 2
     assert "--recode codes them anew" in capsys.readouterr().err
     assert not part.exists()

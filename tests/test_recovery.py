@@ -117,7 +117,7 @@ def shapes(archive: bytes) -> list[Shape]:
         return [key.shape for key in protections(file.container)]
 
 
-def restored(bad: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
+def restore_file(bad: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
     (folder / "bad.mcz").write_bytes(bad)
     (folder / "out.mcz").unlink(missing_ok=True)
     report = mcz.repair(folder / "bad.mcz", folder / "out.mcz")
@@ -133,7 +133,7 @@ def test_what_follows_a_protected_file_is_protected(archive: bytes, shapes: list
 
 
 def test_a_file_that_is_as_it_was_comes_back(archive: bytes, tmp_path: Path) -> None:
-    report, data = restored(archive, tmp_path)
+    report, data = restore_file(archive, tmp_path)
     assert (report.restored, report.damage, data) == (True, [], archive)
 
 
@@ -149,7 +149,7 @@ def test_bad_bytes_wherever_they_lie(
         places = st.integers(shape.start, shape.stop - 1)
         for at in data.draw(st.sets(places, min_size=1, max_size=most)):
             bad[at] ^= data.draw(st.integers(1, 255))
-    report, found = restored(bytes(bad), tmp_path)
+    report, found = restore_file(bytes(bad), tmp_path)
     assert report.restored
     assert found == archive
 
@@ -163,7 +163,7 @@ def test_a_burst_wherever_it_lies(
     at = data.draw(st.integers(shape.start, shape.stop - shape.burst))
     fill = data.draw(st.sampled_from([b"\0", b"\xff", b"\x89RCV"]))
     burst = (fill * shape.burst)[: shape.burst]
-    report, found = restored(archive[:at] + burst + archive[at + shape.burst :], tmp_path)
+    report, found = restore_file(archive[:at] + burst + archive[at + shape.burst :], tmp_path)
     assert report.restored
     assert found == archive
 
@@ -176,7 +176,7 @@ def test_bad_blocks_are_solved_by_columns(
     shape = shapes[0]
     for at in (100, shape.stop - shape.burst):
         bad = archive[:at] + bytes(shape.burst) + archive[at + shape.burst :]
-        report, found = restored(bad, tmp_path)
+        report, found = restore_file(bad, tmp_path)
         assert report.restored
         assert found == archive
 
@@ -198,7 +198,7 @@ def test_what_is_cut_off_or_put_in(
         size = data.draw(st.integers(1, first.burst - first.block_size))
         bad = archive[:at] + (b"" if kind == "gap" else b"?" * size)
         bad += archive[at + size if kind == "gap" else at :]
-    report, found = restored(bad, tmp_path)
+    report, found = restore_file(bad, tmp_path)
     assert report.restored, kind
     assert found == archive
 
@@ -208,7 +208,7 @@ def test_beyond_it_what_is_whole_is_saved(
 ) -> None:
     shape = shapes[0]
     size = (shape.n_recovery + 1) * shape.block_size
-    report, _ = restored(archive[:1000] + bytes(size) + archive[1000 + size :], tmp_path)
+    report, _ = restore_file(archive[:1000] + bytes(size) + archive[1000 + size :], tmp_path)
     assert not report.restored
     assert report.recovery is not None
     assert not report.recovery.possible
@@ -251,7 +251,7 @@ def test_any_damage_is_repaired_or_salvaged_or_refused(
         if not bad:
             break
     try:
-        report, found = restored(bytes(bad), tmp_path)
+        report, found = restore_file(bytes(bad), tmp_path)
     except mcz.MczError:
         return
     assert found == archive or not report.restored
@@ -317,7 +317,7 @@ def test_all_of_a_file_is_protected_anew(archive: bytes, tmp_path: Path) -> None
     (protection,) = mcz.protect(path, 0.1, anew=True)
     whole = path.read_bytes()
     assert (protection.start, protection.stop) == (0, len(whole))
-    report, found = restored(whole[: -protection.burst], tmp_path)
+    report, found = restore_file(whole[: -protection.burst], tmp_path)
     assert report.restored
     assert found == whole
     with mcz.open(path) as file:
@@ -384,7 +384,7 @@ DAMAGED = [
 @pytest.mark.parametrize("damaged", DAMAGED, ids=lambda path: path.stem)
 def test_the_vectors_are_repaired(damaged: Path, tmp_path: Path) -> None:
     sound = VECTORS / "valid" / "recovery" / f"{damaged.stem.rpartition('-')[0]}.mcz"
-    report, data = restored(damaged.read_bytes(), tmp_path)
+    report, data = restore_file(damaged.read_bytes(), tmp_path)
     assert (report.restored, data) == (True, sound.read_bytes())
 
 
@@ -406,7 +406,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
     return (folder / "a.mcz").read_bytes(), plain
 
 
-def held(data: bytes) -> set[tuple[str, bytes]]:
+def file_contents(data: bytes) -> set[tuple[str, bytes]]:
     """Contents of a file, by name."""
     with mcz.open(data) as file:
         found = {(clip.name, clip.read().tobytes()) for clip in file}
@@ -414,7 +414,7 @@ def held(data: bytes) -> set[tuple[str, bytes]]:
 
 
 def test_one_byte_more_is_left_out(small: tuple[bytes, bytes], tmp_path: Path) -> None:
-    report, data = restored(small[0] + b"?", tmp_path)
+    report, data = restore_file(small[0] + b"?", tmp_path)
     assert (report.restored, report.lost, data) == (True, [], small[0])
     assert any("1 bytes behind its end" in line for line in report.damage)
 
@@ -434,12 +434,12 @@ def test_protection_makes_no_tail_worse(
     kept = []
     for file in small:
         try:
-            _, found = restored(file + tail, tmp_path)
+            _, found = restore_file(file + tail, tmp_path)
         except mcz.FormatError:
             kept.append(set())
             continue
         assert mcz.verify(found) == []
-        kept.append(held(found))
+        kept.append(file_contents(found))
     assert kept[1] <= kept[0]
 
 
@@ -453,11 +453,11 @@ def test_other_files_have_recovery_data_too(
     (takes / "inner.mcz").write_bytes(small[0])
     mcz.pack(takes, tmp_path / "outer.mcz", keep_all=True, copies=False)
     outer = (tmp_path / "outer.mcz").read_bytes()
-    report, data = restored(outer + b"?", tmp_path)
-    assert (report.restored, report.lost, held(data)) == (False, [], held(outer))
+    report, data = restore_file(outer + b"?", tmp_path)
+    assert (report.restored, report.lost, file_contents(data)) == (False, [], file_contents(outer))
     for first, second in ((small[0], archive), (archive, small[0])):
-        _, data = restored(first + second, tmp_path)
-        assert held(data) >= held(first) | held(second)
+        _, data = restore_file(first + second, tmp_path)
+        assert file_contents(data) >= file_contents(first) | file_contents(second)
 
 
 def test_what_can_be_restored_is_though_more_was_lost(
@@ -468,7 +468,7 @@ def test_what_can_be_restored_is_though_more_was_lost(
     bad = bytearray(archive)
     bad[200 : 200 + first.burst] = bytes(first.burst)
     bad[second.start + 20 : second.start + 8000] = bytes(7980)
-    report, data = restored(bytes(bad), tmp_path)
+    report, data = restore_file(bytes(bad), tmp_path)
     assert not report.restored
     with mcz.open(archive) as file, mcz.open(data) as found:
         whole = {name for name in file.clips if name != "more"}

@@ -34,7 +34,7 @@ from mcz.sources.text.hierarchy import write_hierarchy
 from mcz.sources.text.layout import MAX_RUNS, Layout, Pattern, Run
 from tests.clocked_files import bvh
 from tests.commands import run
-from tests.motions import smooth, written
+from tests.motions import smooth, write_bytes
 
 BVH = bvh("1.25", "1.23456789e-01", "2.50")
 
@@ -45,14 +45,14 @@ def test_exceptions_do_not_outlive_their_values(tmp_path: Path) -> None:
     motion = mcz.read(path)
     assert len(motion.signals[0].exceptions) == 1
     changed = motion.with_values(motion.values + 1)
-    with mcz.open(written(changed)) as file:
+    with mcz.open(write_bytes(changed)) as file:
         np.testing.assert_array_equal(file.clips["a"].read(), motion.values + 1)
 
 
 def test_salvage_of_integers() -> None:
     bones = mcz.Skeleton((mcz.Joint("m", channels=(mcz.Channel("", "count"),)),))
     signal = Signal(np.arange(40).reshape(40, 1))
-    data = bytearray(written(mcz.Motion(bones, (signal,)), codec="raw", segment_frames=10))
+    data = bytearray(write_bytes(mcz.Motion(bones, (signal,)), codec="raw", segment_frames=10))
     with mcz.open(bytes(data), salvage=True) as file:
         assert file.clips["motion"].motion().signals[0].values.tolist() == signal.values.tolist()
     with mcz.open(bytes(data)) as file:
@@ -71,7 +71,7 @@ def test_templates_keep_their_limit() -> None:
 
 def test_reserved_metadata() -> None:
     with pytest.raises(mcz.MotionError, match="frame-numbers"):
-        written(smooth(3, metadata={"frame-numbers": "zzz"}))
+        write_bytes(smooth(3, metadata={"frame-numbers": "zzz"}))
 
 
 @pytest.fixture
@@ -140,7 +140,7 @@ def test_names_with_colons(tmp_path: Path) -> None:
 def test_a_base_in_another_file_is_forgotten() -> None:
     motion = smooth(3)
     bones = replace(motion.skeleton, base=b"a" * 16)
-    assert mcz.verify(written(replace(motion, skeleton=bones))) == []
+    assert mcz.verify(write_bytes(replace(motion, skeleton=bones))) == []
 
 
 @pytest.mark.parametrize("through", ["walk.mcz", "walk.amc", "clip"])
@@ -161,7 +161,7 @@ def test_a_skeletons_own_file_survives(tmp_path: Path, through: str) -> None:
 
 def test_joints_by_numpy_numbers() -> None:
     motion = smooth(3)
-    with mcz.open(written(motion)) as file:
+    with mcz.open(write_bytes(motion)) as file:
         clip = file.clips["smooth"]
         wanted = clip.read(joints=[1, 0])
         np.testing.assert_array_equal(clip.read(joints=np.array([1, 0])), wanted)
@@ -181,7 +181,7 @@ def test_joints_by_numpy_numbers() -> None:
 def test_rates_of_other_kinds(rate: object, expected: Fraction) -> None:
     motion = replace(smooth(3), frame_rate=rate)
     assert motion.frame_rate == expected
-    with mcz.open(written(motion)) as file:
+    with mcz.open(write_bytes(motion)) as file:
         assert file.clips["smooth"].frame_rate == expected
 
 
@@ -198,7 +198,7 @@ def test_runs_are_limited_when_written() -> None:
 
 
 def test_salvage_gives_up_where_everything_looks_like_a_chunk() -> None:
-    data = bytearray(written(smooth(3)))
+    data = bytearray(write_bytes(smooth(3)))
     false = b"".join(build_header(b"DATA", 0, 16 * left - 20) for left in range(20_000, 1, -1))
     false += bytes(16)
     with mcz.open(bytes(data) + b"\0" + false, salvage=True) as file:
@@ -282,17 +282,17 @@ def test_a_motion_without_frames_is_converted(tmp_path: Path, to: str) -> None:
 def test_reading_many_segments_is_not_quadratic(monkeypatch: pytest.MonkeyPatch) -> None:
     counted = [0]
 
-    def counting(*args: Any) -> tuple[int, int]:
+    def count_range(*args: Any) -> tuple[int, int]:
         counted[0] += 1
         return own_range(*args)
 
     own_range = dwt.own_range
-    monkeypatch.setattr(dwt, "own_range", counting)
+    monkeypatch.setattr(dwt, "own_range", count_range)
     counts = []
     for n_frames in (4096, 16384):
         motion = replace(smooth(2), signals=(Signal(np.zeros((n_frames, 10))),))
         motion = replace(motion, frame_numbers=None)
-        with mcz.open(written(motion, codec="mrdwt", segment_frames=16)) as file:
+        with mcz.open(write_bytes(motion, codec="mrdwt", segment_frames=16)) as file:
             counted[0] = 0
             file.clips[motion.name].read()
         counts.append(counted[0])
@@ -327,7 +327,7 @@ def test_points_of_other_names_are_noted() -> None:
 
 def test_extract_and_diff_take_a_limit_of_decoded_bytes(tmp_path: Path) -> None:
     path, out = tmp_path / "a.mcz", tmp_path / "b.mcz"
-    path.write_bytes(written(smooth(100), codec="mrdwt"))
+    path.write_bytes(write_bytes(smooth(100), codec="mrdwt"))
     for limit, code in (("100", 1), ("1M", 0)):
         options = ["--max-decoded", limit]
         assert run("extract", path, out, "--frames", "0:90", *options) == code
@@ -343,7 +343,7 @@ def test_figures_of_a_clip_that_was_cut_are_shown_in_cm() -> None:
 
 def test_extract_says_which_clip_lacks_a_joint() -> None:
     with pytest.raises(mcz.MotionError, match="clip 'smooth': no joint 'tail' among"):
-        mcz.extract(written(smooth(3, name="smooth")), io.BytesIO(), joints=["tail"])
+        mcz.extract(write_bytes(smooth(3, name="smooth")), io.BytesIO(), joints=["tail"])
 
 
 def test_salvage_of_a_c3d_without_frames() -> None:
@@ -352,7 +352,7 @@ def test_salvage_of_a_c3d_without_frames() -> None:
     first = motion.signals[0]
     nothing = replace(first, values=first.values[:0], mask=None)
     data = c3d.write(replace(motion, signals=(nothing,), source=None))
-    with mcz.open(written(c3d.read(data, "none")), salvage=True) as file:
+    with mcz.open(write_bytes(c3d.read(data, "none")), salvage=True) as file:
         assert file.only_clip().source_bytes() == data
 
 

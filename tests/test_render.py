@@ -79,7 +79,7 @@ def test_the_floor_is_below_the_feet_and_all_is_seen(walk: Motion) -> None:
     assert track.size == pytest.approx(170, rel=0.1)
 
 
-def turned(motion: Motion, up: str) -> Motion:
+def set_up_axis(motion: Motion, up: str) -> Motion:
     """Markers whose up axis is another one, and which move as before."""
     order = {"y": [0, 1, 2], "z": [2, 0, 1], "x": [1, 2, 0]}[up[-1]]
     values = motion.values.reshape(len(motion.values), -1, 3)[:, :, order]
@@ -105,11 +105,11 @@ def markers(n_frames: int = 6, n: int = 5) -> Motion:
 def test_every_up_axis_gives_the_same_picture(tmp_path: Path) -> None:
     found = []
     for up in ("y", "z", "x", "-x", "-y", "-z"):
-        mcz.render(turned(markers(), up), tmp_path / f"{up}.png", size=SMALL)
+        mcz.render(set_up_axis(markers(), up), tmp_path / f"{up}.png", size=SMALL)
         found.append(pixels(tmp_path / f"{up}.png"))
     for other in found[1:]:
         assert (found[0] == other).all()
-    mcz.render(turned(markers(), "z"), tmp_path / "wrong.png", size=SMALL, up="z")
+    mcz.render(set_up_axis(markers(), "z"), tmp_path / "wrong.png", size=SMALL, up="z")
     assert (pixels(tmp_path / "wrong.png") == found[1]).all()
 
 

@@ -17,10 +17,10 @@ from mcz.container.chunks import HEADER
 from mcz.model.schema import build, parse
 from mcz.sources.sample import write_samples
 from tests.commands import run
-from tests.formats.c3d_files import made
+from tests.formats.c3d_files import make_c3d
 from tests.formats.test_c3d_recording import integers, reals, with_analog
-from tests.kinds import Values, body_of, chunks_of, kept, values_of
-from tests.repair import flipped, joined, memory_below, parts_of, replaced
+from tests.kinds import Values, body_of, chunks_of, count_kept_values, values_of
+from tests.repair import flip_bit, join_parts, memory_below, parts_of, replace_payload
 
 
 @pytest.fixture(scope="module")
@@ -40,13 +40,13 @@ def archive(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> bytes:
 def check(repaired: bytes, whole: Values) -> int:
     """Every value of ``repaired`` is as it was; returns how many frames of motions there are."""
     assert mcz.verify(repaired) == []
-    kept(repaired, whole)
+    count_kept_values(repaired, whole)
     with mcz.open(repaired) as file:
         motions = [c for c in file if c.signals[0].name == "motion"]
     return sum(clip.n_frames for clip in motions)
 
 
-def repaired(damaged: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
+def repair_file(damaged: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
     found = mcz.repair(damaged, folder / "out.mcz", force=True)
     return found, (folder / "out.mcz").read_bytes()
 
@@ -60,7 +60,7 @@ def test_runs_of_frames_keep_names_numbers_and_sources(
         path = file.clips["walk"].source.path
     damaged = bytearray(archive)
     damaged[row.offset + row.size // 2] ^= 1
-    found, data = repaired(bytes(damaged), tmp_path)
+    found, data = repair_file(bytes(damaged), tmp_path)
     assert found.runs == {"walk": [(0, 60), (120, 240)]}
     assert len(found.lost) == 1
     assert "60 of 240 frames" in found.lost[0]
@@ -77,13 +77,13 @@ def test_runs_of_frames_keep_names_numbers_and_sources(
 @pytest.mark.parametrize("cut", [0.7, 0.99])
 def test_a_file_that_was_cut_short(archive: bytes, tmp_path: Path, cut: float) -> None:
     whole = values_of(archive)
-    found, data = repaired(archive[: int(cut * len(archive))], tmp_path)
+    found, data = repair_file(archive[: int(cut * len(archive))], tmp_path)
     assert check(data, whole) > 100
     assert found.lost
 
 
 def test_junk_at_the_end_costs_nothing(archive: bytes, tmp_path: Path) -> None:
-    found, data = repaired(archive + b"junk" * 5, tmp_path)
+    found, data = repair_file(archive + b"junk" * 5, tmp_path)
     assert found.lost == []
     with mcz.open(data) as file, mcz.open(archive) as before:
         assert list(file.clips) == list(before.clips)
@@ -151,7 +151,7 @@ def test_a_lost_template_costs_no_value(tmp_path: Path) -> None:
     data = force(tmp_path)
     whole = values_of(data)
     (chunk,) = (row for row in chunks_of(data) if row[0] == "SRCE")
-    found, repaired_data = repaired(flipped(data, body_of(*chunk), 4), tmp_path)
+    found, repaired_data = repair_file(flip_bit(data, body_of(*chunk), 4), tmp_path)
     assert check(repaired_data, whole) == 60
     assert found.runs == {"force": [(0, 60)]}
     assert any("its source file" in line for line in found.lost)
@@ -160,7 +160,7 @@ def test_a_lost_template_costs_no_value(tmp_path: Path) -> None:
         assert clip.source is None
         assert "lost" in clip.metadata["source-note"]
         assert not any(c.unit for c in clip.signals[-1].channels or ())
-    (tmp_path / "d.mcz").write_bytes(flipped(data, body_of(*chunk), 4))
+    (tmp_path / "d.mcz").write_bytes(flip_bit(data, body_of(*chunk), 4))
     assert run("repair", tmp_path / "d.mcz", "-o", tmp_path / "r.mcz") == 4
     with mcz.open(tmp_path / "d.mcz", salvage=True) as file:
         assert file.clips["force"].read(signal="analog").shape == (120, 2)
@@ -169,7 +169,7 @@ def test_a_lost_template_costs_no_value(tmp_path: Path) -> None:
 
 def force(folder: Path) -> bytes:
     """Points and two analog channels at twice the rate, whose template has scales and units."""
-    file = made(60, 4, 2, 2, size=2)
+    file = make_c3d(60, 4, 2, 2, size=2)
     scales, units = reals(file, [0.5, 2.0]), file.texts([b"N", b"V"])
     with_analog(file, SCALE=scales, OFFSET=integers(file, [1000, 0]), UNITS=units)
     (folder / "force.c3d").write_bytes(file.build())
@@ -187,9 +187,12 @@ def test_a_signal_that_is_lost_takes_no_other_along(samples: Path, tmp_path: Pat
     bad = bytearray(data)
     for at in places:
         bad[at] ^= 1
-    found, repaired_data = repaired(bytes(bad), tmp_path)
+    found, repaired_data = repair_file(bytes(bad), tmp_path)
     lost = 60 * (motion.layout.n_channels + residuals.layout.n_channels)
-    assert kept(repaired_data, whole) == sum(v.size for v in whole["walk"].values()) - lost
+    assert (
+        count_kept_values(repaired_data, whole)
+        == sum(v.size for v in whole["walk"].values()) - lost
+    )
     assert found.runs == {"walk": [(0, 60), (60, 120), (120, 180), (180, 240)]}
     assert found.lost == [
         "clip 'walk', signal 'motion': 60 of 240 frames",
@@ -210,10 +213,10 @@ def test_a_signal_that_is_lost_takes_no_other_along(samples: Path, tmp_path: Pat
 def test_what_cannot_be_decoded_here_needs_its_end(tmp_path: Path) -> None:
     """Clips of an unknown codec are kept with their CEND; without it their hashes are lost."""
     data = with_unknown_codec(tmp_path)
-    found, repaired_data = repaired(data + b"junk", tmp_path)
+    found, repaired_data = repair_file(data + b"junk", tmp_path)
     assert (found.clips, found.lost) == (["walk"], [])
     (end,) = (row for row in chunks_of(data) if row[0] == "CEND")
-    found, repaired_data = repaired(flipped(data, body_of(*end), 1), tmp_path)
+    found, repaired_data = repair_file(flip_bit(data, body_of(*end), 1), tmp_path)
     assert found.clips == []
     assert found.skeletons
     assert any("codec 1048576" in line and "CEND" in line for line in found.lost)
@@ -228,7 +231,7 @@ def with_unknown_codec(folder: Path) -> bytes:
     fields = parse(payloads.Clip, parts[which][1], "CLIP")
     signals = [replace(signal, codec=1 << 20) for signal in fields.signals]
     payload = build(replace(fields, signals=signals), "CLIP")
-    return joined(replaced(parts, which, payload))
+    return join_parts(replace_payload(parts, which, payload))
 
 
 @pytest.mark.parametrize("indexed", [True, False])
@@ -252,8 +255,8 @@ def test_no_clip_gets_frames_of_the_next_one(
         stop = file.clips["b"].signals[0].rows[2].offset - HEADER.size + 5
     hole = b"" if removed else bytes(stop - start)
     bad = data[:start] + hole + data[stop:] if indexed else data[:start] + hole + data[stop:-240]
-    found, repaired_data = repaired(bad, tmp_path)
-    assert kept(repaired_data, whole) == 120 * 96
+    found, repaired_data = repair_file(bad, tmp_path)
+    assert count_kept_values(repaired_data, whole) == 120 * 96
     assert found.runs == {"a": [(0, 120)]}
     for name, signals in values_of(bad, salvage=True).items():
         values = signals["motion"]
@@ -269,7 +272,7 @@ def test_a_lost_head_and_alias_are_in_the_index(archive: bytes, tmp_path: Path) 
     bad = bytearray(archive)
     for row in chunks:
         bad[body_of(*row)] ^= 6
-    found, repaired_data = repaired(bytes(bad), tmp_path)
+    found, repaired_data = repair_file(bytes(bad), tmp_path)
     assert found.lost == []
     with mcz.open(repaired_data) as file:
         assert file.aliases == aliases
@@ -282,8 +285,8 @@ def test_a_lost_skeleton_costs_names_alone(tmp_path: Path) -> None:
     data = (tmp_path / "t.mcz").read_bytes()
     whole = values_of(data)
     (skeleton,) = (row for row in chunks_of(data) if row[0] == "SKEL")
-    found, repaired_data = repaired(flipped(data, body_of(*skeleton), 0), tmp_path)
-    assert kept(repaired_data, whole) == 180
+    found, repaired_data = repair_file(flip_bit(data, body_of(*skeleton), 0), tmp_path)
+    assert count_kept_values(repaired_data, whole) == 180
     assert any("its skeleton is lost" in line for line in found.lost)
     with mcz.open(repaired_data) as file:
         assert file.clips["t"].source is None
@@ -327,7 +330,7 @@ def test_any_mutant_is_repaired_or_refused(tmp_path: Path, data: st.DataObject) 
         payload = bytearray(parts[which][1])
         if payload:
             payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
-            vector = joined(replaced(parts, which, bytes(payload)))
+            vector = join_parts(replace_payload(parts, which, bytes(payload)))
     at, size = data.draw(st.integers(0, len(vector) - 1)), data.draw(st.integers(0, 300))
     put = data.draw(st.sampled_from([b"", bytes(size), vector[:size], b"?" * (size % 50)]))
     mutant = vector[:at] + put + vector[at + data.draw(st.sampled_from([0, 1, size])) :]
@@ -345,8 +348,8 @@ def test_what_breaks_a_rule_is_left_out(tmp_path: Path) -> None:
     data = (tmp_path / "q.mcz").read_bytes()
     whole, parts = values_of(data), parts_of(data)
     which = next(i for i, (piece, _) in enumerate(parts) if piece.type == b"QUAL")
-    bad = joined(replaced(parts, which, b"\x05\xff"))
-    found, repaired_data = repaired(bad, tmp_path)
+    bad = join_parts(replace_payload(parts, which, b"\x05\xff"))
+    found, repaired_data = repair_file(bad, tmp_path)
     assert check(repaired_data, whole) == 240
     assert any("break a rule" in line for line in found.lost)
 
@@ -361,7 +364,7 @@ def test_extracts_of_damaged_files_end_with_4_or_1(samples: Path, tmp_path: Path
     mcz.pack(takes, tmp_path / "x.mcz", copies=False)
     data = (tmp_path / "x.mcz").read_bytes()
     end = next(row for row in chunks_of(data) if row[0] == "CEND")
-    (tmp_path / "d.mcz").write_bytes(flipped(data, body_of(*end), 2))
+    (tmp_path / "d.mcz").write_bytes(flip_bit(data, body_of(*end), 2))
     for name, code in (("b", 4), ("a", 1)):
         for more in ([], ["--frames", "0:10"]):
             out = tmp_path / f"{name}{len(more)}.mcz"

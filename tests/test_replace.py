@@ -50,13 +50,13 @@ def known_codecs(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(codecs.CODECS, codec.name, codec)
 
 
-def written(motion: Motion, codec: str = "fast", **params: Any) -> bytes:
+def write_bytes(motion: Motion, codec: str = "fast", **params: Any) -> bytes:
     out = io.BytesIO()
     mcz.write(motion, out, codec, **params)
     return out.getvalue()
 
 
-def edited(data: bytes, joint: int | str, values: Any, **options: Any) -> tuple[bytes, Any]:
+def replace_values(data: bytes, joint: int | str, values: Any, **options: Any) -> tuple[bytes, Any]:
     """The file with other values, checked as a whole."""
     out = io.BytesIO()
     with mcz.open(data) as file:
@@ -86,10 +86,10 @@ def check_others(before: bytes, after: bytes, *joints: str) -> None:
 @pytest.mark.parametrize("joint", ["spine", "knee"])
 def test_the_joint_changes_and_nothing_else(case: str, joint: str) -> None:
     codec, params = CASES[case]
-    data = written(smooth(500), codec, **params)
+    data = write_bytes(smooth(500), codec, **params)
     wave = np.round(10 * np.cos(np.arange(500) * 0.11), 4)
     new = np.round(values_of(data, joint) + wave[:, None], 4)
-    after, found = edited(data, joint, new)
+    after, found = replace_values(data, joint, new)
     assert (found.clip, found.joint, found.codec) == ("smooth", joint, codec)
     check_others(data, after, joint)
     error = np.abs(values_of(after, joint) - new)
@@ -97,15 +97,15 @@ def test_the_joint_changes_and_nothing_else(case: str, joint: str) -> None:
     if codec in LOSSLESS:
         assert not error.any()
         whole = smooth(500).with_values(values_of(after))
-        assert len(written(whole, codec, **params)) == len(after)
+        assert len(write_bytes(whole, codec, **params)) == len(after)
     else:
         assert 0 < error.max() < 9
 
 
 def test_the_bound_of_qbc_holds_for_the_new_values() -> None:
-    data = written(smooth(500), "qbc", d2_lmt=0.25, segment_frames=160)
+    data = write_bytes(smooth(500), "qbc", d2_lmt=0.25, segment_frames=160)
     new = 40 * np.sin(np.arange(500)[:, None] * np.array([0.3, 0.2, 0.1]))
-    after, found = edited(data, "spine", new)
+    after, found = replace_values(data, "spine", new)
     distances = ((values_of(after, "spine") - new) ** 2).sum(axis=1)
     assert distances.max() <= 0.25 + 1e-9
     assert found.max_error <= 0.5
@@ -115,9 +115,9 @@ def test_the_bound_of_qbc_holds_for_the_new_values() -> None:
 def test_wavelets_lose_no_more_than_before(case: str) -> None:
     codec, params = CASES[case]
     motion = smooth(500)
-    data = written(motion, codec, **params)
+    data = write_bytes(motion, codec, **params)
     new = motion.values[:, 6:9][::-1].copy()
-    _, found = edited(data, "spine", new)
+    _, found = replace_values(data, "spine", new)
     before = np.abs(values_of(data, "spine") - motion.values[:, 6:9]).max()
     assert found.max_error <= 2 * before + 1e-6
 
@@ -126,17 +126,17 @@ def test_a_wavelet_channel_that_was_zero_gets_a_step() -> None:
     motion = smooth(300)
     values = motion.values.copy()
     values[:, 9] = 0
-    data = written(motion.with_values(values), "mrdwt")
+    data = write_bytes(motion.with_values(values), "mrdwt")
     new = 20 * np.sin(np.arange(300) * 0.1)
-    _, found = edited(data, "knee", new)  # one channel: one dimension will do
+    _, found = replace_values(data, "knee", new)  # one channel: one dimension will do
     assert found.max_error < 2
     assert found.joint_bytes > found.joint_bytes_before == 0
 
 
 def test_the_same_values_give_the_same_streams() -> None:
     for codec in LOSSLESS:
-        data = written(smooth(300), codec, segment_frames=70)
-        after, found = edited(data, "hips", values_of(data, "hips"))
+        data = write_bytes(smooth(300), codec, segment_frames=70)
+        after, found = replace_values(data, "hips", values_of(data, "hips"))
         assert found.joint_bytes == found.joint_bytes_before
         assert after == data
 
@@ -150,18 +150,18 @@ def _with_copies(n_frames: int = 300) -> Motion:
 
 
 def test_joints_that_repeat_the_joint_keep_their_values() -> None:
-    data = written(_with_copies(), segment_frames=100)
+    data = write_bytes(_with_copies(), segment_frames=100)
     new = np.round(values_of(data, "spine") + 1, 4)
-    after, _ = edited(data, "spine", new)
+    after, _ = replace_values(data, "spine", new)
     assert np.array_equal(values_of(after, "knee"), values_of(data, "knee"))
     assert np.array_equal(values_of(after, "spine"), new)
     check_others(data, after, "spine")
 
 
 def test_a_joint_that_repeats_another_leaves_it_alone() -> None:
-    data = written(_with_copies(), segment_frames=100)
+    data = write_bytes(_with_copies(), segment_frames=100)
     new = np.round(values_of(data, "knee") + 1, 4)
-    after, _ = edited(data, "knee", new)
+    after, _ = replace_values(data, "knee", new)
     check_others(data, after, "knee")
     assert np.array_equal(values_of(after, "knee"), new)
 
@@ -190,11 +190,11 @@ def test_the_source_file_is_the_edited_one(samples: Path, tmp_path: Path) -> Non
 
 def test_on_grid_rounds_to_what_the_source_prints(samples: Path) -> None:
     motion = mcz.read(samples / "walk.bvh")
-    data = written(motion)
+    data = write_bytes(motion)
     new = values_of(data, motion.skeleton.addresses()[1]) + 1 / 3
-    exact, found = edited(data, 1, new)
+    exact, found = replace_values(data, 1, new)
     assert found.max_error == 0
-    rounded, found_rounded = edited(data, 1, new, on_grid=True)
+    rounded, found_rounded = replace_values(data, 1, new, on_grid=True)
     assert 0 < found_rounded.max_error < 1e-3
     assert found_rounded.joint_bytes <= found.joint_bytes + 8
     assert len(rounded) < len(exact)
@@ -205,11 +205,11 @@ def test_on_grid_rounds_to_what_the_source_prints(samples: Path) -> None:
 
 def test_markers_keep_their_source(samples: Path) -> None:
     motion = mcz.read(samples / "walk.c3d")
-    data = written(motion)
+    data = write_bytes(motion)
     name = motion.skeleton.addresses()[3]
     values = values_of(data, name)
     moved = values + np.float32(8)
-    after, _ = edited(data, name, moved, on_grid=True)
+    after, _ = replace_values(data, name, moved, on_grid=True)
     with mcz.open(after) as file:
         clip = file.only_clip()
         assert np.allclose(clip.read(joints=[name]), moved, equal_nan=True, atol=1e-3)
@@ -218,31 +218,31 @@ def test_markers_keep_their_source(samples: Path) -> None:
     bad = moved.copy()
     bad[5, 1] = np.nan
     with pytest.raises(MotionError, match=r"frame 5 of .*ty is NaN"):
-        edited(data, name, bad)
+        replace_values(data, name, bad)
 
 
 def test_binary_grids_say_what_they_hold() -> None:
     values = np.float32(smooth(20).values).astype(np.float64)
     motion = Motion(smooth().skeleton, (Signal(values, (Grid(GridKind.BINARY32),) * 10),))
-    data = written(motion)
+    data = write_bytes(motion)
     with pytest.raises(MotionError, match=r"frame 0 of knee.rx: its grid BINARY32 .* on_grid"):
-        edited(data, "knee", np.full(20, 0.1))
-    after, found = edited(data, "knee", np.full(20, 0.1), on_grid=True)
+        replace_values(data, "knee", np.full(20, 0.1))
+    after, found = replace_values(data, "knee", np.full(20, 0.1), on_grid=True)
     assert values_of(after, "knee")[0, 0] == np.float32(0.1)
     assert 0 < found.max_error < 1e-8
     with pytest.raises(MotionError, match="does not hold"):
-        edited(data, "knee", np.full(20, 1e300), on_grid=True)
+        replace_values(data, "knee", np.full(20, 1e300), on_grid=True)
 
 
 def test_integers_stay_integers() -> None:
     values = np.arange(200).reshape(20, 10)
-    data = written(Motion(smooth().skeleton, (Signal(values),)))
-    after, _ = edited(data, "knee", np.arange(20.0))
+    data = write_bytes(Motion(smooth().skeleton, (Signal(values),)))
+    after, _ = replace_values(data, "knee", np.arange(20.0))
     assert values_of(after, "knee")[:, 0].tolist() == list(range(20))
     for number in (0.5, 2.0**54, np.inf):
         with pytest.raises(MotionError, match="integers"):
-            edited(data, "knee", np.full(20, number))
-    after, found = edited(data, "knee", np.full(20, 0.75), on_grid=True)
+            replace_values(data, "knee", np.full(20, number))
+    after, found = replace_values(data, "knee", np.full(20, 0.75), on_grid=True)
     assert found.max_error == 0.25
     assert values_of(after, "knee").tolist() == [[1]] * 20
 
@@ -253,18 +253,18 @@ def test_nan_is_invalid_where_there_is_no_source(codec: str) -> None:
     mask = np.ones(motion.values.shape, bool)
     mask[10:20, 6:9] = False
     motion = replace(motion, signals=(replace(motion.signals[0], mask=mask),))
-    data = written(motion, codec)
+    data = write_bytes(motion, codec)
     new = values_of(data, "spine")
     assert np.isnan(new[10:20]).all()
     new[10:20] = 5.0  # a gap is filled, another one made
     new[30:33, 1] = np.nan
-    after, _ = edited(data, "spine", new)
+    after, _ = replace_values(data, "spine", new)
     found = values_of(after, "spine")
     assert np.array_equal(np.isnan(found), np.isnan(new))
     check_others(data, after, "spine")
     assert np.array_equal(values_of(after, "hips"), values_of(data, "hips"))
     new[:] = 1.0
-    after, _ = edited(after, "spine", new)
+    after, _ = replace_values(after, "spine", new)
     assert not np.isnan(values_of(after)).any()
 
 
@@ -276,7 +276,7 @@ def test_a_clip_that_was_cut(case: str, tmp_path: Path) -> None:
     mcz.extract(whole, part, frames=(230, 415))
     data = part.read_bytes()
     new = np.round(values_of(data, "spine") * 0.5 + 3, 4)
-    after, found = edited(data, "spine", new)
+    after, found = replace_values(data, "spine", new)
     check_others(data, after, "spine")
     assert np.abs(values_of(after, "spine") - new).max() == found.max_error < 8
     assert np.array_equal(values_of(after)[:, :6], values_of(data)[:, :6])
@@ -292,16 +292,16 @@ def test_a_clip_without_its_finest_details(codec: str, tmp_path: Path) -> None:
     mcz.write(smooth(300), whole, codec)
     mcz.extract(whole, part, resolution=1)
     new = np.linspace(0, 50, 300)
-    after, found = edited(part.read_bytes(), "knee", new)
+    after, found = replace_values(part.read_bytes(), "knee", new)
     check_others(part.read_bytes(), after, "knee")
     assert found.max_error < 2
 
 
 def test_the_quality_record_says_what_is_known() -> None:
-    data = written(smooth(200), "qbc")
+    data = write_bytes(smooth(200), "qbc")
     with mcz.open(data) as file:
         before = file.only_clip().quality
-    after, found = edited(data, "knee", np.zeros(200))
+    after, found = replace_values(data, "knee", np.zeros(200))
     with mcz.open(after) as file:
         record = file.only_clip().quality
     assert before and record
@@ -309,7 +309,7 @@ def test_the_quality_record_says_what_is_known() -> None:
     assert record["codec"] == "qbc" and record["param.preset"] == "default"
     assert record["unedited_mse"] == before["mse"] and "mse" not in record
     assert float(record["edit_mse"]) <= found.max_error**2
-    twice, _ = edited(after, "spine", np.ones((200, 3)))
+    twice, _ = replace_values(after, "spine", np.ones((200, 3)))
     with mcz.open(twice) as file:
         again = file.only_clip().quality
     assert again and again["edit-joints"] == "knee,spine"
@@ -318,7 +318,7 @@ def test_the_quality_record_says_what_is_known() -> None:
 
 
 def test_a_lossless_clip_has_no_record() -> None:
-    after, _ = edited(written(smooth(20)), "knee", np.zeros(20))
+    after, _ = replace_values(write_bytes(smooth(20)), "knee", np.zeros(20))
     with mcz.open(after) as file:
         assert file.only_clip().quality is None
 
@@ -421,39 +421,39 @@ REFUSED = {
 def test_what_does_not_suit_is_refused(case: str) -> None:
     joint, values, error, message = REFUSED[case]
     with pytest.raises(error, match=message):
-        edited(written(smooth(20)), joint, values)
+        replace_values(write_bytes(smooth(20)), joint, values)
 
 
 def test_codecs_that_cannot_say_why() -> None:
     with pytest.raises(OptionError, match="codes its channels in one group with those of hips"):
-        edited(written(smooth(20), "one"), "knee", np.zeros(20))
+        replace_values(write_bytes(smooth(20), "one"), "knee", np.zeros(20))
     with pytest.raises(OptionError, match="codec pca codes its channels in one group with"):
-        edited(written(smooth(20), "pca"), "knee", np.zeros(20))
+        replace_values(write_bytes(smooth(20), "pca"), "knee", np.zeros(20))
     with pytest.raises(OptionError, match="overlap cannot code one joint anew"):
-        edited(written(smooth(20), "overlap"), "knee", np.zeros(20))
+        replace_values(write_bytes(smooth(20), "overlap"), "knee", np.zeros(20))
     for codec in ("mrdwt", "qbc"):
         with pytest.raises(MotionError, match="not finite"):
-            edited(written(smooth(20), codec), "knee", np.full(20, np.inf))
+            replace_values(write_bytes(smooth(20), codec), "knee", np.full(20, np.inf))
     own = Signal(np.zeros((20, 1)), channels=(Channel("", "force"),))
     with pytest.raises(OptionError, match="channels of its own"):
-        edited(written(Motion(smooth().skeleton, (own,))), 0, np.zeros(20))
-    with mcz.open(written(smooth(20)), salvage=True) as file, pytest.raises(OptionError):
+        replace_values(write_bytes(Motion(smooth().skeleton, (own,))), 0, np.zeros(20))
+    with mcz.open(write_bytes(smooth(20)), salvage=True) as file, pytest.raises(OptionError):
         mcz.replace(file, None, "knee", np.zeros(20), io.BytesIO())
 
 
 def test_frames_of_none() -> None:
     for codec in ("raw", "fast", "mrdwt", "qbc"):
-        edited(written(smooth(0), codec), "spine", np.zeros((0, 3)))
-        after, _ = edited(written(smooth(1), codec), "spine", np.ones((1, 3)))
+        replace_values(write_bytes(smooth(0), codec), "spine", np.zeros((0, 3)))
+        after, _ = replace_values(write_bytes(smooth(1), codec), "spine", np.ones((1, 3)))
         assert np.abs(values_of(after, "spine") - 1).max() <= (0 if codec in LOSSLESS else 0.5)
 
 
 @given(motions(), st.sampled_from(LOSSLESS), st.integers(0, 2**32))
 def test_any_values_come_back(motion: Motion, codec: str, seed: int) -> None:
-    data = written(motion, codec, segment_frames=5)
+    data = write_bytes(motion, codec, segment_frames=5)
     words = np.random.default_rng(seed).integers(0, 2**64, (motion.n_frames, 3), np.uint64)
     new = words.view(np.float64)
-    after, _ = edited(data, "spine", new)
+    after, _ = replace_values(data, "spine", new)
     found = values_of(after, "spine")
     assert np.array_equal(found.view(np.int64), np.where(np.isnan(new), np.nan, new).view(np.int64))
     check_others(data, after, "spine")
@@ -464,8 +464,8 @@ def test_a_stranger_among_copies() -> None:
     motion = smooth(50)
     values = motion.values.copy()
     values[:, 7] = values[:, 9] = values[:, 0]
-    data = written(motion.with_values(values))
-    after, _ = edited(data, "hips", np.round(values[:, :6] + 1, 4))
+    data = write_bytes(motion.with_values(values))
+    after, _ = replace_values(data, "hips", np.round(values[:, :6] + 1, 4))
     assert np.array_equal(values_of(after)[:, 6:], values[:, 6:])
 
 

@@ -42,7 +42,7 @@ def origins(motion: Motion) -> np.ndarray:
 
 
 @st.composite
-def turning(draw: st.DrawFn, parents: list[int], how: str = "euler") -> Skeleton:
+def turning_skeleton(draw: st.DrawFn, parents: list[int], how: str = "euler") -> Skeleton:
     """A skeleton of these parents, each of whose joints turns as it likes."""
     made = []
     for number, parent in enumerate(parents):
@@ -65,7 +65,7 @@ def two_alike(draw: st.DrawFn) -> tuple[Skeleton, Skeleton]:
     """Two skeletons of the same names and parents, and of nothing else in common."""
     n_joints = draw(st.integers(1, 5))
     parents = [-1, *(draw(st.integers(0, k - 1)) for k in range(1, n_joints))]
-    return draw(turning(parents)), draw(turning(parents))
+    return draw(turning_skeleton(parents)), draw(turning_skeleton(parents))
 
 
 @given(two_alike())

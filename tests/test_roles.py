@@ -15,10 +15,10 @@ from mcz import Channel, Motion, MotionError, Signal
 from mcz.sources import sample
 from mcz.sources.c3d import c3d
 from tests.commands import run
-from tests.formats.c3d_files import made
-from tests.motions import written
+from tests.formats.c3d_files import make_c3d
+from tests.motions import write_bytes
 
-C3D = c3d.read(made(3, 2, 2, 2, size=2).build(), "gait")
+C3D = c3d.read(make_c3d(3, 2, 2, 2, size=2).build(), "gait")
 
 
 def beside(values: Sequence[float], unit: str = "s", **about: object) -> Signal:
@@ -32,8 +32,8 @@ def walk(*more: Signal, n: int = 4) -> Motion:
     return replace(plain, signals=(first, *more), source=None, frame_numbers=None)
 
 
-def stored(motion: Motion) -> mcz.File:
-    return mcz.open(written(motion))
+def write_and_open(motion: Motion) -> mcz.File:
+    return mcz.open(write_bytes(motion))
 
 
 def test_signals_that_say_no_role_are_the_motion_and_others() -> None:
@@ -47,7 +47,7 @@ def test_roles_come_back_under_any_names() -> None:
     renamed = replace(
         C3D, signals=tuple(replace(s, name=f"s{k}") for k, s in enumerate(C3D.signals))
     )
-    with stored(renamed) as file:
+    with write_and_open(renamed) as file:
         clip = file.only_clip()
         assert [info.role for info in clip.signals] == [s.role for s in C3D.signals]
         assert clip.motion_signal is not None and clip.motion_signal.name == "s0"

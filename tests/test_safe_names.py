@@ -20,7 +20,7 @@ from tests.commands import run
 from tests.motions import smooth
 
 
-def packed(folder: Path, *names: str) -> Path:
+def pack_names(folder: Path, *names: str) -> Path:
     """An archive of files with these names, each with its own text."""
     source = folder / "in"
     for number, name in enumerate(names):
@@ -34,7 +34,7 @@ def packed(folder: Path, *names: str) -> Path:
 @pytest.mark.parametrize("force", [False, True])
 @pytest.mark.parametrize("linked", ["sub", "sub/note.txt"])
 def test_unpack_follows_no_link(tmp_path: Path, linked: str, force: bool) -> None:
-    archive = packed(tmp_path, "sub/note.txt", "other.txt")
+    archive = pack_names(tmp_path, "sub/note.txt", "other.txt")
     outside, out = tmp_path / "outside", tmp_path / "out"
     outside.mkdir()
     target = outside / "note.txt"
@@ -51,7 +51,7 @@ def test_unpack_follows_no_link(tmp_path: Path, linked: str, force: bool) -> Non
 
 
 def test_unpack_writes_to_no_pipe(tmp_path: Path) -> None:
-    archive, out = packed(tmp_path, "note.txt"), tmp_path / "out"
+    archive, out = pack_names(tmp_path, "note.txt"), tmp_path / "out"
     out.mkdir()
     os.mkfifo(out / "note.txt")
     report = mcz.unpack(archive, out, force=True)
@@ -62,7 +62,7 @@ def test_unpack_writes_to_no_pipe(tmp_path: Path) -> None:
 def test_unpack_leaves_its_folder_with_no_names(
     tmp_path: Path, names: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    archive = packed(tmp_path, "note.txt")
+    archive = pack_names(tmp_path, "note.txt")
     for name in ("../out.txt", "/out.txt", "a/../../out.txt"):
         stored = unpacking.Stored(name, "attachment", "note.txt")
         monkeypatch.setattr(unpacking, "files_of", lambda file, clips, one=stored: [one])
@@ -73,7 +73,7 @@ def test_unpack_leaves_its_folder_with_no_names(
 
 def test_unpack_into_a_folder_that_is_itself_a_link(tmp_path: Path) -> None:
     """The user named it."""
-    archive = packed(tmp_path, "note.txt")
+    archive = pack_names(tmp_path, "note.txt")
     (tmp_path / "real").mkdir()
     (tmp_path / "out").symlink_to(tmp_path / "real")
     assert not mcz.unpack(archive, tmp_path / "out").failures
@@ -107,7 +107,7 @@ HOSTILE = (
 
 @pytest.mark.parametrize("names", NAMES)
 def test_unpack_writes_no_name_with_a_hidden_character(tmp_path: Path, names: str) -> None:
-    archive, out = packed(tmp_path, *HOSTILE), tmp_path / "out"
+    archive, out = pack_names(tmp_path, *HOSTILE), tmp_path / "out"
     report = mcz.unpack(archive, out, names=names)
     assert not any(HIDDEN.search(str(path.relative_to(out))) for path in out.rglob("*"))
     if names == "strict":
@@ -192,15 +192,15 @@ def test_a_disk_that_folds_names_loses_nothing(
     tmp_path: Path, force: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Here the disk is made to: the second name leads to the file of the first."""
-    archive, out = packed(tmp_path, "NOTES.TXT", "notes.txt"), tmp_path / "out"
+    archive, out = pack_names(tmp_path, "NOTES.TXT", "notes.txt"), tmp_path / "out"
     write = safe_names.Folder.write
 
-    def folding(self: safe_names.Folder, path: str, data: bytes, *more, **options) -> Path:
+    def fold_case(self: safe_names.Folder, path: str, data: bytes, *more, **options) -> Path:
         place = write(self, path, data, *more, **options)
         os.link(place, out / "notes.txt")
         return place
 
-    monkeypatch.setattr(safe_names.Folder, "write", folding)
+    monkeypatch.setattr(safe_names.Folder, "write", fold_case)
     report = mcz.unpack(archive, out, force=force)
     assert [o.path for o in report.failures] == ["notes.txt"]
     assert "names='portable' keeps both" in report.failures[0].message

@@ -16,7 +16,7 @@ from tests.commands import run
 NAMES = ("x", "y", "z", "base_qx", "base_qy", "base_qz", "base_qw", "hip", "knee")
 
 
-def turning(n_frames: int = 40) -> np.ndarray:
+def turning_quaternions(n_frames: int = 40) -> np.ndarray:
     """Unit quaternions that turn on by a third of a turn a frame, every third of the other sign."""
     angles = np.arange(n_frames) / 3 * np.pi / 2
     axis = np.array([0.36, 0.48, 0.8])
@@ -27,7 +27,7 @@ def turning(n_frames: int = 40) -> np.ndarray:
 
 def robot(names: Sequence[str] = NAMES, quaternion: np.ndarray | None = None) -> Motion:
     random = np.random.default_rng(4)
-    four = turning() if quaternion is None else quaternion
+    four = turning_quaternions() if quaternion is None else quaternion
     rest = random.normal(0, 0.2, (len(four), 5)).cumsum(axis=0)
     values = np.concatenate([rest[:, :3] + [0, 0, 2], four, rest[:, 3:]], axis=1)
     joints = tuple(Joint(name, channels=(Channel("", "value"),)) for name in names)
@@ -60,7 +60,7 @@ def test_four_columns_of_unit_norm_turn(names: Sequence[str], rate: float) -> No
 
 
 def test_numbers_of_few_decimals_and_gaps() -> None:
-    four = turning().round(3)
+    four = turning_quaternions().round(3)
     four[7] = np.nan
     found = mcz.resample(robot(quaternion=four), 50)
     known = norms(found)[~np.isnan(norms(found))]
@@ -69,12 +69,12 @@ def test_numbers_of_few_decimals_and_gaps() -> None:
 
 
 def test_what_is_not_clear_is_refused() -> None:
-    four = turning() * 1.5
+    four = turning_quaternions() * 1.5
     with pytest.raises(OptionError, match="named like a quaternion, .* components=True"):
         mcz.resample(robot(quaternion=four), 50)
     mcz.resample(robot(quaternion=four), 50, components=True)
     mcz.resample(robot([f"c{n}" for n in range(9)], four), 50)  # nothing says that it is one
-    motion = robot([f"c{n}" for n in range(9)], turning() * [0, 0, 1, 1] / [[1]])
+    motion = robot([f"c{n}" for n in range(9)], turning_quaternions() * [0, 0, 1, 1] / [[1]])
     values = motion.values.copy()
     angles = np.arange(40) / 7
     values[:, 3:7] = np.column_stack([0 * angles, 0 * angles, np.sin(angles), np.cos(angles)])
@@ -96,7 +96,7 @@ def test_windows_of_a_data_set_keep_the_norm(tmp_path: Path) -> None:
 
 def test_a_table_and_an_array_file(tmp_path: Path) -> None:
     values = robot().values
-    np.savez(tmp_path / "a.npz", fps=30, rot=turning())
+    np.savez(tmp_path / "a.npz", fps=30, rot=turning_quaternions())
     lines = "\n".join(",".join(f"{v:.6f}" for v in row) for row in values.tolist())
     (tmp_path / "a.csv").write_text(lines + "\n")
     for name, at in (("a.npz", 0), ("a.csv", 3)):

@@ -47,31 +47,31 @@ def plain(value: Any) -> Any:
     return type(value), value
 
 
-def drawn(draw: st.DrawFn, type_: Any, context: construct.Container) -> bytes:
+def draw_bytes(draw: st.DrawFn, type_: Any, context: construct.Container) -> bytes:
     """Bytes of a value that a construct type mostly takes behind the fields ``context``."""
     match type_:
         case construct.Renamed():
-            return drawn(draw, type_.subcon, context)
+            return draw_bytes(draw, type_.subcon, context)
         case records.RecordType():
             inner, parts = empty_context(), []
             for name, item in type_.rows:
-                parts.append(drawn(draw, item, inner))
-                inner[name] = taken(item, parts[-1], inner, 0)
+                parts.append(draw_bytes(draw, item, inner))
+                inner[name] = parse_value(item, parts[-1], inner, 0)
             return b"".join(parts)
         case types.Checked():
-            tried = [drawn(draw, type_.subcon, context) for _ in range(8)]
-            good = [data for data in tried if taken(type_, data, context, None) is not None]
+            tried = [draw_bytes(draw, type_.subcon, context) for _ in range(8)]
+            good = [data for data in tried if parse_value(type_, data, context, None) is not None]
             return draw(st.sampled_from(good or tried))
         case construct.IfThenElse():
             chosen = type_.thensubcon if type_.condfunc(context) else type_.elsesubcon
-            return drawn(draw, chosen, context)
+            return draw_bytes(draw, chosen, context)
         case types.Counted():
             count = draw(st.integers(0, min(type_.most, 3)))
             return varint(count) + b"".join(
-                drawn(draw, type_.subcon, context) for _ in range(count)
+                draw_bytes(draw, type_.subcon, context) for _ in range(count)
             )
         case construct.Array():
-            return b"".join(drawn(draw, type_.subcon, context) for _ in range(type_.count))
+            return b"".join(draw_bytes(draw, type_.subcon, context) for _ in range(type_.count))
         case types.Varint():
             return varint(draw(st.sampled_from(TRICKY)))
         case construct.FormatField() if type_.length == 1:
@@ -87,7 +87,7 @@ def drawn(draw: st.DrawFn, type_: Any, context: construct.Container) -> bytes:
             size = size_of(type_, context)
             return draw(st.binary(min_size=size, max_size=size))
         case construct.Adapter():
-            return drawn(draw, type_.subcon, context)
+            return draw_bytes(draw, type_.subcon, context)
     return draw(st.binary(max_size=3)) if type_ is construct.GreedyBytes else b""
 
 
@@ -100,7 +100,7 @@ def size_of(type_: construct.Bytes, context: construct.Container) -> int:
     return int(size) if size < 2**12 else 3
 
 
-def taken(type_: Any, data: bytes, context: construct.Container, otherwise: Any) -> Any:
+def parse_value(type_: Any, data: bytes, context: construct.Container, otherwise: Any) -> Any:
     """The value of ``data``, ``otherwise`` where it has none."""
     try:
         return type_._parse(io.BytesIO(data), context, "")
@@ -112,7 +112,7 @@ def taken(type_: Any, data: bytes, context: construct.Container, otherwise: Any)
 def changed_bytes(draw: st.DrawFn) -> tuple[str, bytes]:
     """The name of a record, and bytes: mostly right, cut, with a bit flipped or bytes added."""
     name = draw(st.sampled_from(sorted(RECORDS)))
-    data = bytearray(drawn(draw, RECORDS[name].construct_type(), empty_context()))
+    data = bytearray(draw_bytes(draw, RECORDS[name].construct_type(), empty_context()))
     how = draw(st.sampled_from(("whole", "whole", "cut", "flipped", "more", "replaced")))
     at = draw(st.integers(0, max(len(data) - 1, 0)))
     if how == "cut":

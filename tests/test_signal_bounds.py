@@ -16,7 +16,7 @@ import pytest
 import mcz
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources.c3d import c3d
-from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made, real, word
+from tests.formats.c3d_files import DEC, INTEL, SGI, Made, make_c3d, real, word
 from tests.motions import smooth
 
 Rng = np.random.Generator
@@ -163,7 +163,7 @@ SKELETONS = {
 }
 
 
-def moving(rng: Rng, name: str, n: int) -> np.ndarray:
+def smooth_courses(rng: Rng, name: str, n: int) -> np.ndarray:
     """Smooth courses of 3 joints, (n, channels), with a little noise."""
     skeleton = SKELETONS[name]
     phases = np.arange(n)[:, None] * rng.uniform(0.02, 0.1, skeleton.n_channels)
@@ -181,7 +181,7 @@ def test_channels_of_the_motion_keep_a_bound(name: str, target: str) -> None:
     skeleton = SKELETONS[name]
     for seed in range(10):
         rng = np.random.default_rng(seed)
-        values = moving(rng, name, 100)
+        values = smooth_courses(rng, name, 100)
         bound = float(values.std() * 10.0 ** rng.uniform(-3.5, -1))
         motion = mcz.Motion(skeleton, (mcz.Signal(values),), Fraction(60), name="moving")
         stream = io.BytesIO()
@@ -293,13 +293,13 @@ def test_what_is_coarser_than_the_bound_stays() -> None:
     assert record["signal.emg.max_error"] == "0.0"
 
 
-def recorded(processor: int, size: int) -> mcz.Motion:
+def read_c3d(processor: int, size: int) -> mcz.Motion:
     """A C3D file with analog channels in N, Nmm and V."""
 
     def reals(*values: float) -> tuple[int, tuple[int, ...], bytes]:
         return 4, (len(values),), b"".join(real(value, processor) for value in values)
 
-    file: Made = made(64, 2, 3, 8, processor=processor, size=size)
+    file: Made = make_c3d(64, 2, 3, 8, processor=processor, size=size)
     offsets = b"".join(word(value, processor) for value in (100, -5, 0))
     file.parameters.setdefault("ANALOG", {}).update(
         SCALE=reals(0.25, -2.0, 0.001),
@@ -313,7 +313,7 @@ def recorded(processor: int, size: int) -> mcz.Motion:
 @pytest.mark.parametrize("processor", [INTEL, DEC, SGI])
 @pytest.mark.parametrize("size", [2, 4])
 def test_a_restored_file_keeps_the_bound(processor: int, size: int, tmp_path: Path) -> None:
-    motion = recorded(processor, size)
+    motion = read_c3d(processor, size)
     motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=0.1))
     path = tmp_path / "clip.mcz"
     params = {"analog.max_error": "5N,60Nmm,0.01mV"}

@@ -52,7 +52,7 @@ FITS, OTHER_DOFS, FOREIGN = asf(), asf(dofs=b"rx ry rz"), asf(b"tail")
 FILES = {"fits": FITS, "dofs": OTHER_DOFS, "foreign": FOREIGN}
 
 
-def put(folder: Path, amc: str, **kinds: str) -> Path:
+def put_files(folder: Path, amc: str, **kinds: str) -> Path:
     """The path of an AMC in ``folder`` beside ASF files, each ``name="fits"`` or the like."""
     for name, kind in kinds.items():
         (folder / f"{name}.asf").write_bytes(FILES[kind])
@@ -81,7 +81,7 @@ def read(path: Path, **options: object) -> tuple[mcz.Motion, list[str]]:
 )
 def test_without_a_word(tmp_path: Path, amc: str, asfs: dict[str, str], note: str) -> None:
     """Skeletons are chosen by the take's name if bones and DOFs fit the file."""
-    motion, said = read(put(tmp_path, amc, **asfs))
+    motion, said = read(put_files(tmp_path, amc, **asfs))
     assert said == []
     assert note in motion.metadata["skeleton-note"]
     assert motion.skeleton.n_joints == 2 and motion.skeleton.base is None
@@ -98,7 +98,7 @@ def test_without_a_word(tmp_path: Path, amc: str, asfs: dict[str, str], note: st
     ],
 )
 def test_with_a_line(tmp_path: Path, amc: str, asfs: dict[str, str], words: str) -> None:
-    motion, said = read(put(tmp_path, amc, **asfs))
+    motion, said = read(put_files(tmp_path, amc, **asfs))
     assert len(said) == 1
     assert words in said[0]
     assert motion.skeleton.n_joints == 2
@@ -115,7 +115,7 @@ def test_with_a_line(tmp_path: Path, amc: str, asfs: dict[str, str], words: str)
 )
 def test_refused(tmp_path: Path, amc: str, asfs: dict[str, str], words: str) -> None:
     """The error names the candidates and the option."""
-    path = put(tmp_path, amc, **asfs)
+    path = put_files(tmp_path, amc, **asfs)
     with pytest.raises(SourceError) as caught:
         mcz.read(path)
     assert words in str(caught.value)
@@ -124,7 +124,7 @@ def test_refused(tmp_path: Path, amc: str, asfs: dict[str, str], words: str) -> 
 
 
 def test_files_of_one_name_are_a_riddle(tmp_path: Path) -> None:
-    path = put(tmp_path, "walk_1", walk="fits")
+    path = put_files(tmp_path, "walk_1", walk="fits")
     (tmp_path / "walk.ASF").write_bytes(OTHER_DOFS + b"# more\n")
     if len(list(tmp_path.iterdir())) < 3:
         pytest.skip("this file system does not tell upper from lower case")
@@ -135,7 +135,7 @@ def test_files_of_one_name_are_a_riddle(tmp_path: Path) -> None:
 
 
 def test_a_skeleton_that_cannot_be_read(tmp_path: Path) -> None:
-    path = put(tmp_path, "walk_1", other="fits")
+    path = put_files(tmp_path, "walk_1", other="fits")
     (tmp_path / "bad.asf").write_bytes(b"no")
     assert "other.asf" in read(path)[1][0]
     (tmp_path / "walk.asf").write_bytes(b"no")
@@ -145,7 +145,7 @@ def test_a_skeleton_that_cannot_be_read(tmp_path: Path) -> None:
 
 def test_bones_that_come_late(tmp_path: Path) -> None:
     """The whole file counts, not its first frame alone."""
-    path = put(tmp_path, "walk", walk="fits")
+    path = put_files(tmp_path, "walk", walk="fits")
     path.write_bytes(AMC + b"3\nroot 0 0 0 0 0 0\nspine 1 2\nprop 7\n")
     with pytest.raises(SourceError, match=r"lacks prop; skeleton="):
         mcz.read(path)
@@ -155,7 +155,7 @@ def test_bones_that_come_late(tmp_path: Path) -> None:
 
 
 def test_one_that_is_given(tmp_path: Path) -> None:
-    path = put(tmp_path, "05_01", a="fits", b="dofs", c="foreign")
+    path = put_files(tmp_path, "05_01", a="fits", b="dofs", c="foreign")
     motion, said = read(path, skeleton=tmp_path / "a.asf")
     assert (said, motion.metadata["skeleton-note"]) == ([], "ASF as given: a.asf")
     again = read(path, skeleton=mcz.read_skeleton(tmp_path / "a.asf"))[0]
@@ -171,7 +171,7 @@ def test_one_that_is_given(tmp_path: Path) -> None:
 
 
 def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
-    path = put(tmp_path, "05_01")
+    path = put_files(tmp_path, "05_01")
     try:
         (tmp_path / "caf\udce9.asf").write_bytes(FITS)
     except (OSError, UnicodeError):
@@ -187,7 +187,7 @@ def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
 
 
 def test_encode_says_it_and_keeps_it(tmp_path: Path, call: Call) -> None:
-    path = put(tmp_path, "05_01", **{"09": "fits"})
+    path = put_files(tmp_path, "05_01", **{"09": "fits"})
     code, _, errors = call("encode", path)
     assert (code, errors.count("\n")) == (0, 1)
     assert errors.startswith(f"mcz: {path}: its skeleton is {tmp_path / '09.asf'}, the only one")
@@ -198,7 +198,7 @@ def test_encode_says_it_and_keeps_it(tmp_path: Path, call: Call) -> None:
 
 
 def test_encode_refuses_and_leads_on(tmp_path: Path, call: Call) -> None:
-    path = put(tmp_path, "05_01", **{"09": "foreign"})
+    path = put_files(tmp_path, "05_01", **{"09": "foreign"})
     code, out, errors = call("encode", path)
     assert (code, out, errors.count("\n")) == (1, "", 1)
     assert "09.asf (which lacks spine)" in errors and "--skeleton" in errors
@@ -212,10 +212,10 @@ def test_encode_refuses_and_leads_on(tmp_path: Path, call: Call) -> None:
 def test_pack_names_each(tmp_path: Path, call: Call) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
-    put(folder, "walk_1", walk="fits", other="dofs")
-    put(folder, "zombie")
+    put_files(folder, "walk_1", walk="fits", other="dofs")
+    put_files(folder, "zombie")
     (folder / "alone").mkdir()
-    put(folder / "alone", "riddle", a="fits", b="fits")
+    put_files(folder / "alone", "riddle", a="fits", b="fits")
     code, out, _ = call("pack", folder, tmp_path / "a.mcz", "--json")
     rows = {row["path"]: row for row in json.loads(out)["files"]}
     assert code == 0
@@ -233,27 +233,27 @@ def test_pack_names_each(tmp_path: Path, call: Call) -> None:
 
 
 def test_append_names_it(tmp_path: Path, call: Call) -> None:
-    put(tmp_path, "walk", walk="fits")
+    put_files(tmp_path, "walk", walk="fits")
     assert call("encode", tmp_path / "walk.amc")[0] == 0
     (tmp_path / "x").mkdir()
-    path = put(tmp_path / "x", "05_01", **{"09": "fits"})
+    path = put_files(tmp_path / "x", "05_01", **{"09": "fits"})
     code, _, errors = call("append", path, tmp_path / "walk.mcz")
     assert code == 0
     assert "09.asf, the only one around" in errors
-    path = put(tmp_path / "x", "05_02", **{"10": "fits"})
+    path = put_files(tmp_path / "x", "05_02", **{"10": "fits"})
     code, _, errors = call("append", path, tmp_path / "walk.mcz")
     assert code == 1 and "2 have its bones" in errors
 
 
 def test_write_keeps_what_read_recorded(tmp_path: Path) -> None:
-    mcz.write(mcz.read(put(tmp_path, "walk", walk="fits")), tmp_path / "a.mcz")
+    mcz.write(mcz.read(put_files(tmp_path, "walk", walk="fits")), tmp_path / "a.mcz")
     with mcz.open(tmp_path / "a.mcz") as file:
         note = file.clips["walk"].motion().metadata["skeleton-note"]
     assert note == "ASF of the name of the take"
 
 
 def test_diff_and_bench(tmp_path: Path, call: Call) -> None:
-    path = put(tmp_path, "05_01", **{"09": "fits"})
+    path = put_files(tmp_path, "05_01", **{"09": "fits"})
     shutil.copy(path, tmp_path / "05_02.amc")
     code, _, errors = call("diff", path, tmp_path / "05_02.amc")
     assert (code, errors.count("the only one around")) == (0, 2)
@@ -261,26 +261,26 @@ def test_diff_and_bench(tmp_path: Path, call: Call) -> None:
     options = ("--codecs", "raw", "--no-speeds", "--no-cache", "--jobs", "1")
     code, _, errors = call("bench", path, *options)
     assert (code, errors.count("the only one around")) == (0, 1)
-    put(tmp_path, "05_01", **{"10": "fits"})
+    put_files(tmp_path, "05_01", **{"10": "fits"})
     assert call("diff", path, path)[0] == 1
 
 
 def test_live(tmp_path: Path) -> None:
-    put(tmp_path, "walk", a="fits", b="dofs", c="foreign")
+    put_files(tmp_path, "walk", a="fits", b="dofs", c="foreign")
 
-    def coded(name: str, sink: io.BytesIO) -> tuple[str, ...]:
+    def encode_remarks(name: str, sink: io.BytesIO) -> tuple[str, ...]:
         options = SourceOptions(skeleton=tmp_path / f"{name}.asf", rate=120)
         encoding = EncodingOptions("lsdt-frame", {"step": 0.01})
         return encode_live(AMC.splitlines(keepends=True), sink, "amc", options, encoding).remarks
 
     sink = io.BytesIO()
-    assert coded("a", sink) == ()
+    assert encode_remarks("a", sink) == ()
     with mcz.open(sink.getvalue()) as file:
         assert "ASF as given: a.asf" in file.clips["live"].metadata["skeleton-note"]
         assert np.isfinite(file.clips["live"].read()).all()
-    assert "b.asf does not fit" in coded("b", io.BytesIO())[0]
+    assert "b.asf does not fit" in encode_remarks("b", io.BytesIO())[0]
     with pytest.raises(SourceError, match="none of the bones: spine"):
-        coded("c", io.BytesIO())
+        encode_remarks("c", io.BytesIO())
 
 
 @pytest.mark.real

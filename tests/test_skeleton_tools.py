@@ -17,7 +17,7 @@ from mcz.kinematics import origins_of, shell_points_of
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.numbers.scaling import Scaling
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
-from tests.motions import POSITIONS, ROTATIONS, smooth, stored
+from tests.motions import POSITIONS, ROTATIONS, smooth, write_and_read
 from tests.skeletons import skeletons, values_for
 
 WALKS = {"amc": acclaim_walk(), "bvh": bvh_walk(), "c3d": marker_walk()}
@@ -85,7 +85,7 @@ def test_renaming_keeps_all_but_names() -> None:
     assert mcz.rename(motion.skeleton, changed) == renamed.skeleton
     back = mcz.rename(renamed, {new: old for old, new in changed.items()})
     assert back.skeleton == motion.skeleton
-    assert stored(renamed).skeleton == renamed.skeleton
+    assert write_and_read(renamed).skeleton == renamed.skeleton
 
 
 def test_a_name_that_repeats_is_renamed_by_its_address() -> None:
@@ -122,7 +122,7 @@ def test_leaves_are_cut_off_bit_for_bit(form: str) -> None:
         assert np.array_equal(numbers_of(selected, name), numbers_of(motion, name))
     assert apart(motion, selected) == 0
     assert selected.source is None
-    again = stored(selected)
+    again = write_and_read(selected)
     assert again.skeleton == selected.skeleton
     assert np.array_equal(again.values, selected.values, equal_nan=True)
 

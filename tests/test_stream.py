@@ -46,7 +46,7 @@ from mcz.files.reading.sizes import layout
 from mcz.model.schema import build, parse
 from tests import live_codec
 from tests.clocked_files import bvh
-from tests.repair import flipped, parts_of, use
+from tests.repair import flip_bit, parts_of, use
 from tools.records import built
 
 NAMES = ("a", "b", "c")
@@ -191,7 +191,7 @@ def test_salvage_is_not_misled_by_what_a_damaged_one_holds() -> None:
         chunk for chunk in scan(open_source(data)).chunks if chunk.type == ChunkType.REPT
     ).offset
     for byte in (at, at + 5, at + 7, at + 9):
-        with mcz.open(flipped(data, byte, 1), salvage=True) as file:
+        with mcz.open(flip_bit(data, byte, 1), salvage=True) as file:
             assert list(file.clips) == ["live"]
             np.testing.assert_array_equal(file.clips["live"].read(), rows())
 
@@ -230,13 +230,13 @@ def test_each_frame_comes_with_its_bytes(codec: str, lost: str) -> None:
     asked: list[int] = []
     arrived: list[int] = []
 
-    def given() -> Iterator[np.ndarray]:
+    def give_rows() -> Iterator[np.ndarray]:
         for number, row in enumerate(rows()):
             assert arrived == list(range(number))
             asked.append(number)
             yield row
 
-    sent = mcz.stream_encode(given(), NAMES, codec=codec, params=CODECS[codec], unit="cm")
+    sent = mcz.stream_encode(give_rows(), NAMES, codec=codec, params=CODECS[codec], unit="cm")
     for frame in mcz.stream_decode(sent, lost=lost):
         assert asked == list(range(frame.number + 1))
         arrived.append(frame.number)
@@ -493,7 +493,7 @@ def test_a_damaged_packet_is_one_that_did_not_come(lost: str) -> None:
     for frame in (0, 3, 9, 10, 31, 59):
         start, stop = packet_spans(data)[frame]
         for byte in (start, start + 1, stop - 1):
-            found, summary = read(flipped(data, byte, 2), lost=lost)
+            found, summary = read(flip_bit(data, byte, 2), lost=lost)
             assert [f.number for f in found] == list(range(60))
             run = 10 - frame % 10
             assert states(found) == states(read(without_packets(data, {frame}), lost=lost)[0])
@@ -524,7 +524,7 @@ def test_any_damage(edits: list[tuple[float, str, int]], lost: str, join: bool) 
         elif kind == "twice":
             data = data[: at + size] + data[at:]
         elif at < len(data):
-            data = flipped(data, at, size % 8)
+            data = flip_bit(data, at, size % 8)
     try:
         found, _ = read(data, lost=lost, join=join)
     except mcz.MczError as error:
@@ -829,7 +829,7 @@ def test_a_model_that_is_lost_comes_again() -> None:
     opening = parts[0]
     inner = repeated_chunks(opening.removeprefix(SIGNATURE), len(SIGNATURE))
     for event in inner:
-        bad = flipped(opening, event.offset + 18, 1)
+        bad = flip_bit(opening, event.offset + 18, 1)
         found, _ = read(b"".join([bad, *parts[1:]]), lost="hold")
         assert states(found) == "m" * 10 + "d" * 50, event.chunk.label
 

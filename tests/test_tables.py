@@ -198,17 +198,17 @@ def test_export(archive: Path, tmp_path: Path, to: str) -> None:
 
 
 def test_the_command(archive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def ran(*words: str) -> tuple[int, str]:
+    def run_command(*words: str) -> tuple[int, str]:
         code = run("export", archive, tmp_path, *words)
         return int(code), "".join(capsys.readouterr())
 
-    code, said = ran("--to", "npz")
+    code, said = run_command("--to", "npz")
     assert code == 0 and "3 written" in said
-    code, said = ran("--to", "npz")
+    code, said = run_command("--to", "npz")
     assert code == Exit.USAGE and "exists" in said
-    code, said = ran("--to", "npz", "--force", "--clip", "walk")
+    code, said = run_command("--to", "npz", "--force", "--clip", "walk")
     assert code == 0 and "1 written" in said
-    code, said = ran("--to", "bvh", "--where", "format == 'c3d'")
+    code, said = run_command("--to", "bvh", "--where", "format == 'c3d'")
     assert code == Exit.BAD_INPUT and "walk.c3d" in said
     with pytest.raises(mcz.OptionError, match="to 'fbx': one of csv, npz"):
         mcz.export(archive, tmp_path, "fbx")

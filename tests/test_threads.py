@@ -18,7 +18,7 @@ from mcz.codecs import CODECS
 from mcz.codecs.contract import Layout
 from mcz.codecs.segments import Sizing, segments_by_guess
 from mcz.model.threads import in_force, in_order, limited
-from tests.motions import smooth, written
+from tests.motions import smooth, write_bytes
 
 MOTION = smooth(1800)
 SEGMENTED = sorted(
@@ -29,7 +29,7 @@ SEGMENTED = sorted(
 
 
 def file_of(codec: str, threads: int | None = None, **params: object) -> bytes:
-    return written(MOTION, codec=codec, threads=threads, **params)
+    return write_bytes(MOTION, codec=codec, threads=threads, **params)
 
 
 @pytest.mark.parametrize("codec", SEGMENTED)

@@ -19,7 +19,7 @@ from mcz.codecs.parameters import Dial
 from mcz.files.reading.sizes import clip_sizes
 from mcz.files.writing.tuning import GOAL, PROMISED, Target, search
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
-from tests.motions import written
+from tests.motions import write_bytes
 
 DIAL = Dial("T_g", 2.0**-20, 2.0**20)
 RISING = Dial("a_w", 2.0**-20, 2.0**20, rises=True)
@@ -43,8 +43,8 @@ def walk(n_frames: int = 1200, **changes: object) -> Motion:
 WALK = walk()
 
 
-def saved(motion: Motion, **params: object) -> bytes:
-    return written(motion, codec="mrdwt", **params)
+def encode_file(motion: Motion, **params: object) -> bytes:
+    return write_bytes(motion, codec="mrdwt", **params)
 
 
 class Found:
@@ -96,7 +96,7 @@ class Found:
     ],
 )
 def test_targets_are_met(name: str, limit: float) -> None:
-    found = Found(WALK, saved(WALK, **{name: limit}))
+    found = Found(WALK, encode_file(WALK, **{name: limit}))
     found.check(name, limit)
     assert found.figures[name] >= PROMISED * limit
 
@@ -105,7 +105,7 @@ def test_targets_are_met(name: str, limit: float) -> None:
 def test_the_end_of_the_range_is_remarked_upon(name: str) -> None:
     """More than the finest setting needs, or a greater error than the coarsest makes."""
     short = walk(100)
-    found = Found(short, saved(short, **{name: 10**8}))
+    found = Found(short, encode_file(short, **{name: 10**8}))
     found.check(name, 10**8)
     assert "the range of T_g ends there" in found.quality["target_remark"]
     assert float(found.quality["param.T_g"]) in (DIAL.low, DIAL.high)
@@ -115,7 +115,7 @@ def test_the_end_of_the_range_is_remarked_upon(name: str) -> None:
 def test_all_other_parameters_stay(name: str) -> None:
     limit = {"target_bytes": 3000, "kbps": 2}[name]
     given = {"preset": "khan2016", "wavelet": "db2", "segment_frames": 400, name: limit}
-    found = Found(WALK, saved(WALK, **given))
+    found = Found(WALK, encode_file(WALK, **given))
     found.check(name, limit)
     assert found.quality["param.preset"] == "khan2016"
     assert found.quality["param.wavelet"] == "db2"
@@ -127,7 +127,7 @@ def test_all_other_parameters_stay(name: str) -> None:
 def test_any_size(limit: int) -> None:
     short = walk(300)  # every step of a few bytes, at its shortest
     try:
-        data = saved(short, target_bytes=limit)
+        data = encode_file(short, target_bytes=limit)
     except mcz.OptionError as error:
         assert limit < 400 and "cannot be met" in str(error)
         return
@@ -145,7 +145,7 @@ def test_signals_beside_the_motion_count() -> None:
     )
     motion = replace(WALK, signals=(WALK.signals[0], analog))
     for name, limit in (("target_bytes", 8000), ("kbps", 6.0), ("mean_error_cm", 0.3)):
-        data = saved(motion, **{name: limit})
+        data = encode_file(motion, **{name: limit})
         Found(motion, data).check(name, limit)
         with mcz.open(data) as file:
             np.testing.assert_array_equal(file.only_clip().read(signal=1), analog.values)
@@ -204,11 +204,11 @@ def test_errors_of_a_skeleton_without_kinematics() -> None:
     joints = (Joint("a", channels=(Channel("", "smile"),)),)
     motion = Motion(Skeleton((), unit_cm=1.0), (Signal(np.zeros((9, 0))),), name="none")
     with pytest.raises(mcz.OptionError, match="mean_error_cm has no meaning"):
-        saved(motion, mean_error_cm=1)
+        encode_file(motion, mean_error_cm=1)
     unknown = Skeleton((*joints, Joint("b", channels=(Channel("rx"),))), unit_cm=1.0, angle_unit="")
     motion = Motion(unknown, (Signal(np.ones((9, 2))),), name="none")
     with pytest.raises(mcz.OptionError, match="mean_error_cm has no meaning: .*angle unit"):
-        saved(motion, mean_error_cm=1)
+        encode_file(motion, mean_error_cm=1)
 
 
 def test_lossless_codecs_have_no_targets() -> None:
@@ -223,7 +223,7 @@ def test_values_that_only_coarse_steps_can_hold() -> None:
     values = motion.values.copy()
     values[:, 0] += 1e7
     motion = motion.with_values(values)
-    found = Found(motion, saved(motion, target_bytes=10**7))
+    found = Found(motion, encode_file(motion, target_bytes=10**7))
     found.check("target_bytes", 10**7)
     assert "no T_g that was tried is nearer" in found.quality["target_remark"]
 
@@ -231,7 +231,7 @@ def test_values_that_only_coarse_steps_can_hold() -> None:
 # The search alone
 
 
-def searched(
+def run_search(
     dial: Dial, figure: Callable[[float], float], limit: float, falls: bool
 ) -> tuple[float, float, bool, list[float]]:
     asked: list[float] = []
@@ -254,7 +254,7 @@ def searched(
 def test_smooth_figures_are_met_soon(dial: Dial, setting: float, power: float, falls: bool) -> None:
     """Any power law whose solution lies in the range; a size grows with a dial that rises."""
     sign = power if falls == dial.rises else -power
-    found, reached, ended, asked = searched(dial, lambda t: t**sign, setting**sign, falls)
+    found, reached, ended, asked = run_search(dial, lambda t: t**sign, setting**sign, falls)
     assert reached == found**sign <= setting**sign
     assert not ended and reached >= PROMISED * setting**sign
     assert len(asked) < 40
@@ -271,7 +271,7 @@ def test_figures_that_are_not_monotone(seed: int, limit: float, falls: bool) -> 
         place = int((math.log2(t) + 20) * 100) % 4096
         return t ** (-0.5 if falls else 0.5) * float(noise[place])
 
-    found, reached, _, asked = searched(DIAL, figure, limit, falls)
+    found, reached, _, asked = run_search(DIAL, figure, limit, falls)
     assert reached == figure(found) <= limit
     assert found in asked and len(asked) < 150
     assert reached == max(f for f in map(figure, asked) if f <= limit)
@@ -279,14 +279,14 @@ def test_figures_that_are_not_monotone(seed: int, limit: float, falls: bool) -> 
 
 @pytest.mark.parametrize(("limit", "falls", "end"), [(5, True, DIAL.low), (5, False, DIAL.high)])
 def test_ends_of_the_range(limit: float, falls: bool, end: float) -> None:
-    found, reached, ended, _ = searched(DIAL, lambda t: 1.0, limit, falls)
+    found, reached, ended, _ = run_search(DIAL, lambda t: 1.0, limit, falls)
     assert (found, reached, ended) == (end, 1.0, True)
 
 
 @pytest.mark.parametrize("falls", [True, False])
 def test_targets_that_no_setting_meets(falls: bool) -> None:
     with pytest.raises(mcz.OptionError, match="figure 0.5 cannot be met: T_g .* gives 1"):
-        searched(DIAL, lambda t: 1.0, 0.5, falls)
+        run_search(DIAL, lambda t: 1.0, 0.5, falls)
 
 
 def test_a_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
@@ -295,12 +295,12 @@ def test_a_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
             raise mcz.MotionError("a coefficient exceeds")
         return 1 / t
 
-    found, reached, _, _ = searched(DIAL, figure, 1000.0, falls=True)
+    found, reached, _, _ = run_search(DIAL, figure, 1000.0, falls=True)
     assert reached == 1 / found <= 100 and found >= 0.01
     with pytest.raises(mcz.MotionError):
-        searched(DIAL, lambda t: figure(t / 1e5), 1000.0, falls=True)
+        run_search(DIAL, lambda t: figure(t / 1e5), 1000.0, falls=True)
     with pytest.raises(mcz.OptionError, match="figure 1e-05 cannot be met: a coefficient exceeds"):
-        searched(DIAL, lambda t: 1 / figure(t), 1e-5, falls=False)
+        run_search(DIAL, lambda t: 1 / figure(t), 1e-5, falls=False)
 
 
 def test_a_figure_that_stays_is_not_followed_to_the_end() -> None:
@@ -311,7 +311,7 @@ def test_a_figure_that_stays_is_not_followed_to_the_end() -> None:
         return 100.0
 
     with pytest.raises(mcz.OptionError, match="cannot be met: T_g .* gives 100"):
-        searched(DIAL, figure, 10.0, falls=True)
+        run_search(DIAL, figure, 10.0, falls=True)
     assert len(asked) <= 5
 
 
@@ -319,7 +319,7 @@ def test_errors_of_the_codec_come_through() -> None:
     values = walk(50).values.copy()
     values[3, 3] = math.nan
     with pytest.raises(mcz.MotionError, match="not finite"):
-        saved(walk(50).with_values(values), target_bytes=1000)
+        encode_file(walk(50).with_values(values), target_bytes=1000)
 
 
 # Dials that go the other way, and dials of integers
@@ -339,19 +339,19 @@ def test_integers_that_meet_the_target_are_the_nearest(dial, whole, more, falls)
     rises = falls == dial.rises  # the figure, with the dial
     figure: Callable[[float], float] = float if rises else (lambda n: 1.0 / n)
     limit = whole + more if rises else 1 / (whole - more * 0.5)
-    found, reached, _, asked = searched(dial, figure, limit, falls)
+    found, reached, _, asked = run_search(dial, figure, limit, falls)
     assert reached == figure(found) <= limit
     assert found == whole or reached >= GOAL * limit
     assert len(set(asked)) < 120
 
 
 def test_a_whole_dial_ends_at_its_range() -> None:
-    assert searched(COUNTED, lambda n: 1.0, 5, falls=True)[:3] == (1, 1.0, True)
-    assert searched(COUNTED, lambda n: 1.0, 5, falls=False)[:3] == (1000, 1.0, True)
-    assert searched(WHOLE, lambda n: 1.0, 5, falls=True)[:3] == (2**20, 1.0, True)
-    assert searched(WHOLE, lambda n: 1.0, 5, falls=False)[:3] == (1, 1.0, True)
+    assert run_search(COUNTED, lambda n: 1.0, 5, falls=True)[:3] == (1, 1.0, True)
+    assert run_search(COUNTED, lambda n: 1.0, 5, falls=False)[:3] == (1000, 1.0, True)
+    assert run_search(WHOLE, lambda n: 1.0, 5, falls=True)[:3] == (2**20, 1.0, True)
+    assert run_search(WHOLE, lambda n: 1.0, 5, falls=False)[:3] == (1, 1.0, True)
     with pytest.raises(mcz.OptionError, match="cannot be met: q 1 gives 1"):
-        searched(WHOLE, lambda n: 1.0, 0.5, falls=True)
+        run_search(WHOLE, lambda n: 1.0, 0.5, falls=True)
 
 
 def test_a_rising_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
@@ -360,10 +360,10 @@ def test_a_rising_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
             raise mcz.MotionError("a coefficient exceeds")
         return t
 
-    found, reached, _, _ = searched(RISING, figure, 1000.0, falls=True)
+    found, reached, _, _ = run_search(RISING, figure, 1000.0, falls=True)
     assert reached == found <= 100
     with pytest.raises(mcz.MotionError):
-        searched(RISING, lambda t: figure(t * 1e9), 1e-9, falls=False)
+        run_search(RISING, lambda t: figure(t * 1e9), 1e-9, falls=False)
 
 
 @pytest.mark.parametrize(
@@ -378,7 +378,7 @@ def test_a_rising_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
     ],
 )
 def test_targets_of_other_codecs(codec: str, name: str, limit: float) -> None:
-    Found(WALK, written(WALK, codec=codec, **{name: limit})).check(name, limit)
+    Found(WALK, write_bytes(WALK, codec=codec, **{name: limit})).check(name, limit)
 
 
 def test_targets_that_components_cannot_meet() -> None:

@@ -27,7 +27,7 @@ def gappy() -> Motion:
     return replace(C3D, signals=(replace(C3D.signals[0], mask=mask), *C3D.signals[1:]))
 
 
-def stretched() -> Motion:
+def odd_names_motion() -> Motion:
     """Names that USD does not take, a joint that slides, and x up."""
     joints = (
         Joint("a b", channels=(Channel("rz"), Channel("sx"))),
@@ -39,7 +39,7 @@ def stretched() -> Motion:
     return Motion(skeleton, (Signal(values),), Fraction(24), name="an odd/name")
 
 
-MOTIONS = {"amc": AMC, "bvh": BVH, "gappy": gappy(), "stretched": stretched()}
+MOTIONS = {"amc": AMC, "bvh": BVH, "gappy": gappy(), "stretched": odd_names_motion()}
 
 
 def test_a_sample_a_frame() -> None:

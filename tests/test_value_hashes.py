@@ -24,7 +24,7 @@ OPTIONAL = {"raw", "fast"}
 NAMES = sorted(CODECS)
 
 
-def mishashed(codec: str) -> bytes:
+def wrong_hash_file(codec: str) -> bytes:
     """A clip whose hash is that of other values."""
     out, case = BytesIO(), CASES[codec]
     mcz.write(smooth(12), out, codec, **case.params)
@@ -34,7 +34,7 @@ def mishashed(codec: str) -> bytes:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_whole_signal_is_compared_unless_the_codec_excuses_it(name: str, tmp_path: Path) -> None:
     path = tmp_path / "clip.mcz"
-    path.write_bytes(mishashed(name))
+    path.write_bytes(wrong_hash_file(name))
     for verify in (False, True):
         with mcz.open(path, verify=verify) as file:
             clip = file.only_clip()

@@ -25,14 +25,14 @@ from mcz.container.source import open_source
 from mcz.errors import UnsupportedError
 from tests import live_codec
 from tests.commands import Call
-from tests.motions import skeleton, smooth, written
+from tests.motions import skeleton, smooth, write_bytes
 
 DATE = "2026-11-24"
 
 
 def archive() -> bytes:
     """A clip in chunks."""
-    return written(smooth(12), "raw")
+    return write_bytes(smooth(12), "raw")
 
 
 def live() -> bytes:
@@ -47,7 +47,7 @@ def live() -> bytes:
 
 
 @pytest.fixture(scope="module")
-def packed(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def archive_path(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("packed")
     for name in ("walk.asf", "walk.amc", "walk.bvh"):
         (folder / "in" / "sub").mkdir(parents=True, exist_ok=True)
@@ -58,7 +58,7 @@ def packed(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "all.mcz"
 
 
-def checked(target: Any, progress: Callable[[int, int], object] | None = None) -> ChecksumReport:
+def run_check(target: Any, progress: Callable[[int, int], object] | None = None) -> ChecksumReport:
     with closing(open_source(target)) as source:
         return check_checksums(source, progress)
 
@@ -86,9 +86,9 @@ def test_every_flipped_bit_is_found(data: bytes) -> None:
         assert mcz.verify(bytes(bad), quick=True), at
 
 
-def test_all_faults_are_named(packed: Path) -> None:
-    data = bytearray(packed.read_bytes())
-    with mcz.open(packed) as file:
+def test_all_faults_are_named(archive_path: Path) -> None:
+    data = bytearray(archive_path.read_bytes())
+    with mcz.open(archive_path) as file:
         rows = [clip.clip for clip in file.container.directory.clips.values()]
         cends = [clip.cend for clip in file.container.directory.clips.values()]
     data[rows[0].offset + 9] ^= 1  # a header, behind which the walk finds its way again
@@ -114,12 +114,12 @@ def test_damaged_packets_are_named() -> None:
     assert all("crc of packet" in problem.message for problem in found)
 
 
-def test_an_index_of_another_file_is_found(packed: Path) -> None:
+def test_an_index_of_another_file_is_found(archive_path: Path) -> None:
     """Its checksum is right, what it says is not."""
     from mcz.container.index import build_index
 
-    data = packed.read_bytes()
-    with mcz.open(packed) as file:
+    data = archive_path.read_bytes()
+    with mcz.open(archive_path) as file:
         directory, foot = file.container.directory, file.container.index
         assert foot is not None
         assert index_content(directory)
@@ -142,21 +142,21 @@ def _with(directory: object, name: str, table: dict) -> object:
     return replace(directory, **{name: table}, indexes=())
 
 
-def test_blocks_end_anywhere(packed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_end_anywhere(archive_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The block size bounds memory and does not change the findings."""
     from mcz.container import parser
 
     open_ones = live()
-    whole = checked(packed), checked(open_ones)
+    whole = run_check(archive_path), run_check(open_ones)
     monkeypatch.setattr(parser, "BLOCK", 70_000)  # a packet may have 64 KiB
-    assert (checked(packed), checked(open_ones)) == whole
+    assert (run_check(archive_path), run_check(open_ones)) == whole
     assert whole[0].indexed
     assert whole[1].n_packets == 20
 
 
-def test_a_file_that_grows_is_checked_up_to_its_end(packed: Path, tmp_path: Path) -> None:
+def test_a_file_that_grows_is_checked_up_to_its_end(archive_path: Path, tmp_path: Path) -> None:
     path = tmp_path / "grows.mcz"
-    path.write_bytes(packed.read_bytes() + b"SKEL")
+    path.write_bytes(archive_path.read_bytes() + b"SKEL")
     assert mcz.verify(path, quick=True)
     with path.open("r+b") as writer:
         assert lock(writer)
@@ -176,21 +176,23 @@ def test_damage_of_any_sort_is_a_problem(data: bytes, draw: st.DataObject) -> No
         assert bool(mcz.verify(bad, quick=True)) == (bad != data)
 
 
-def test_quick_takes_no_part(packed: Path, call: Call) -> None:
+def test_quick_takes_no_part(archive_path: Path, call: Call) -> None:
     with pytest.raises(mcz.OptionError, match="takes no where"):
-        mcz.verify(packed, quick=True, where="n_frames > 1")
-    assert call("verify", packed, "--quick", "--where", "n_frames > 1")[0] == 2
-    assert call("verify", packed, "--quick", "--source", packed)[0] == 2
+        mcz.verify(archive_path, quick=True, where="n_frames > 1")
+    assert call("verify", archive_path, "--quick", "--where", "n_frames > 1")[0] == 2
+    assert call("verify", archive_path, "--quick", "--source", archive_path)[0] == 2
 
 
-def test_the_command_says_what_was_not_checked(packed: Path, tmp_path: Path, call: Call) -> None:
-    code, out, errors = call("verify", packed, "--quick")
+def test_the_command_says_what_was_not_checked(
+    archive_path: Path, tmp_path: Path, call: Call
+) -> None:
+    code, out, errors = call("verify", archive_path, "--quick")
     assert (code, errors) == (0, "")
     assert "values and sources were not checked" in out
     seen: list[int] = []
-    checked(packed, lambda done, total: seen.append(done))
-    assert seen[-1] == packed.stat().st_size
-    bad = bytearray(packed.read_bytes())
+    run_check(archive_path, lambda done, total: seen.append(done))
+    assert seen[-1] == archive_path.stat().st_size
+    bad = bytearray(archive_path.read_bytes())
     bad[len(bad) // 2] ^= 1
     (tmp_path / "bad.mcz").write_bytes(bad)
     code, out, errors = call("verify", tmp_path / "bad.mcz", "--quick")
@@ -201,41 +203,41 @@ def test_the_command_says_what_was_not_checked(packed: Path, tmp_path: Path, cal
 # Reports -------------------------------------------------------------------------
 
 
-def test_a_report_lists_what_was_verified(packed: Path, tmp_path: Path, call: Call) -> None:
+def test_a_report_lists_what_was_verified(archive_path: Path, tmp_path: Path, call: Call) -> None:
     import hashlib
 
     path = tmp_path / "report.json"
-    words = ("verify", packed, "--report", path, "--date", "none")
+    words = ("verify", archive_path, "--report", path, "--date", "none")
     assert call(*words)[0] == 0
     first = path.read_bytes()
     document = json.loads(first)
     assert document["verified"] and document["mode"] == "full" and document["date"] is None
-    assert document["sha256"] == hashlib.sha256(packed.read_bytes()).hexdigest()
+    assert document["sha256"] == hashlib.sha256(archive_path.read_bytes()).hexdigest()
     assert document["totals"]["files"] == 5
     assert document["totals"]["files_bytes"] == sum(
-        file.stat().st_size for file in (packed.parent / "in").rglob("*.*") if file.is_file()
+        file.stat().st_size for file in (archive_path.parent / "in").rglob("*.*") if file.is_file()
     )
     clip = next(row for row in document["clips"] if row["source_path"] == "walk.amc")
-    amc = (packed.parent / "in" / "walk.amc").read_bytes()
+    amc = (archive_path.parent / "in" / "walk.amc").read_bytes()
     assert clip["source_sha256"] == hashlib.sha256(amc).hexdigest()
     assert {row["result"] for row in (*document["clips"], *document["attachments"])} == {"verified"}
     assert call(*words)[0] == 2  # a report is not overwritten
     assert call(*words, "--force")[0] == 0
-    assert call("verify", packed, "--report", tmp_path / "now.json")[0] == 0
+    assert call("verify", archive_path, "--report", tmp_path / "now.json")[0] == 0
     assert json.loads((tmp_path / "now.json").read_bytes())["date"].endswith("Z")
     assert path.read_bytes() == first
-    assert call("verify", packed, "--report", tmp_path / "report.pdf")[0] == 2
-    assert call("verify", packed, "--report", f"{packed}", "--force")[0] == 2
-    assert call("verify", packed, "--date", "none")[0] == 2
+    assert call("verify", archive_path, "--report", tmp_path / "report.pdf")[0] == 2
+    assert call("verify", archive_path, "--report", f"{archive_path}", "--force")[0] == 2
+    assert call("verify", archive_path, "--date", "none")[0] == 2
 
 
 @pytest.mark.parametrize("quick", [[], ["--quick"]])
 @pytest.mark.parametrize("damage", ["none", "one clip", "no end"])
 def test_a_report_says_what_is_wrong(
-    packed: Path, tmp_path: Path, call: Call, quick: list[str], damage: str
+    archive_path: Path, tmp_path: Path, call: Call, quick: list[str], damage: str
 ) -> None:
-    data = bytearray(packed.read_bytes())
-    with mcz.open(packed) as file:
+    data = bytearray(archive_path.read_bytes())
+    with mcz.open(archive_path) as file:
         at = next(iter(file.container.directory.clips.values())).segments[0].offset
     if damage == "one clip":
         data[at + 40] ^= 1
@@ -260,9 +262,9 @@ def test_a_report_says_what_is_wrong(
         assert results.count("damaged") == (damage == "one clip")
 
 
-def test_a_report_of_some_clips_says_so(packed: Path, tmp_path: Path, call: Call) -> None:
+def test_a_report_of_some_clips_says_so(archive_path: Path, tmp_path: Path, call: Call) -> None:
     path = tmp_path / "r.json"
-    code, _, _ = call("verify", packed, "--where", "format == 'bvh'", "--report", path)
+    code, _, _ = call("verify", archive_path, "--where", "format == 'bvh'", "--report", path)
     document = json.loads(path.read_bytes())
     assert code == 0
     assert sorted(row["result"] for row in document["clips"]) == ["not decoded", "verified"]

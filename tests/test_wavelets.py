@@ -37,7 +37,9 @@ def whole(signal: np.ndarray, wavelet: Wavelet, levels: int) -> list[np.ndarray]
     return dwt.analyze(signal, 0, 0, n, wavelet.lengths(n, levels), wavelet)
 
 
-def synthesized(bands: list[np.ndarray], wavelet: Wavelet, start: int, stop: int) -> np.ndarray:
+def synthesize_range(
+    bands: list[np.ndarray], wavelet: Wavelet, start: int, stop: int
+) -> np.ndarray:
     """Frames of a range from no more than the coefficients that it needs."""
     levels = len(bands) - 1
     ranges = dwt.needed_ranges(start, stop, levels, wavelet.n_taps)
@@ -63,7 +65,7 @@ def test_synthesis_is_that_of_pywavelets(name: str, n: int, levels: int) -> None
     sizes = [lengths[levels], *reversed(lengths[1:])] if levels else [n]
     bands = [signal_of(size, seed) for seed, size in enumerate(sizes)]
     meant = pywt.waverec(bands, name, mode="symmetric", axis=0)[:n]
-    np.testing.assert_allclose(synthesized(bands, wavelet, 0, n), meant, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(synthesize_range(bands, wavelet, 0, n), meant, rtol=0, atol=1e-9)
 
 
 @given(NAMES, SIZES, LEVELS, st.data())
@@ -74,8 +76,8 @@ def test_any_range_is_the_same_as_in_the_whole(name: str, n: int, levels: int, d
         bands[band] = np.zeros((0, 3))  # details that are left out
     start = data.draw(st.integers(0, n - 1))
     stop = data.draw(st.integers(start + 1, n))
-    full = synthesized(bands, wavelet, 0, n)
-    part = synthesized(bands, wavelet, start, stop)
+    full = synthesize_range(bands, wavelet, 0, n)
+    part = synthesize_range(bands, wavelet, start, stop)
     assert part.tobytes() == full[start:stop].tobytes()
 
 

@@ -60,7 +60,7 @@ def test_the_way_back(seed: int, size: float) -> None:
         np.testing.assert_allclose(vectors_of_quaternions(sign * quaternions), v, atol=1e-14)
 
 
-def spinning(n: int = 200) -> np.ndarray:
+def spinning_vector(n: int = 200) -> np.ndarray:
     """A vector that goes through two turns about a swaying axis, (3, n)."""
     time = np.linspace(0, 4 * np.pi, n)
     return np.stack([0.1 * np.sin(time / 3), time, 0.2 * np.cos(time / 5)]) + 0.3
@@ -70,7 +70,7 @@ def spinning(n: int = 200) -> np.ndarray:
 @pytest.mark.parametrize("ends", [[], [1], [7, 8, 90], range(1, 200)])
 def test_vectors_follow_each_other(unit: str, ends: list[int]) -> None:
     one = 180 / np.pi if unit == "deg" else 1.0
-    smooth = spinning().T
+    smooth = spinning_vector().T
     wrapped = Rotation.from_rotvec(smooth).as_rotvec()
     assert np.abs(np.diff(wrapped, axis=0)).max() > 3
     kinds = ("tx", "vy", "vx", "vz", "vx")
@@ -93,7 +93,7 @@ def test_vectors_follow_each_other(unit: str, ends: list[int]) -> None:
 
 
 def test_quaternions_keep_their_sign() -> None:
-    smooth = Rotation.from_rotvec(spinning().T).as_quat(scalar_first=True)
+    smooth = Rotation.from_rotvec(spinning_vector().T).as_quat(scalar_first=True)
     signs = np.where(np.random.default_rng(5).random(200) < 0.5, -1.0, 1.0)
     signs[0] = 1
     skeleton = Skeleton((Joint("hips", channels=tuple(map(Channel, ("qw", "qx", "qy", "qz")))),))

@@ -13,14 +13,14 @@ import mcz
 from mcz import ChecksumError, Signal
 from mcz.container.decoded_cache import MOST_BYTES, DecodedCache, Run
 from mcz.container.segments import FRESH
-from tests.motions import smooth, written
+from tests.motions import smooth, write_bytes
 
 LENGTH = 90
 VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
 
 
 def file_of(codec: str, **options: object) -> bytes:
-    return written(smooth(LENGTH), codec=codec, **options)
+    return write_bytes(smooth(LENGTH), codec=codec, **options)
 
 
 FILES = {codec: file_of(codec, segment_frames=16) for codec in ("fast", "best", "mrdwt")}
@@ -88,7 +88,7 @@ def test_damage_later_in_a_run_leaves_what_is_before(name: str) -> None:
 
 def test_segments_that_no_channel_needs_are_checked() -> None:
     still = mcz.Motion(mcz.Skeleton((mcz.Joint("rock"),)), (Signal(np.zeros((7, 0))),), name="rock")
-    data = bytearray(written(still))
+    data = bytearray(write_bytes(still))
     with mcz.open(bytes(data)) as file:
         row = file.only_clip().signals[0].rows[0]
     data[row.offset + 1] ^= 4

@@ -41,10 +41,10 @@ class Server:
         if self.wrong is not None and len(self.asked) > self.after:
             self.wrong(handler, self.data, start, stop)
         else:
-            ranged(handler, self.data, start, stop)
+            answer_range(handler, self.data, start, stop)
 
 
-def ranged(
+def answer_range(
     handler: BaseHTTPRequestHandler,
     data: bytes,
     start: int,
@@ -67,7 +67,7 @@ def ranged(
 
 
 @contextmanager
-def served(found: Server, context: ssl.SSLContext | None = None) -> Iterator[None]:
+def serve(found: Server, context: ssl.SSLContext | None = None) -> Iterator[None]:
     """Serve ``found`` at a local address, with persistent connections."""
 
     class Handler(BaseHTTPRequestHandler):

@@ -9,7 +9,7 @@ from pathlib import Path
 from mcz import TruncatedError
 
 
-def joined(state: str, item: int) -> tuple[str, int]:
+def join_state(state: str, item: int) -> tuple[str, int]:
     return state, item
 
 

@@ -45,7 +45,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def ran(python: str, package: Path, script: Path, *words: Any, **more: str) -> str:
+def run_script(python: str, package: Path, script: Path, *words: Any, **more: str) -> str:
     """Return what ``script`` prints with only the bundled package on its path."""
     environment = {**os.environ, "PYTHONPATH": str(package / "wheels"), **more}
     for name in ("VIRTUAL_ENV", "MCZ_LOOPS"):
@@ -58,7 +58,7 @@ def ran(python: str, package: Path, script: Path, *words: Any, **more: str) -> s
 
 def check(python: str, package: Path, *words: Any) -> dict[str, Any]:
     script = ROOT / "tools/blender/check_addon.py"
-    out = ran(python, package, script, *words, "--addon", package / "addons")
+    out = run_script(python, package, script, *words, "--addon", package / "addons")
     found: dict[str, Any] = json.loads(out.splitlines()[-1])
     assert found["distance"] < NEAR and found["compared"] > 20, found
     return found
@@ -78,7 +78,7 @@ def test_the_kernels_that_it_has(python: str, package: Path, tmp_path: Path) -> 
     """Compiled ones exactly where a wheel of this Python was bundled."""
     script = tmp_path / "kernels.py"
     script.write_text(KERNELS, "utf-8")
-    path, lacks = ran(python, package, script).split()
+    path, lacks = run_script(python, package, script).split()
     assert path.startswith(str(package)) and lacks == str(not WHEELS)
 
 
@@ -239,14 +239,16 @@ def test_installed(python: str, package: Path, samples: Path, tmp_path: Path) ->
     script.write_text(SESSION, "utf-8")
     environment = {"PYTHONPATH": "", "BLENDER_USER_RESOURCES": str(tmp_path / "user")}
     words = package / "addon.zip", samples, archive, cut, tmp_path / "out.mcz"
-    assert "all well" in ran(python, package, script, *words, **environment)
+    assert "all well" in run_script(python, package, script, *words, **environment)
 
 
 def test_blender_finds_no_fault_in_the_manifest(python: str, package: Path) -> None:
-    asked = ran(python, package, Path("-c"), "import bpy; print(bpy.utils.resource_path('LOCAL'))")
+    asked = run_script(
+        python, package, Path("-c"), "import bpy; print(bpy.utils.resource_path('LOCAL'))"
+    )
     script = Path(asked.splitlines()[-1]) / "scripts/addons_core/bl_pkg/cli/blender_ext.py"
     words = "validate", package / "addon.zip", "--valid-tags", ""
-    assert "Success" in ran(python, package, script, *words)
+    assert "Success" in run_script(python, package, script, *words)
 
 
 REAL = [

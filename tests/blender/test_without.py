@@ -45,7 +45,9 @@ def rest_axes(bones: list[placing.Bone], seed: int) -> list[np.ndarray]:
     return found
 
 
-def posed(bones: list[placing.Bone], rests: list[np.ndarray], n_frames: int) -> list[np.ndarray]:
+def pose_matrices(
+    bones: list[placing.Bone], rests: list[np.ndarray], n_frames: int
+) -> list[np.ndarray]:
     """The matrices of bones in every frame, as Blender makes them of keys, scales left out."""
     found: list[np.ndarray] = []
     for bone, rest in zip(bones, rests, strict=True):
@@ -80,7 +82,7 @@ def test_bones_are_where_the_points_are(skeleton: mcz.Skeleton, up: str, seed: i
     motion = mcz.Motion(skeleton, (mcz.Signal(values),))
     bones = placing.bones_of(motion, up, scale)
     rests = rest_axes(bones, seed)
-    matrices = posed(bones, rests, len(values))
+    matrices = pose_matrices(bones, rests, len(values))
     origins = to_blender(origins_of(skeleton, values), up, scale)
     points = to_blender(positions_of(skeleton, values), up, scale)
     size = np.abs(origins).max() + 1
@@ -110,7 +112,7 @@ def test_the_way_back(skeleton: mcz.Skeleton, up: str, seed: int) -> None:
     values, scale = values_for(skeleton, seed=seed), 0.025
     bones = placing.bones_of(mcz.Motion(skeleton, (mcz.Signal(values),)), up, scale)
     rests = rest_axes(bones, seed)
-    matrices = posed(bones, rests, len(values))
+    matrices = pose_matrices(bones, rests, len(values))
     parts = [
         solving.Part(b.name, b.parent, r, b.tail, m, b.ends_at >= 0, b.end >= 0)
         for b, r, m in zip(bones, rests, matrices, strict=True)
@@ -141,7 +143,7 @@ def test_what_does_not_move_has_no_channels() -> None:
     skeleton = mcz.Skeleton((mcz.Joint("a"), mcz.Joint("b", 0, (0.0, 1.0, 0.0))))
     bones = placing.bones_of(mcz.Motion(skeleton, (mcz.Signal(np.zeros((3, 0))),)), "y", 1.0)
     rests = rest_axes(bones, 1)
-    matrices = posed(bones, rests, 3)
+    matrices = pose_matrices(bones, rests, 3)
     parts = [
         solving.Part(b.name, b.parent, r, b.tail, m, False, False)
         for b, r, m in zip(bones, rests, matrices, strict=True)

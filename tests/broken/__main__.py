@@ -20,7 +20,7 @@ def main(what: str, *arguments: str) -> int:
     if arguments[:1] == ("--list",):
         print("\n".join(variants.names(rule)))
         return 0
-    install.install(variants.codes(rule, name or find.found()[rule][0].variant))
+    install.install(variants.codes(rule, name or find.read_catches()[rule][0].variant))
     if arguments[:1] == ("--show",):
         for vector, row in answers.vectors().items():
             if any(vector.startswith(prefix) for prefix in arguments[1:] or [""]):

@@ -23,7 +23,7 @@ class Break:
     patches: tuple[tuple[str, str], ...]
 
 
-def parsed(text: str) -> dict[str, list[Break]]:
+def parse_breaks(text: str) -> dict[str, list[Break]]:
     """The breaks of each rule, from the blocks of by_hand.txt behind the words at its head."""
     found: dict[str, list[Break]] = {}
     for block in text.strip().split("\n\n")[2:]:
@@ -41,4 +41,4 @@ def parsed(text: str) -> dict[str, list[Break]]:
     return found
 
 
-BREAKS = parsed(Path(__file__).with_suffix(".txt").read_text("utf-8"))
+BREAKS = parse_breaks(Path(__file__).with_suffix(".txt").read_text("utf-8"))

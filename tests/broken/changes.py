@@ -11,7 +11,7 @@ import ast
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 
-from tests.broken.marks import Slot, modules, parsed, slots, source
+from tests.broken.marks import Slot, modules, parse_module, slots, source
 
 Changed = Iterator[ast.AST]
 _RELAXED: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -222,7 +222,7 @@ def words(function: str) -> dict[int, dict[str, None]]:
     for module in modules():
         if function not in source(module):
             continue
-        for node in ast.walk(parsed(module)):
+        for node in ast.walk(parse_module(module)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
                 for i, arg in enumerate(node.args if _name(node.func) == function else ()):
                     if isinstance(arg, ast.Constant) and isinstance(arg.value, str):

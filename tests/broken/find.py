@@ -118,7 +118,7 @@ def search(nursery: Nursery, rule: str, known: Sequence[Catch] = ()) -> list[Cat
     return []
 
 
-def found() -> dict[str, list[Catch]]:
+def read_catches() -> dict[str, list[Catch]]:
     """Parse found.txt: the catches of each rule."""
     rows: dict[str, list[Catch]] = {}
     if FOUND.exists():
@@ -139,7 +139,7 @@ def rules() -> list[str]:
 
 
 def main(wanted: Sequence[str]) -> int:
-    rows = found()
+    rows = read_catches()
     for rule in set(rows) - set(rules()):
         del rows[rule]
     todo = [rule for rule in rules() if not wanted or any(map(rule.startswith, wanted))]

@@ -67,7 +67,7 @@ def source(module: str) -> str:
 
 
 @cache
-def parsed(module: str) -> ast.Module:
+def parse_module(module: str) -> ast.Module:
     return ast.parse(source(module))
 
 
@@ -122,17 +122,17 @@ def targets(tree: ast.Module, line: int) -> list[Slot]:
 
     If none begins there, it is the smallest expression that contains the line.
     """
-    found = list(_beginning(tree, line))
+    found = list(_slots_at(tree, line))
     statements = [slot for slot in found if isinstance(slot.node, ast.stmt)]
     return statements or found or [_smallest(tree, line)]
 
 
-def _beginning(node: ast.AST, line: int) -> Iterator[Slot]:
+def _slots_at(node: ast.AST, line: int) -> Iterator[Slot]:
     for slot in slots(node):
         if getattr(slot.node, "lineno", None) == line:
             yield slot
         else:
-            yield from _beginning(slot.node, line)
+            yield from _slots_at(slot.node, line)
 
 
 def _smallest(tree: ast.Module, line: int) -> Slot:

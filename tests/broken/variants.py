@@ -16,7 +16,7 @@ from types import CodeType
 
 from tests.broken import by_hand
 from tests.broken.changes import OPERATORS, changes
-from tests.broken.marks import Slot, modules, parsed, places, places_in, source, targets
+from tests.broken.marks import Slot, modules, parse_module, places, places_in, source, targets
 
 ALL = "all"  # places at once
 HAND = "hand"
@@ -36,7 +36,7 @@ def names(rule: str) -> list[str]:
     checks: list[list[str]] = []
     there = places().get(rule, ())
     for number, place in enumerate(there, 1):
-        tree = parsed(place.module)
+        tree = parse_module(place.module)
         counts = Counter(name for name, _, _ in changes(targets(tree, place.line)))
         own = [f"{number}.{name}.{i + 1}" for name in counts for i in range(counts[name])]
         checks.append([name for name in own if _operator(name) in CHECKS])
@@ -62,7 +62,7 @@ def codes(rule: str, name: str) -> dict[str, CodeType]:
     there = places().get(rule, ())
     if name.startswith(HAND):
         broken = by_hand.BREAKS[rule][int(name.partition(".")[2]) - 1]
-        texts = _patched(rule, broken.patches)
+        texts = _patch_sources(rule, broken.patches)
         trees = {module: ast.parse(text) for module, text in texts.items()}
         now = {place.module: source(place.module) for place in there} | texts
         there = tuple(places_in(rule, now))
@@ -73,27 +73,27 @@ def codes(rule: str, name: str) -> dict[str, CodeType]:
         if int(number) > len(there):
             raise StaleError(f"{rule} has no place {number}")
         place = there[int(number) - 1]
-        tree = trees.setdefault(place.module, parsed(place.module))
+        tree = trees.setdefault(place.module, parse_module(place.module))
         edits.append(_edit(tree, place.line, operator, int(ordinal)))
     before = [slot.node for slot, _ in edits]
     for slot, node in edits:
         node = ast.copy_location(node, slot.node)
         slot.put(ast.fix_missing_locations(node))
     try:
-        return {module: compiled(module, tree) for module, tree in trees.items()}
+        return {module: compile_module(module, tree) for module, tree in trees.items()}
     finally:
         for (slot, _), node in zip(edits, before, strict=True):
             slot.put(node)
 
 
-def compiled(module: str, tree: ast.Module) -> CodeType:
+def compile_module(module: str, tree: ast.Module) -> CodeType:
     return compile(tree, str(modules()[module]), "exec", dont_inherit=True)
 
 
 @cache
 def whole(module: str) -> CodeType:
     """Compile a module unchanged."""
-    return compiled(module, parsed(module))
+    return compile_module(module, parse_module(module))
 
 
 def _edit(tree: ast.Module, line: int, operator: str, ordinal: int) -> tuple[Slot, ast.AST]:
@@ -103,7 +103,7 @@ def _edit(tree: ast.Module, line: int, operator: str, ordinal: int) -> tuple[Slo
     return rows[ordinal - 1]
 
 
-def _patched(rule: str, patches: Iterable[by_hand.Patch]) -> dict[str, str]:
+def _patch_sources(rule: str, patches: Iterable[by_hand.Patch]) -> dict[str, str]:
     """The sources that have the texts of ``patches``, each of which stands in one of them once."""
     texts: dict[str, str] = {}
     for old, new in patches:

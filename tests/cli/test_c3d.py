@@ -14,15 +14,15 @@ import pytest
 import mcz
 from mcz.sources.c3d import c3d
 from tests.commands import Call
-from tests.formats.c3d_files import INTEL, made, real
-from tests.formats.test_c3d_outputs import listed
+from tests.formats.c3d_files import INTEL, make_c3d, real
+from tests.formats.test_c3d_outputs import add_point_lists
 from tests.formats.test_c3d_recording import integers, reals, with_analog
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """gait.c3d: an output among four points, two analog channels at twice the rate, an event."""
-    file = listed(made(6, 4, 2, 2, size=2), ANGLES=["p1"], ANGLE_UNITS=["deg"])
+    file = add_point_lists(make_c3d(6, 4, 2, 2, size=2), ANGLES=["p1"], ANGLE_UNITS=["deg"])
     file.parameters["POINT"]["Y_SCREEN"] = file.texts([b"+Z"])
     with_analog(
         file,

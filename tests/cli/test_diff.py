@@ -20,7 +20,7 @@ from tests.test_contacts import markers
 
 
 @pytest.fixture
-def moved(folder: Path) -> Path:
+def moved_walk(folder: Path) -> Path:
     """The walk of walk.bvh, in cm, its root 1 to the side and, in frame 7, 5: an .mcz."""
     motion = mcz.read(folder / "walk.bvh", unit="cm")
     values = motion.values.copy()
@@ -45,8 +45,8 @@ def test_a_file_and_its_mcz_are_equal(folder: Path, call: Call, name: str) -> No
         assert [key for key in clip if key.startswith("signal.")]
 
 
-def test_figures_are_printed_with_their_units(folder: Path, moved: Path, call: Call) -> None:
-    code, out, err = call("diff", folder / "walk.bvh", moved, "--unit", "cm")
+def test_figures_are_printed_with_their_units(folder: Path, moved_walk: Path, call: Call) -> None:
+    code, out, err = call("diff", folder / "walk.bvh", moved_walk, "--unit", "cm")
     assert (code, err) == (0, "")
     rows = {line.split()[0]: line.split() for line in out.splitlines() if line.startswith("  ")}
     assert rows["max_position_error"][1:7] == ["5", "units", "5", "frame", "7,", "point"]
@@ -54,29 +54,29 @@ def test_figures_are_printed_with_their_units(folder: Path, moved: Path, call: C
     assert rows["mse"][2:] == ["channels,", "squared"]
     assert "1 unit = 1 cm" in out
     assert "note" not in out
-    assert f"{moved}: cr_float32" in out
+    assert f"{moved_walk}: cr_float32" in out
 
 
-def test_unit_is_for_files_that_say_none(folder: Path, moved: Path, call: Call) -> None:
-    clip = call("diff", folder / "walk.bvh", moved, "--json").document["clips"][0]
+def test_unit_is_for_files_that_say_none(folder: Path, moved_walk: Path, call: Call) -> None:
+    clip = call("diff", folder / "walk.bvh", moved_walk, "--json").document["clips"][0]
     assert clip["max_position_error"] == pytest.approx(5)
     assert clip["max_position_error_cm"] is clip["virtual_marker_max_cm"] is None
     assert any("unit" in note for note in clip["notes"])
-    shown = call("diff", moved, folder / "walk.bvh", "--unit", "m", "--json").document
+    shown = call("diff", moved_walk, folder / "walk.bvh", "--unit", "m", "--json").document
     clip = shown["clips"][0]
     assert clip["unit_cm"] == 1  # moved.mcz says cm
     assert clip["max_position_error_cm"] > 100
     assert clip["mse"] is None
 
 
-def test_frames(folder: Path, moved: Path, call: Call) -> None:
+def test_frames(folder: Path, moved_walk: Path, call: Call) -> None:
     bvh = folder / "walk.bvh"
-    clip = call("diff", bvh, moved, "--frames", "5:10", "--json").document["clips"][0]
+    clip = call("diff", bvh, moved_walk, "--frames", "5:10", "--json").document["clips"][0]
     assert (clip["frames"], clip["max_position_error_frame"]) == (5, 7)
-    clip = call("diff", bvh, moved, "--frames", ":7", "--json").document["clips"][0]
+    clip = call("diff", bvh, moved_walk, "--frames", ":7", "--json").document["clips"][0]
     assert (clip["frames"], clip["max_position_error"]) == (7, pytest.approx(1))
-    fails(call("diff", bvh, moved, "--frames", "5:99999"), 2, "99999")
-    fails(call("diff", bvh, moved, "--frames", "5"), 2, "A:B")
+    fails(call("diff", bvh, moved_walk, "--frames", "5:99999"), 2, "99999")
+    fails(call("diff", bvh, moved_walk, "--frames", "5"), 2, "A:B")
 
 
 def test_other_numbers_of_frames_are_refused(folder: Path, call: Call) -> None:
@@ -139,23 +139,23 @@ def test_the_skeleton_of_an_amc(folder: Path, call: Call) -> None:
 
 
 def test_standard_input(
-    folder: Path, moved: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+    folder: Path, moved_walk: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stream = io.TextIOWrapper(io.BytesIO(moved.read_bytes()))
+    stream = io.TextIOWrapper(io.BytesIO(moved_walk.read_bytes()))
     monkeypatch.setattr("sys.stdin", stream)
     clip = call("diff", folder / "walk.bvh", "-", "--json").document["clips"][0]
     assert clip["max_position_error"] == pytest.approx(5)
     fails(call("diff", "-", "-"), 2, "standard input")
 
 
-def test_bad_files_are_refused(folder: Path, moved: Path, call: Call) -> None:
-    fails(call("diff", folder / "none.bvh", moved), 1, "none.bvh", "no such file")
-    fails(call("diff", moved, folder / "none.mcz"), 1, "none.mcz", "no such file")
-    fails(call("diff", folder / "walk.asf", moved), 2, "walk.asf")
+def test_bad_files_are_refused(folder: Path, moved_walk: Path, call: Call) -> None:
+    fails(call("diff", folder / "none.bvh", moved_walk), 1, "none.bvh", "no such file")
+    fails(call("diff", moved_walk, folder / "none.mcz"), 1, "none.mcz", "no such file")
+    fails(call("diff", folder / "walk.asf", moved_walk), 2, "walk.asf")
     (folder / "walk.txt").write_text("walk")
-    assert call("diff", folder / "walk.txt", moved)[0] in (1, 2)
-    moved.write_bytes(moved.read_bytes()[:-40])
-    fails(call("diff", folder / "walk.bvh", moved), 1, "moved.mcz")
+    assert call("diff", folder / "walk.txt", moved_walk)[0] in (1, 2)
+    moved_walk.write_bytes(moved_walk.read_bytes()[:-40])
+    fails(call("diff", folder / "walk.bvh", moved_walk), 1, "moved.mcz")
 
 
 def test_info_shows_the_record(folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,7 +191,7 @@ def test_records_of_others_are_shown_as_they_are() -> None:
 
 
 @pytest.fixture
-def standing(tmp_path: Path) -> tuple[Path, Path]:
+def foot_files(tmp_path: Path) -> tuple[Path, Path]:
     """Two .mcz of markers, frames 10 to 70 with a foot that stands; in the second it creeps."""
     places = np.zeros((90, 2, 3))
     places[:, 1] = (0, 0, 90)
@@ -205,22 +205,33 @@ def standing(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "a.mcz", tmp_path / "b.mcz"
 
 
-def test_the_shell_has_a_radius(folder: Path, moved: Path, call: Call) -> None:
+def test_the_shell_has_a_radius(folder: Path, moved_walk: Path, call: Call) -> None:
     walk = folder / "walk.bvh"
-    clip = call("diff", walk, moved, "--unit", "cm", "--json").document["clips"][0]
+    clip = call("diff", walk, moved_walk, "--unit", "cm", "--json").document["clips"][0]
     assert (clip["shell_radius_cm"], clip["shell_max_frame"]) == (3, 7)
     assert clip["shell_max_cm"] == pytest.approx(5)
-    code, out, _ = call("diff", walk, moved, "--unit", "cm", "--shell", "0.5", "--frames", "5:9")
+    code, out, _ = call(
+        "diff", walk, moved_walk, "--unit", "cm", "--shell", "0.5", "--frames", "5:9"
+    )
     rows = {line.split()[0]: line for line in out.splitlines() if line.startswith("  shell")}
     assert code == 0
     assert "0.5 cm from where joints start" in rows["shell_mean"]
     assert rows["shell_max"].split()[1:5] == ["5", "frame", "7,", "joint"]
     for bad in ("0", "-1", "nan", "wide"):
-        assert call("diff", walk, moved, "--shell", bad)[0] == 2
+        assert call("diff", walk, moved_walk, "--shell", bad)[0] == 2
 
 
-def test_a_table_by_joint(folder: Path, moved: Path, call: Call) -> None:
-    arguments = "diff", folder / "walk.bvh", moved, "--unit", "cm", "--frames", "5:9", "--by-joint"
+def test_a_table_by_joint(folder: Path, moved_walk: Path, call: Call) -> None:
+    arguments = (
+        "diff",
+        folder / "walk.bvh",
+        moved_walk,
+        "--unit",
+        "cm",
+        "--frames",
+        "5:9",
+        "--by-joint",
+    )
     code, out, _ = call(*arguments)
     lines = [line.strip() for line in out.splitlines()]
     head = lines.index("joint          mean cm  max cm  frame  shell mean cm  max cm  frame")
@@ -228,7 +239,7 @@ def test_a_table_by_joint(folder: Path, moved: Path, call: Call) -> None:
     assert lines[head - 1] == ""
     assert lines[head + 1].split() == ["Hips", "2", "5", "7", "2", "5", "7"]
     shown = call(*arguments, "--json").document["clips"][0]["by_joint"]
-    assert [joint["joint"] for joint in shown] == mcz.read(moved).skeleton.addresses()
+    assert [joint["joint"] for joint in shown] == mcz.read(moved_walk).skeleton.addresses()
     assert len(lines) - head - 1 >= len(shown)
     first = shown[0]
     assert (first["points"], first["max_position_error_frame"], first["shell_max_frame"]) == (
@@ -244,21 +255,21 @@ def test_a_table_by_joint(folder: Path, moved: Path, call: Call) -> None:
     assert "by_joint" not in call(*arguments[:3], "--json").document["clips"][0]
 
 
-def test_small_distances_by_joint_are_in_mm(standing: tuple[Path, Path], call: Call) -> None:
-    _, out, _ = call("diff", *standing, "--by-joint", "--frames", ":80")
+def test_small_distances_by_joint_are_in_mm(foot_files: tuple[Path, Path], call: Call) -> None:
+    _, out, _ = call("diff", *foot_files, "--by-joint", "--frames", ":80")
     assert "joint  mean mm  max mm  frame  shell mean mm  max mm  frame" in out
     assert "lfoot     3.95     7.9     79" in out
 
 
-def test_feet_that_stand_slide(standing: tuple[Path, Path], call: Call) -> None:
-    code, out, _ = call("diff", *standing)
+def test_feet_that_stand_slide(foot_files: tuple[Path, Path], call: Call) -> None:
+    code, out, _ = call("diff", *foot_files)
     lines = [line.strip() for line in out.splitlines()]
     assert code == 0
     (said,) = [line for line in lines if line.startswith("contacts of feet: 1, ")]
     (slid,) = [line for line in lines if line.startswith("they slide")]
     assert "joint lfoot)" in slid and "mm on average, at most" in slid
     assert "feet: lfoot; z up (guessed), 120 frames a second (assumed)" in lines
-    clip = call("diff", *standing, "--contacts", "--json").document["clips"][0]
+    clip = call("diff", *foot_files, "--contacts", "--json").document["clips"][0]
     (contact,) = clip["contact_list"]
     assert said == f"contacts of feet: 1, {contact['n_frames']} frames"
     assert clip["slide_max_mm"] == pytest.approx((contact["n_frames"] - 1) * 0.1)
@@ -271,21 +282,23 @@ def test_feet_that_stand_slide(standing: tuple[Path, Path], call: Call) -> None:
         "frame_rate": 120.0,
         "rate_assumed": True,
     }
-    cut = call("diff", *standing, "--frames", "30:60", "--contacts", "--json").document["clips"][0]
+    cut = call("diff", *foot_files, "--frames", "30:60", "--contacts", "--json").document["clips"][
+        0
+    ]
     assert [(c["first"], c["n_frames"]) for c in cut["contact_list"]] == [(30, 30)]
     assert cut["slide_max_frame"] == 59
-    _, out, _ = call("diff", *standing, "--contacts")
+    _, out, _ = call("diff", *foot_files, "--contacts")
     assert "contact of  first  frames  mean mm  max mm  path mm  original's mm" in out
 
 
-def test_who_stands_how_fast_and_where_up_is(standing: tuple[Path, Path], call: Call) -> None:
-    found = call("diff", *standing, "--rate", "30", "--up", "z", "--json").document["clips"][0]
+def test_who_stands_how_fast_and_where_up_is(foot_files: tuple[Path, Path], call: Call) -> None:
+    found = call("diff", *foot_files, "--rate", "30", "--up", "z", "--json").document["clips"][0]
     assert (found["feet"]["frame_rate"], found["feet"]["up_guessed"]) == (30, False)
-    found = call("diff", *standing, "--feet", "head, lfoot", "--json").document["clips"][0]
+    found = call("diff", *foot_files, "--feet", "head, lfoot", "--json").document["clips"][0]
     assert found["feet"]["joints"] == ["head", "lfoot"]
     assert found["contacts"] == 2
-    fails(call("diff", *standing, "--feet", "hand"), 1, "a.mcz", "no joint 'hand'")
-    fails(call("diff", *standing, "--rate", "fast"), 2, "fast")
+    fails(call("diff", *foot_files, "--feet", "hand"), 1, "a.mcz", "no joint 'hand'")
+    fails(call("diff", *foot_files, "--rate", "fast"), 2, "fast")
 
 
 def test_without_feet_nothing_is_said_unless_asked(tmp_path: Path, call: Call) -> None:

@@ -16,7 +16,7 @@ SUFFIXES = sorted({suffix for found in FORMATS.values() for suffix in found.suff
 
 
 @pytest.fixture(scope="module")
-def made(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sample_files(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The samples, and two files of them."""
     target = tmp_path_factory.mktemp("made") / "here"
     shutil.copytree(samples, target)
@@ -26,9 +26,9 @@ def made(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(sample_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The same in the current folder."""
-    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(sample_files, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

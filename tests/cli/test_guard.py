@@ -26,7 +26,7 @@ SLOPPY += "Frame Time: 0.01\n1\n2\n3\n"
 
 
 @pytest.fixture
-def packed(folder: Path, call: Call) -> Path:
+def archive_path(folder: Path, call: Call) -> Path:
     """walk.amc, walk.bvh and walk.c3d in one file."""
     call("pack", folder, folder / "all.mcz")
     return folder / "all.mcz"
@@ -80,29 +80,29 @@ def test_encode_keeps_the_file_of_a_parameter(folder: Path, call: Call) -> None:
     assert basis.read_bytes() == before
 
 
-def test_other_commands_keep_their_input(packed: Path, folder: Path, call: Call) -> None:
-    before = packed.read_bytes()
+def test_other_commands_keep_their_input(archive_path: Path, folder: Path, call: Call) -> None:
+    before = archive_path.read_bytes()
     link = folder / "link.mcz"
-    link.symlink_to(packed)
-    for target in (packed, link):
+    link.symlink_to(archive_path)
+    for target in (archive_path, link):
         for words in (
-            ("decode", packed, "--clip", "walk.bvh", "--to", "csv", "-o", target, "--force"),
-            ("decode", packed, "--clip", "walk.bvh", "--to", "bvh", "-o", target, "--force"),
-            ("extract", packed, target, "--clip", "walk", "--force"),
-            ("append", target, packed, "--verbatim"),
-            ("repair", packed, "-o", target, "--force"),
-            ("train", packed, "-o", target, "--force"),
+            ("decode", archive_path, "--clip", "walk.bvh", "--to", "csv", "-o", target, "--force"),
+            ("decode", archive_path, "--clip", "walk.bvh", "--to", "bvh", "-o", target, "--force"),
+            ("extract", archive_path, target, "--clip", "walk", "--force"),
+            ("append", target, archive_path, "--verbatim"),
+            ("repair", archive_path, "-o", target, "--force"),
+            ("train", archive_path, "-o", target, "--force"),
         ):
             code, out, errors = call(*words)
             assert (code, out, errors.count("\n")) == (2, "", 1), words
             said = "not overwritten" if words[0] == "repair" else "it is the input itself"
             assert said in errors
-    assert packed.read_bytes() == before
+    assert archive_path.read_bytes() == before
 
 
-def test_append_keeps_its_target(packed: Path, folder: Path) -> None:
+def test_append_keeps_its_target(archive_path: Path, folder: Path) -> None:
     with pytest.raises(OptionError, match="the input itself"):
-        mcz.append([packed], packed, verbatim=True)
+        mcz.append([archive_path], archive_path, verbatim=True)
     with pytest.raises(OptionError, match="the input itself"):
         mcz.append([folder / "walk.amc"], folder / "walk.asf", skeleton=folder / "walk.asf")
 
@@ -245,9 +245,9 @@ def test_help_and_lists_may_be_repeated(call: Call, capsys: pytest.CaptureFixtur
     assert "--json is given 2 times" in capsys.readouterr().err
 
 
-def test_decode_several_clips(packed: Path, folder: Path, call: Call) -> None:
+def test_decode_several_clips(archive_path: Path, folder: Path, call: Call) -> None:
     out = folder / "out"
-    words = ("decode", packed, "--clip", "walk", "--clip", "walk.bvh", "--clip", "walk")
+    words = ("decode", archive_path, "--clip", "walk", "--clip", "walk.bvh", "--clip", "walk")
     assert call(*words, "-o", f"{out}/")[0] == 0
     assert sorted(path.name for path in out.iterdir()) == ["walk.amc", "walk.bvh"]
     assert (out / "walk.amc").read_bytes() == (folder / "walk.amc").read_bytes()
@@ -259,27 +259,27 @@ def test_decode_several_clips(packed: Path, folder: Path, call: Call) -> None:
     assert call(*words, "--clip", "none", "-o", out)[0] == 2
 
 
-def test_unpack_and_extract_several_clips(packed: Path, folder: Path, call: Call) -> None:
+def test_unpack_and_extract_several_clips(archive_path: Path, folder: Path, call: Call) -> None:
     out = folder / "out"
-    assert call("unpack", packed, out, "--clip", "walk", "--clip", "walk.c3d")[0] == 0
+    assert call("unpack", archive_path, out, "--clip", "walk", "--clip", "walk.c3d")[0] == 0
     names = ["walk.amc", "walk.asf", "walk.c3d"]  # a clip comes with its skeleton
     assert sorted(path.name for path in out.iterdir()) == names
     small = folder / "small.mcz"
-    assert call("extract", packed, small, "--clip", "walk", "--clip", "walk.bvh")[0] == 0
+    assert call("extract", archive_path, small, "--clip", "walk", "--clip", "walk.bvh")[0] == 0
     with mcz.open(small) as file:
         assert list(file.clips) == ["walk", "walk.bvh"]
         assert file.clips["walk"].source_bytes() == (folder / "walk.amc").read_bytes()
     assert call("verify", small)[0] == 0
-    assert call("unpack", packed, out, "--clip", "none")[0] == 2
+    assert call("unpack", archive_path, out, "--clip", "none")[0] == 2
 
 
-def test_info_of_some_clips(packed: Path, call: Call) -> None:
-    document = json.loads(call("info", packed, "--json", "--clip", "walk")[1])
+def test_info_of_some_clips(archive_path: Path, call: Call) -> None:
+    document = json.loads(call("info", archive_path, "--json", "--clip", "walk")[1])
     assert [clip["name"] for clip in document["clips"]] == ["walk"]
     assert [one["name"] for one in document["skeletons"]] == ["walk"]
-    assert len(json.loads(call("info", packed, "--json")[1])["skeletons"]) == 3
-    assert call("info", packed, "--clip", "none")[0] == 2
-    assert call("info", packed, "--clip", "walk", "--layout")[0] == 2
+    assert len(json.loads(call("info", archive_path, "--json")[1])["skeletons"]) == 3
+    assert call("info", archive_path, "--clip", "none")[0] == 2
+    assert call("info", archive_path, "--clip", "walk", "--layout")[0] == 2
 
 
 # What is left out, what was noticed ----------------------------------------------

@@ -138,10 +138,10 @@ def test_text_that_breaks_off_leaves_what_was_whole(tmp_path: Path) -> None:
         "mcz: standard input: line 21: b'x' is not a number; the stream is aborted after 2 frames, "
         "and has no end\n"
     )
-    assert kept(out) == 2
+    assert count_frames(out) == 2
 
 
-def kept(path: Path) -> int:
+def count_frames(path: Path) -> int:
     """The frames in a clip without an end, which only salvage opens."""
     with pytest.raises(mcz.TruncatedError):
         mcz.open(path)
@@ -160,7 +160,7 @@ def test_a_source_that_dies_in_a_frame_leaves_no_end(tmp_path: Path, asf: Path) 
     ):
         code, _, errors = run("encode", "-", *STEP, *arguments, "-o", out, "--force", data=data)
         assert (code, "has no end" in errors) == (1, True), data
-        assert kept(out) == whole
+        assert count_frames(out) == whole
 
 
 def test_codecs_that_are_not_live_read_all(tmp_path: Path, asf: Path) -> None:
@@ -200,7 +200,7 @@ def lines(data: bytes) -> Iterator[bytes]:
     return iter(io.BytesIO(data).readline, b"")
 
 
-def arrived(name: str, data: bytes, *skeleton: mcz.Skeleton) -> np.ndarray:
+def parse_rows(name: str, data: bytes, *skeleton: mcz.Skeleton) -> np.ndarray:
     arriving = FORMATS[name].arrive(lines(data), *skeleton)
     rows = [row for _, row in arriving.frames]
     return np.array(rows).reshape(len(rows), arriving.skeleton.n_channels)
@@ -211,7 +211,7 @@ def test_bvh_arrives_as_it_is_read() -> None:
         b"Frame Time: .0083333\n", b"Frame Time:\n.01 1 2\n 3 # 4\n 10 1.5\n2 3 20 "
     )
     whole = FORMATS["bvh"].read(odd)
-    np.testing.assert_array_equal(arrived("bvh", odd), whole.values)
+    np.testing.assert_array_equal(parse_rows("bvh", odd), whole.values)
     arriving = FORMATS["bvh"].arrive(lines(odd))
     assert arriving.skeleton == whole.skeleton
     assert arriving.frame_rate == whole.frame_rate == 100
@@ -229,7 +229,7 @@ def test_bvh_arrives_as_it_is_read() -> None:
 )
 def test_bad_bvh(data: bytes, match: str) -> None:
     with pytest.raises(mcz.SourceError, match=match):
-        arrived("bvh", data)
+        parse_rows("bvh", data)
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_bad_bvh(data: bytes, match: str) -> None:
 )
 def test_bad_amc(asf: Path, data: bytes, match: str) -> None:
     with pytest.raises(mcz.SourceError, match=match):
-        arrived("amc", data, mcz.read_skeleton(asf))
+        parse_rows("amc", data, mcz.read_skeleton(asf))
     with pytest.raises(mcz.SourceError, match="needs its skeleton"):
         FORMATS["amc"].arrive(lines(data))
 
@@ -258,7 +258,7 @@ def in_channels(asf: Path) -> tuple[SourceOptions, EncodingOptions]:
 def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
     data = b":DEGREES\n1\nroot 1 2 3 4 5 6\nknee 7\n2\nroot 1 2 3 4 5 6\n4\nknee 8\n"
     whole = FORMATS["amc"].read(data, "x", mcz.read_skeleton(asf))
-    np.testing.assert_array_equal(arrived("amc", data, mcz.read_skeleton(asf)), whole.values)
+    np.testing.assert_array_equal(parse_rows("amc", data, mcz.read_skeleton(asf)), whole.values)
     out = io.BytesIO()
     report = encode_live(lines(data), out, "amc", *in_channels(asf))
     assert report.remarks == ()
@@ -306,7 +306,7 @@ def test_real_clips_live(data: Path) -> None:
     distances = np.sqrt(((found - mcz.positions(motion)) ** 2).sum(axis=2))
     assert distances.mean() < 0.05
     for path in (bvh,) if bvh.exists() else ():
-        np.testing.assert_array_equal(arrived("bvh", path.read_bytes()), mcz.read(path).values)
+        np.testing.assert_array_equal(parse_rows("bvh", path.read_bytes()), mcz.read(path).values)
 
 
 def test_nothing_is_kept_that_was_used() -> None:

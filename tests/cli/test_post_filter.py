@@ -32,13 +32,13 @@ def places(samples: Path, tmp_path: Path) -> Path:
     return tmp_path / "places.mcz"
 
 
-def decoded(file: Path) -> Motion:
+def read_motion(file: Path) -> Motion:
     with mcz.open(file) as held:
         return next(iter(held.clips.values())).motion()
 
 
 def test_tables(markers: Path, tmp_path: Path, call: Call) -> None:
-    whole = mcz.post_filter(decoded(markers)).signals[0]
+    whole = mcz.post_filter(read_motion(markers)).signals[0]
     out = tmp_path / "walk.npz"
     assert call("decode", markers, "--post-filter", "--to", "npz", "-o", out)[0] == 0
     with np.load(out, allow_pickle=False) as table:
@@ -53,7 +53,7 @@ def test_tables(markers: Path, tmp_path: Path, call: Call) -> None:
 
 def test_c3d(markers: Path, tmp_path: Path, call: Call) -> None:
     """Its own file again, in the style of the source, and a plain one."""
-    whole = mcz.post_filter(decoded(markers))
+    whole = mcz.post_filter(read_motion(markers))
     for name, arguments in {"own.c3d": (), "plain.c3d": ("--to", "c3d")}.items():
         out = tmp_path / name
         code, _, err = call("decode", markers, "--post-filter", *arguments, "-o", out)
@@ -61,8 +61,8 @@ def test_c3d(markers: Path, tmp_path: Path, call: Call) -> None:
         again = mcz.read(out).signals[0]
         valid = np.ones(again.values.shape, bool) if again.mask is None else again.mask
         assert np.abs(again.values - whole.values)[valid].max() < 0.1
-        assert np.abs(again.values - decoded(markers).values)[valid].max() > 1
-    assert len(mcz.read(tmp_path / "own.c3d").signals) == len(decoded(markers).signals)
+        assert np.abs(again.values - read_motion(markers).values)[valid].max() > 1
+    assert len(mcz.read(tmp_path / "own.c3d").signals) == len(read_motion(markers).signals)
 
 
 def test_inverse_kinematics_after_the_filter(places: Path, tmp_path: Path, call: Call) -> None:
@@ -74,9 +74,9 @@ def test_inverse_kinematics_after_the_filter(places: Path, tmp_path: Path, call:
     code, _, err = call(*arguments, "--rate", "120", "--with-skeleton")
     assert code == 0, err
     assert "inverse kinematics: 31 points" in err
-    seen = mcz.positions(mcz.post_filter(decoded(places), rate=120))
+    seen = mcz.positions(mcz.post_filter(read_motion(places), rate=120))
     found = mcz.positions(mcz.read(out))
-    assert np.abs(found - seen).mean() < np.abs(found - mcz.positions(decoded(places))).mean()
+    assert np.abs(found - seen).mean() < np.abs(found - mcz.positions(read_motion(places))).mean()
     code, _, err = call("decode", places, "--post-filter", "--rate", "120")
     assert code != 0
     assert "choose a format with --to" in err
@@ -93,7 +93,7 @@ def test_what_is_refused(markers: Path, samples: Path, tmp_path: Path, call: Cal
         assert code not in (0, 2)
         assert "not one of markers alone" in err
         assert len(err.splitlines()) == 1
-    unknown = replace(mcz.post_filter(decoded(markers)), frame_rate=None)
+    unknown = replace(mcz.post_filter(read_motion(markers)), frame_rate=None)
     mcz.write(unknown, tmp_path / "unknown.mcz")
     arguments = ("decode", tmp_path / "unknown.mcz", "--to", "csv", "-o", tmp_path / "u.csv")
     code, _, err = call(*arguments, "--post-filter")

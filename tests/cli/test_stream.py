@@ -52,7 +52,7 @@ def run(*arguments: str | Path, data: bytes = b"") -> tuple[int, bytes, str]:
     return code, out, errors.decode()
 
 
-def encoded(*arguments: str | Path, data: bytes = CSV) -> bytes:
+def encode_stream(*arguments: str | Path, data: bytes = CSV) -> bytes:
     code, out, errors = run("encode", *CODER, *arguments, data=data)
     assert (code, errors) == (0, "")
     return out
@@ -97,7 +97,7 @@ def test_a_binary_stream_there_and_back() -> None:
     rows = ROWS.copy()
     rows[3, 1] = np.nan
     data = NAMES + rows.astype("<f4").tobytes()
-    coded = encoded("--float32", data=data)
+    coded = encode_stream("--float32", data=data)
     code, out, _ = run("decode", "--float32", data=coded)
     assert code == 0
     names, _, values = out.partition(b"\n")
@@ -105,7 +105,7 @@ def test_a_binary_stream_there_and_back() -> None:
     found = np.frombuffer(values, "<f4").reshape(10, 6)
     np.testing.assert_array_equal(np.isnan(found), np.isnan(rows))
     np.testing.assert_allclose(found, rows, atol=0.02)
-    again = encoded("--float32", data=out)
+    again = encode_stream("--float32", data=out)
     assert len(list(live_frames(io.BytesIO(again)))) == 10
     code, _, errors = run("encode", *CODER, "--float32", data=data[:-5])
     assert code == 1
@@ -116,7 +116,7 @@ def test_what_is_printed_can_be_read_again(tmp_path: Path) -> None:
     rows = ROWS.copy()
     rows[3, 1] = np.nan
     path = tmp_path / "a.mcz"
-    path.write_bytes(encoded(data=NAMES + b"".join(map(line, rows))))
+    path.write_bytes(encode_stream(data=NAMES + b"".join(map(line, rows))))
     plain = list(live_frames(io.BytesIO(path.read_bytes())))
     stored = tmp_path / "a.csv"
     common.run(cli, "mcz", ["decode", str(path), "--to", "csv", "-o", str(stored)])
@@ -125,7 +125,7 @@ def test_what_is_printed_can_be_read_again(tmp_path: Path) -> None:
         run("decode", "--states", path)[1],
         stored.read_bytes(),
     ):
-        found = list(live_frames(io.BytesIO(encoded(data=printed))))
+        found = list(live_frames(io.BytesIO(encode_stream(data=printed))))
         assert len(found) == 10
         for (_, values, valid), (_, wanted, known) in zip(found, plain, strict=True):
             np.testing.assert_array_equal(valid, known)
@@ -140,13 +140,13 @@ def test_rows_of_the_channels_of_a_skeleton(tmp_path: Path) -> None:
         "MOTION\nFrames: 1\nFrame Time: .01\n1 2 3 4\n"
     )
     data = b"1,2,3,10\n1,2,3,20\n"
-    coded = encoded("--skeleton", bvh, "--param", "domain=channels", data=data)
+    coded = encode_stream("--skeleton", bvh, "--param", "domain=channels", data=data)
     found = [values for _, values, _ in live_frames(io.BytesIO(coded))]
     np.testing.assert_allclose(found, [[1, 2, 3, 10], [1, 2, 3, 20]], atol=0.02)
-    places = encoded("--skeleton", bvh, data=data)
+    places = encode_stream("--skeleton", bvh, data=data)
     assert next(live_frames(io.BytesIO(places)))[1].shape == (9,)
     (tmp_path / "a.mcz").write_bytes(coded)
-    again = encoded("--skeleton", tmp_path / "a.mcz", data=data)
+    again = encode_stream("--skeleton", tmp_path / "a.mcz", data=data)
     assert next(live_frames(io.BytesIO(again)))[1].shape == (9,)
     code, _, errors = run("encode", *CODER, "--skeleton", tmp_path / "no.bvh", data=data)
     assert (code, "no such file" in errors) == (1, True)
@@ -273,7 +273,7 @@ def test_what_a_crash_leaves(tmp_path: Path) -> None:
 def test_a_reader_that_has_seen_enough() -> None:
     with Started("stream", "decode") as started:
         started.stdout.close()
-        started.stdin.write(encoded())
+        started.stdin.write(encode_stream())
         started.end()
         assert started.stderr.read() == b""
 
@@ -458,7 +458,7 @@ def test_a_sender_that_is_killed_is_an_aborted_end(lost: str) -> None:
 
 
 def test_a_silent_peer_is_not_waited_for_for_ever() -> None:
-    data = encoded()
+    data = encode_stream()
     for part in (data[: len(data) // 2], data[:40], b""):
         with socket.create_server(("127.0.0.1", 0)) as server:
             address = f"127.0.0.1:{server.getsockname()[1]}"

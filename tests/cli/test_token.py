@@ -16,7 +16,7 @@ TOKEN = "s3cret-of-the-stage"
 
 
 @contextmanager
-def listening(token: str | None = TOKEN) -> Iterator[tcp.Listener]:
+def listen(token: str | None = TOKEN) -> Iterator[tcp.Listener]:
     listener = tcp.Listener("127.0.0.1:0", token)
     listener.write(b"opening")
     yield listener
@@ -24,7 +24,7 @@ def listening(token: str | None = TOKEN) -> Iterator[tcp.Listener]:
 
 
 def test_who_knows_the_token_gets_the_stream() -> None:
-    with listening() as listener, tcp.connected(listener.address, TOKEN) as stream:
+    with listen() as listener, tcp.connected(listener.address, TOKEN) as stream:
         assert stream.read(7) == b"opening"
         listener.wait_for(1)
         listener.entry = lambda: 0
@@ -36,7 +36,7 @@ def test_who_knows_the_token_gets_the_stream() -> None:
     "sent", [b"", b"\n", TOKEN.encode()[:-1] + b"\n", TOKEN.encode() + b"x\n", b"x" * 10_000]
 )
 def test_who_does_not_gets_nothing(sent: bytes, capsys: pytest.CaptureFixture[str]) -> None:
-    with listening() as listener:
+    with listen() as listener:
         where = tcp.address_of(listener.address)
         with socket.create_connection(where) as connection:
             connection.sendall(sent)
@@ -51,7 +51,7 @@ def test_who_does_not_gets_nothing(sent: bytes, capsys: pytest.CaptureFixture[st
 def test_a_silent_client_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "PATIENCE", 0.2)
     with (
-        listening() as listener,
+        listen() as listener,
         socket.create_connection(tcp.address_of(listener.address)) as silent,
         tcp.connected(listener.address, TOKEN) as stream,
     ):
@@ -64,14 +64,14 @@ def test_a_silent_client_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -
 )
 def test_a_client_is_told(given: str | None, hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "PATIENCE", 0.2)
-    with listening() as listener, pytest.raises(Failure) as found:  # noqa: SIM117
+    with listen() as listener, pytest.raises(Failure) as found:  # noqa: SIM117
         with tcp.connected(listener.address, given):
             pass
     assert hint in str(found.value)
 
 
 def test_a_token_to_one_who_asks_for_none() -> None:
-    with listening(None) as listener, tcp.connected(listener.address, TOKEN) as stream:
+    with listen(None) as listener, tcp.connected(listener.address, TOKEN) as stream:
         assert stream.read(7) == b"opening"
 
 

@@ -14,7 +14,7 @@ import mcz
 from mcz.codecs import codec_by_name
 from mcz.codecs.contract import Codec
 from mcz.kinematics.angles import unwrap
-from tests.codecs.lossy import Direct, markers, wandering
+from tests.codecs.lossy import Direct, markers, random_walks
 from tests.motions import smooth
 
 
@@ -88,20 +88,20 @@ CASES = {
 }
 
 
-def saved(motion: mcz.Motion, case: Case, **params: Any) -> bytes:
+def write_case(motion: mcz.Motion, case: Case, **params: Any) -> bytes:
     out = io.BytesIO()
     mcz.write(motion, out, codec=case.name, **{**case.params, **params})
     return out.getvalue()
 
 
 @cache
-def written(name: str, n_frames: int = 100, length: int = 0) -> bytes:
+def write_smooth(name: str, n_frames: int = 100, length: int = 0) -> bytes:
     """``smooth`` of so many frames by a case, in segments of ``length`` (0: as the codec likes)."""
     case = CASES[name]
-    return saved(smooth(n_frames), case, **(case.length(length) if length else {}))
+    return write_case(smooth(n_frames), case, **(case.length(length) if length else {}))
 
 
-def meant(case: Case, motion: mcz.Motion) -> np.ndarray:
+def expected_values(case: Case, motion: mcz.Motion) -> np.ndarray:
     """The values that a codec comes near to."""
     if case.codec.lossless or case.name == "overlap":
         return motion.values
@@ -114,5 +114,5 @@ def meant(case: Case, motion: mcz.Motion) -> np.ndarray:
 def small(name: str) -> Direct:
     """A clip of a few bytes, by the codec alone, in two segments."""
     case = CASES[name]
-    motion = markers(20, 2) if case.of_points else wandering(20, ["tx", "rx", "rz"])
+    motion = markers(20, 2) if case.of_points else random_walks(20, ["tx", "rx", "rz"])
     return Direct(case.name, motion, **{**case.params, **case.length(12)})

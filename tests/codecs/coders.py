@@ -44,10 +44,10 @@ class Coder:
     name: str
     build: Callable[[Ordinals, list[tuple[Grid, Grid]]], bytes]
 
-    def coded(self, columns: Ordinals, grid: Grid, clip_grid: Grid | None = None) -> bytes:
+    def encode_columns(self, columns: Ordinals, grid: Grid, clip_grid: Grid | None = None) -> bytes:
         return self.build(columns, [(grid, clip_grid or grid)] * columns.shape[1])
 
-    def decoded(self, stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> Ordinals:
+    def decode_stream(self, stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> Ordinals:
         layout = Layout(n_rows, (tuple(range(n_channels)),), grids=(grid,) * n_channels)
         request = Request(0, n_rows, (0,))
         decode = codec_by_name(self.name).decode
@@ -61,7 +61,7 @@ class Coder:
                 for module in (products, decoder) if lacking else ():
                     name = f"{module.__name__}.lacks_compiled_kernels"
                     stack.enter_context(mock.patch(name, return_value=True))
-                found.append(self.decoded(stream, n_rows, n_channels, grid).tolist())
+                found.append(self.decode_stream(stream, n_rows, n_channels, grid).tolist())
         assert found[0] == found[-1]
         return found[0]
 
@@ -71,7 +71,7 @@ def plan_of(columns: Ordinals, own: list[tuple[Grid, Grid]]) -> Plan:
     return builder.plan(columns, tuple(grid for grid, _ in own))
 
 
-def predicted(
+def encode_predicted(
     columns: Ordinals, own: list[tuple[Grid, Grid]], references: list[list[int]] | None = None
 ) -> bytes:
     """A stream of method 1 of ``best``, or of 0 where no channel is coded."""
@@ -88,7 +88,7 @@ FAST = Coder(
         columns, tuple(grid for grid, _ in own)
     )[0],
 )
-BEST = Coder("best", predicted)
+BEST = Coder("best", encode_predicted)
 CODERS = (FAST, BEST)
 
 

@@ -38,7 +38,7 @@ def clip_of(values: Array, kinds: list[str] | None = None, angle_unit: str = "de
     return Motion(skeleton, (Signal(values),), frame_rate=Fraction(60), name="clip")
 
 
-def wandering(n_frames: int, kinds: list[str], seed: int = 0) -> Motion:
+def random_walks(n_frames: int, kinds: list[str], seed: int = 0) -> Motion:
     """Random walks, the rotations wrapped to -180 to 180 as files have them."""
     random = np.random.default_rng(seed)
     steps = random.normal(0, 4, (n_frames, len(kinds)))
@@ -47,7 +47,7 @@ def wandering(n_frames: int, kinds: list[str], seed: int = 0) -> Motion:
     return clip_of(np.where(turns, (values + 180) % 360 - 180, values), kinds)
 
 
-def gapped(n_frames: int = 100) -> Motion:
+def markers_with_gaps(n_frames: int = 100) -> Motion:
     """Two markers of which the second is away at both ends and twice between."""
     joints = tuple(
         Joint(name, channels=tuple(map(Channel, POSITION_KINDS))) for name in ("LASI", "RASI")
@@ -91,14 +91,14 @@ def rough(n_frames: int, seed: int) -> Motion:
     return replace(motion, signals=(Signal(np.where(mask, values, np.nan), grids, mask=mask),))
 
 
-def saved(codec: str, motion: Motion, **params: object) -> bytes:
+def encode_file(codec: str, motion: Motion, **params: object) -> bytes:
     out = io.BytesIO()
     mcz.write(motion, out, codec=codec, **params)
     return out.getvalue()
 
 
-def decoded(codec: str, motion: Motion, **params: object) -> Array:
-    with mcz.open(saved(codec, motion, **params), max_decoded=2**40) as file:
+def encode_and_decode(codec: str, motion: Motion, **params: object) -> Array:
+    with mcz.open(encode_file(codec, motion, **params), max_decoded=2**40) as file:
         return file.only_clip().read()
 
 

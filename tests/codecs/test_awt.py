@@ -15,7 +15,7 @@ from mcz.codecs.wavelet.awt import CODEC
 from mcz.codecs.wavelet.wavelet import transform_of
 from mcz.files.writing.signal_source import MemorySource
 from mcz.model.motion import Motion
-from tests.codecs.lossy import saved, wandering
+from tests.codecs.lossy import encode_file, random_walks
 from tests.motions import smooth
 
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx"]), min_size=1, max_size=5)
@@ -26,7 +26,9 @@ def source_of(motion: Motion) -> SignalSource:
     return MemorySource(motion, 0, CODEC, 2**26)
 
 
-def chosen(motion: Motion, average: float, **changes: Any) -> tuple[choice.Choice, list]:
+def choose_coefficients(
+    motion: Motion, average: float, **changes: Any
+) -> tuple[choice.Choice, list]:
     source = source_of(motion)
     bands = choice.coefficients_of("awt", source, transform_of(source.layout, "db2", 3))
     given_ = {"whole_approximation": False, "iterations": None, "seed": 0} | changes
@@ -46,8 +48,8 @@ def least_distortion(bands: list, kept: int) -> float:
 
 @given(st.integers(1, 150), KINDS, st.floats(0.5, 200), st.booleans(), st.integers(0, 2**31 - 1))
 def test_annealing_ends_near_the_optimum(n_frames, kinds, average, whole, seed) -> None:
-    motion = wandering(n_frames, kinds)
-    found, bands = chosen(motion, average, whole_approximation=whole, seed=seed)
+    motion = random_walks(n_frames, kinds)
+    found, bands = choose_coefficients(motion, average, whole_approximation=whole, seed=seed)
     assert found.after <= found.before + 1e-12
     assert found.after <= NEAR * least_distortion(bands, int(found.counts.sum())) + 1e-9
     n_each = sum(map(len, bands))
@@ -63,13 +65,13 @@ def test_annealing_ends_near_the_optimum(n_frames, kinds, average, whole, seed) 
 
 
 def test_annealing_is_deterministic_and_needs_its_seed() -> None:
-    motion = wandering(400, ["tx", "rx", "ry", "rz"] * 8)
-    first, _ = chosen(motion, 30, seed=7, iterations=3000)
-    again, _ = chosen(motion, 30, seed=7, iterations=3000)
-    other, _ = chosen(motion, 30, seed=8, iterations=3000)
+    motion = random_walks(400, ["tx", "rx", "ry", "rz"] * 8)
+    first, _ = choose_coefficients(motion, 30, seed=7, iterations=3000)
+    again, _ = choose_coefficients(motion, 30, seed=7, iterations=3000)
+    other, _ = choose_coefficients(motion, 30, seed=8, iterations=3000)
     np.testing.assert_array_equal(first.counts, again.counts)
     assert (first.counts != other.counts).any()
-    assert saved("awt", motion, seed=3) == saved("awt", motion, seed=3)
+    assert encode_file("awt", motion, seed=3) == encode_file("awt", motion, seed=3)
 
 
 # What is coded
@@ -79,7 +81,7 @@ def test_positions_are_better_for_it() -> None:
     motion = smooth(400)
     errors = []
     for distortion in ("positions", "channels"):
-        with mcz.open(saved("awt", motion, a_w=40, distortion=distortion)) as file:
+        with mcz.open(encode_file("awt", motion, a_w=40, distortion=distortion)) as file:
             quality = file.only_clip().quality
         errors.append(float(quality["mean_position_error_cm"]))
     assert errors[0] < errors[1]

@@ -8,7 +8,7 @@ import pytest
 from mcz.codecs.contract import Layout
 from mcz.codecs.lossless.best_streams import ECHOED, build_stream
 from mcz.codecs.lossless.echoes import find_echoes
-from tests.codecs.coders import BEST, GRIDS, predicted
+from tests.codecs.coders import BEST, GRIDS, encode_predicted
 from tests.motions import smooth
 
 FIXED, SIX = GRIDS[0], GRIDS[3]
@@ -20,10 +20,10 @@ def test_channels_that_say_the_same() -> None:
     walk = rng.integers(-50, 50, 300).cumsum()
     wanted = np.stack([walk, walk + 1, walk * 2, -walk, walk // 3 + walk], axis=1)
     wanted[150:152, 2] += 2**30
-    stream = BEST.coded(wanted, FIXED)
-    np.testing.assert_array_equal(BEST.decoded(stream, 300, 5, FIXED), wanted)
+    stream = BEST.encode_columns(wanted, FIXED)
+    np.testing.assert_array_equal(BEST.decode_stream(stream, 300, 5, FIXED), wanted)
     alone: list[list[int]] = [[]] * 5
-    assert len(stream) < 0.8 * len(predicted(wanted, [(FIXED, FIXED)] * 5, alone))
+    assert len(stream) < 0.8 * len(encode_predicted(wanted, [(FIXED, FIXED)] * 5, alone))
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-3, 9.5, 9.99999e5, 1e30])
@@ -35,7 +35,9 @@ def test_numbers_that_cross_their_classes(size: float) -> None:
     values[250:255] = 0
     wanted = SIX.ordinals(np.array([float(f"{v:.6g}") for v in values]))[0][:, None]
     wanted[253] = -1  # -0
-    np.testing.assert_array_equal(BEST.decoded(BEST.coded(wanted, SIX), 400, 1, SIX), wanted)
+    np.testing.assert_array_equal(
+        BEST.decode_stream(BEST.encode_columns(wanted, SIX), 400, 1, SIX), wanted
+    )
 
 
 def test_what_is_played_twice_is_coded_once() -> None:
@@ -48,7 +50,7 @@ def test_what_is_played_twice_is_coded_once() -> None:
         stream = build_stream(twice, grids, layout)
         assert stream[0] == ECHOED
         assert len(stream) < 1.1 * len(build_stream(once, grids, layout))
-        np.testing.assert_array_equal(BEST.decoded(stream, 80, 6, FIXED), twice)
+        np.testing.assert_array_equal(BEST.decode_stream(stream, 80, 6, FIXED), twice)
 
 
 def test_smooth_motion_has_no_echoes() -> None:

@@ -22,8 +22,16 @@ import mcz
 from mcz.codecs import CODECS, codec_by_name
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
 from tests import overlap_codec
-from tests.codecs.cases import CASES, Case, meant, saved, small, written
-from tests.codecs.lossy import Direct, bones, bytes_of, clip_of, gapped, markers, wandering
+from tests.codecs.cases import CASES, Case, expected_values, small, write_case, write_smooth
+from tests.codecs.lossy import (
+    Direct,
+    bones,
+    bytes_of,
+    clip_of,
+    markers,
+    markers_with_gaps,
+    random_walks,
+)
 from tests.motions import smooth
 
 EVERY = pytest.mark.parametrize("name", CASES)
@@ -45,8 +53,8 @@ def test_every_codec_has_a_case() -> None:
     assert {case.name for case in CASES.values()} == set(CODECS)
 
 
-def decoded(motion: Motion, case: Case, **params: Any) -> np.ndarray:
-    with mcz.open(saved(motion, case, **params), max_decoded=2**40) as file:
+def encode_and_decode(motion: Motion, case: Case, **params: Any) -> np.ndarray:
+    with mcz.open(write_case(motion, case, **params), max_decoded=2**40) as file:
         return file.only_clip().read()
 
 
@@ -56,13 +64,13 @@ def decoded(motion: Motion, case: Case, **params: Any) -> np.ndarray:
 @EVERY
 @pytest.mark.parametrize("n_frames", [0, 1, 2, 3, 100])
 def test_values_come_back(name: str, n_frames: int) -> None:
-    case, data = CASES[name], written(name, n_frames)
+    case, data = CASES[name], write_smooth(name, n_frames)
     assert mcz.verify(data) == []
     with mcz.open(data) as file:
         clip = file.only_clip()
         assert (clip.codec, clip.n_frames) == (case.name, n_frames)
         found = clip.read()
-    wanted = meant(case, smooth(n_frames))
+    wanted = expected_values(case, smooth(n_frames))
     assert found.shape == wanted.shape
     assert np.abs(found - wanted).max(initial=0) <= case.error
     assert found.size < 99 or (found == wanted).all() == case.codec.lossless or name == "overlap"
@@ -71,29 +79,29 @@ def test_values_come_back(name: str, n_frames: int) -> None:
 @EVERY
 @pytest.mark.parametrize("length", [7, 32])
 def test_segments_hold_what_one_would(name: str, length: int) -> None:
-    case, many = CASES[name], written(name, 100, length)
-    with mcz.open(many) as file, mcz.open(written(name, 100, 4096)) as other:
+    case, many = CASES[name], write_smooth(name, 100, length)
+    with mcz.open(many) as file, mcz.open(write_smooth(name, 100, 4096)) as other:
         clip, whole = file.only_clip(), other.only_clip().read()
         rows = [row.header for row in clip.signals[0].rows]
         found = clip.read()
     assert len(rows) > 1
     assert [row.first for row in rows] == [0, *(row.stop for row in rows[:-1])]
     assert rows[-1].stop == 100
-    assert np.abs(found - meant(case, smooth(100))).max() <= case.error
+    assert np.abs(found - expected_values(case, smooth(100))).max() <= case.error
     if case.is_free:
         assert found.tobytes() == whole.tobytes()
 
 
 @EVERY
 def test_the_same_clip_gives_the_same_bytes(name: str) -> None:
-    assert saved(smooth(100), CASES[name]) == written(name)
+    assert write_case(smooth(100), CASES[name]) == write_smooth(name)
 
 
 @FINITE
 def test_segments_keep_to_the_memory_that_is_allowed(name: str) -> None:
     """Limit for 40 frames; codecs may round up to whole blocks of 16."""
     case = CASES[name]
-    motion = markers(200, 1) if case.of_points else wandering(200, ["tx", "rx", "rz"])
+    motion = markers(200, 1) if case.of_points else random_walks(200, ["tx", "rx", "rz"])
     limits = {**case.length(150), "segment_bytes": 40 * 8 * 3}
     if case.params.get("preset") == "khan2014" and case.name == "qbc":
         with pytest.raises(mcz.OptionError, match="delta 80 is more than the 40 frames"):
@@ -128,7 +136,7 @@ def test_a_long_clip_is_cut_into_segments_by_size(codec: str, params: Any, lead:
 @given(data=st.data())
 def test_a_part_is_what_it_is_in_the_whole(name: str, data: st.DataObject) -> None:
     n_frames = data.draw(st.sampled_from([1, 20, 100]))
-    file_data = written(name, n_frames, data.draw(st.sampled_from([0, 2, 7, 32])))
+    file_data = write_smooth(name, n_frames, data.draw(st.sampled_from([0, 2, 7, 32])))
     with mcz.open(file_data, unverified=data.draw(st.booleans())) as file:
         clip = file.only_clip()
         resolution = data.draw(st.integers(0, clip.signals[0].counts.n_resolutions - 1))
@@ -176,7 +184,7 @@ def test_details_that_are_not_stored_are_those_left_out(name: str) -> None:
 
 @EVERY
 def test_resolutions_out_of_range_are_refused(name: str) -> None:
-    with mcz.open(written(name)) as file:
+    with mcz.open(write_smooth(name)) as file:
         clip = file.only_clip()
         n = clip.signals[0].counts.n_resolutions
         with pytest.raises(mcz.OptionError, match=f"resolutions 0 to {n - 1}"):
@@ -186,7 +194,7 @@ def test_resolutions_out_of_range_are_refused(name: str) -> None:
 # Edits
 
 
-def extracted(data: bytes, **how: Any) -> bytes:
+def extract_clips(data: bytes, **how: Any) -> bytes:
     out = io.BytesIO()
     mcz.extract(data, out, **how)
     assert mcz.verify(out.getvalue()) == []
@@ -196,7 +204,7 @@ def extracted(data: bytes, **how: Any) -> bytes:
 @EVERY
 @pytest.mark.parametrize("frames", [None, (31, 32), (45, 83)])
 def test_what_is_extracted_has_the_same_values(name: str, frames: tuple[int, int] | None) -> None:
-    case, data = CASES[name], written(name, 100, 16)
+    case, data = CASES[name], write_smooth(name, 100, 16)
     start, stop = frames or (0, 100)
     with mcz.open(data) as file:
         whole = file.only_clip()
@@ -206,7 +214,7 @@ def test_what_is_extracted_has_the_same_values(name: str, frames: tuple[int, int
             for k in sorted({0, min(1, n - 1), n - 1}):
                 if (frames, joints, k) == (None, None, 0):
                     continue
-                part = extracted(data, frames=frames, joints=joints, resolution=k)
+                part = extract_clips(data, frames=frames, joints=joints, resolution=k)
                 kept = joints and sorted(joints)
                 wanted = whole.read((start, stop), kept, k)
                 with mcz.open(part) as other:
@@ -216,20 +224,20 @@ def test_what_is_extracted_has_the_same_values(name: str, frames: tuple[int, int
                     assert piece.tobytes() == wanted[: (stop - start) // 2].tobytes()
                     assert clip.signals[0].counts.n_resolutions == n - k
                 if stop - start > 20:
-                    again = extracted(part, frames=(9, 17))
+                    again = extract_clips(part, frames=(9, 17))
                     with mcz.open(again) as other:
                         assert other.only_clip().read().tobytes() == wanted[9:17].tobytes()
     if not by_joint:
         with pytest.raises(mcz.OptionError, match="recode"):
-            extracted(data, joints=["hips" if "hips" in whole.skeleton.addresses() else 0])
+            extract_clips(data, joints=["hips" if "hips" in whole.skeleton.addresses() else 0])
 
 
 @EVERY
 @pytest.mark.parametrize("frames", [(5, 30), (42, None), (8, 8)])
 def test_frames_that_are_cut_off_are_gone(name: str, frames: tuple[int, int | None]) -> None:
-    case, data = CASES[name], written(name)
+    case, data = CASES[name], write_smooth(name)
     start, stop = frames[0], frames[1] or 100
-    part = extracted(data, frames=frames, recode=True)
+    part = extract_clips(data, frames=frames, recode=True)
     with mcz.open(data) as file, mcz.open(part) as other:
         before, after = file.only_clip(), other.only_clip()
         rows = [[row.header.n_frames for row in info.rows] for info in after.signals]
@@ -241,7 +249,7 @@ def test_frames_that_are_cut_off_are_gone(name: str, frames: tuple[int, int | No
         if after.quality:
             assert after.quality["cut-frames"] == f"{start}:{stop}"
     # What an earlier cut left stored goes, too.
-    again = extracted(extracted(data, frames=frames), clip="smooth", recode=True)
+    again = extract_clips(extract_clips(data, frames=frames), clip="smooth", recode=True)
     with mcz.open(again) as other:
         rows = [[row.header.n_frames for row in info.rows] for info in other.only_clip().signals]
         assert list(map(sum, rows)) == [stop - start]
@@ -250,7 +258,7 @@ def test_frames_that_are_cut_off_are_gone(name: str, frames: tuple[int, int | No
 def test_clips_of_all_codecs_are_merged(tmp_path: Path) -> None:
     for name, case in CASES.items():
         motion = replace(smooth(40), name=name)
-        (tmp_path / f"{name}.mcz").write_bytes(saved(motion, case))
+        (tmp_path / f"{name}.mcz").write_bytes(write_case(motion, case))
     mcz.merge(sorted(tmp_path.glob("*.mcz")), tmp_path / "all.mcz")
     assert mcz.verify(tmp_path / "all.mcz") == []
     with mcz.open(tmp_path / "all.mcz") as file:
@@ -265,9 +273,9 @@ def test_clips_of_all_codecs_are_merged(tmp_path: Path) -> None:
 
 @FINITE
 def test_masks_are_kept_and_what_lies_beneath_is_not_coded(name: str) -> None:
-    case, motion = CASES[name], replace(gapped(), frame_rate=Fraction(60))
+    case, motion = CASES[name], replace(markers_with_gaps(), frame_rate=Fraction(60))
     mask = motion.signals[0].mask
-    with mcz.open(saved(motion, case, **case.length(40))) as file:
+    with mcz.open(write_case(motion, case, **case.length(40))) as file:
         clip = file.only_clip()
         values, found = clip.read_masked()
         np.testing.assert_array_equal(found, mask)
@@ -309,9 +317,9 @@ def test_odd_clips(name: str, odd: str) -> None:
     case, motion = CASES[name], replace(ODD[odd], frame_rate=Fraction(60), name=odd)
     if case.of_points and odd in PLACELESS:
         with pytest.raises((mcz.MotionError, mcz.OptionError)):
-            saved(motion, case)
+            write_case(motion, case)
         return
-    found, wanted = decoded(motion, case), meant(case, motion)
+    found, wanted = encode_and_decode(motion, case), expected_values(case, motion)
     assert found.shape == wanted.shape
     assert np.abs(found - wanted).max(initial=0) <= (3 if odd == "wide" else 1) * case.error
 
@@ -332,10 +340,10 @@ def test_values_that_are_not_finite_are_refused(name: str, bad: float) -> None:
     values[30, 4] = bad
     motion = markers(60, 2).with_values(values)
     if case.codec.lossless:
-        assert decoded(motion, case).tobytes() == values.tobytes()
+        assert encode_and_decode(motion, case).tobytes() == values.tobytes()
         return
     with pytest.raises(mcz.MotionError, match=rf"{case.name}: frames? .*{'not finite'}"):
-        saved(motion, case)
+        write_case(motion, case)
 
 
 @LOSSY
@@ -345,7 +353,7 @@ def test_huge_values_are_refused_or_coded(name: str, kind: str, huge: float) -> 
     case, values = CASES[name], np.ones((60, 2))
     values[20, 1], values[21, 1] = huge, -huge
     with contextlib.suppress(mcz.MotionError):
-        assert np.isfinite(decoded(clip_of(values, [kind, kind]), case)).all()
+        assert np.isfinite(encode_and_decode(clip_of(values, [kind, kind]), case)).all()
 
 
 @LOSSY_CODEC
@@ -359,7 +367,9 @@ def test_what_a_lossy_signal_cannot_be(name: str) -> None:
         (own, "channels of its own"),
     ):
         with pytest.raises(mcz.MotionError, match=words):
-            saved(replace(clip_of(np.zeros((10, 2))), signals=(signal,)), Case(name, 0, params))
+            write_case(
+                replace(clip_of(np.zeros((10, 2))), signals=(signal,)), Case(name, 0, params)
+            )
 
 
 @LOSSY_CODEC
@@ -400,7 +410,7 @@ def test_10000_channels(
     joints = tuple(Joint(f"p{i}", channels=places) for i in range(3334))
     values = np.cumsum(np.random.default_rng(0).normal(0, 1, (n_frames, 10_002)), axis=0)
     motion = Motion(Skeleton(joints, unit_cm=1.0), (Signal(values),), name="wide")
-    with mcz.open(saved(motion, Case(codec, 0, params)), max_decoded=2**40) as file:
+    with mcz.open(write_case(motion, Case(codec, 0, params)), max_decoded=2**40) as file:
         clip = file.only_clip()
         assert len(clip.signals[0].rows) >= least
         np.testing.assert_allclose(clip.read((100, 110)), values[100:110], atol=error)
@@ -418,9 +428,9 @@ def test_a_finer_setting_costs_more_and_errs_less(name: str) -> None:
     rising, falling = (1, 3, 6, 100), (10, 1.0, 0.1, 0.01)
     sizes, errors = [], []
     for setting in rising if dial.rises else falling:
-        coded = saved(motion, case, **{dial.parameter: setting})
+        coded = write_case(motion, case, **{dial.parameter: setting})
         with mcz.open(coded) as file:
-            errors.append(np.abs(file.only_clip().read() - meant(case, motion)).mean())
+            errors.append(np.abs(file.only_clip().read() - expected_values(case, motion)).mean())
         sizes.append(bytes_of(coded))  # without the quality record
     assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
     assert errors[-1] < errors[0] / 4
@@ -444,11 +454,11 @@ def test_bad_parameters_are_refused_by_name(name: str) -> None:
             continue
         for value in bad_values(parameter.range):
             with pytest.raises(mcz.OptionError, match=rf"^{parameter.name} |'{parameter.name}'"):
-                saved(smooth(5), Case(name), **{parameter.name: value})
+                write_case(smooth(5), Case(name), **{parameter.name: value})
             seen += 1
     assert seen > 5
     with pytest.raises(mcz.OptionError, match=f"{name} has no parameter 'level'; it has"):
-        saved(smooth(5), Case(name), level=4)
+        write_case(smooth(5), Case(name), level=4)
 
 
 @EVERY
@@ -460,7 +470,7 @@ def test_values_of_text_are_parsed(name: str) -> None:
 @LOSSY
 def test_a_quality_record_says_how_and_how_well(name: str) -> None:
     case, motion = CASES[name], smooth(100)
-    with mcz.open(written(name)) as file:
+    with mcz.open(write_smooth(name)) as file:
         quality = file.only_clip().quality
         found = mcz.compare(motion, file.only_clip().motion())
     assert quality["codec"] == case.name

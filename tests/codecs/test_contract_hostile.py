@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs import CODECS
 from mcz.codecs.contract import Model, model_id
-from tests.codecs.cases import CASES, small, written
+from tests.codecs.cases import CASES, small, write_smooth
 from tests.codecs.lossy import Direct
-from tests.repair import flipped, flips, joined, memory_below, parts_of, replaced, use
+from tests.repair import flip_bit, flips, join_parts, memory_below, parts_of, replace_payload, use
 
 NAMES = [name for name in CASES if name != "overlap"]
 EVERY = pytest.mark.parametrize("name", NAMES)
@@ -58,7 +58,7 @@ def test_every_bit_of_a_stream(name: str) -> None:
     for place in coded.places():
         data = coded.stream(*place)
         for byte, bit in flips(len(data), 10**9, seed=0):
-            outcome(coded, coded.with_stream(place, flipped(data, byte, bit)))
+            outcome(coded, coded.with_stream(place, flip_bit(data, byte, bit)))
 
 
 @EVERY
@@ -79,7 +79,7 @@ def test_every_prefix_and_bit_of_a_header(name: str) -> None:
     assert outcome(coded, {"header": coded.header + b"\0"}) in REFUSED
     with memory_below(32 * 2**20):
         for byte, bit in flips(len(coded.header), 10**9, seed=0):
-            outcome(coded, {"header": flipped(coded.header, byte, bit)})
+            outcome(coded, {"header": flip_bit(coded.header, byte, bit)})
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if CASES[name].codec.uses])
@@ -97,7 +97,7 @@ def test_a_model_that_is_not_there_cut_or_changed(name: str) -> None:
         layout = replace(coded.layout, find_model=lambda _: Model(99, model.data))
         coded.read(changes={"layout": layout})
     bad = [model.data[:size] for size in range(len(model.data))]
-    bad += [flipped(model.data, *at) for at in flips(len(model.data), 200, seed=0)]
+    bad += [flip_bit(model.data, *at) for at in flips(len(model.data), 200, seed=0)]
     for data in bad:
         layout = replace(coded.layout, find_model=lambda _, data=data: Model(model.kind, data))
         outcome(coded, {"layout": layout})
@@ -122,16 +122,16 @@ def test_layouts_and_segments_that_do_not_fit(name: str) -> None:
 @CODEC
 def test_files_with_repaired_checksums(name: str) -> None:
     """The public reader, extract and salvage, behind every checksum."""
-    data = written(name, 20, 12)
+    data = write_smooth(name, 20, 12)
     use(data)
     parts = parts_of(data)
     for number, (chunk, payload) in enumerate(parts):
         if chunk.type not in (b"DATA", b"CLIP", b"MODL"):
             continue  # no codec has a say in them
-        bad = [flipped(payload, *at) for at in flips(len(payload), 60, seed=number)]
+        bad = [flip_bit(payload, *at) for at in flips(len(payload), 60, seed=number)]
         bad += [payload[:size] for size in range(0, len(payload), max(1, len(payload) // 5))]
         for changed in bad:
-            file_data = joined(replaced(parts, number, changed))
+            file_data = join_parts(replace_payload(parts, number, changed))
             with suppress(mcz.MczError):
                 use(file_data)
             with suppress(mcz.MczError):

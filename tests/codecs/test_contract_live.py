@@ -18,8 +18,8 @@ from mcz.codecs.contract import Layout, LiveDecoder, LiveEncoder, Request, Span,
 from mcz.errors import LostFrameError
 from mcz.files.writing.signal_source import MemorySource
 from mcz.model.motion import Motion
-from tests.codecs.lossy import Array, Direct, clip_of, gapped, markers
-from tests.repair import flipped
+from tests.codecs.lossy import Array, Direct, clip_of, markers, markers_with_gaps
+from tests.repair import flip_bit
 
 CASES: dict[str, tuple[str, dict[str, Any], int]] = {  # frames from one that starts fresh on
     "lsdt-frame": ("lsdt-frame", {"step": 0.3, "basis": "cosines", "segment_frames": 5}, 5),
@@ -66,7 +66,7 @@ class Live:
         assert self.codec.follow is not None
         return self.codec.follow(self.encoder.header, self.layout)
 
-    def pushed(self) -> Pushed:
+    def push_rows(self) -> Pushed:
         mask = self.motion.signals[0].mask
         valid = [None] * self.motion.n_frames if mask is None else mask
         rows = zip(self.motion.values, valid, strict=True)
@@ -74,7 +74,7 @@ class Live:
 
     def values(self) -> Array:
         """The answers to all frames."""
-        return np.array([self.decoder.push(*packet) for packet in self.pushed()])
+        return np.array([self.decoder.push(*packet) for packet in self.push_rows()])
 
     def read(self, pushed: Pushed, start: int, stop: int) -> Array:
         """A file of the packets, each in a segment of its own."""
@@ -100,7 +100,7 @@ def test_a_file_of_the_packets_has_what_came_live(
     name: str, n_frames: int, seed: int, data: st.DataObject
 ) -> None:
     live = Live(name, walk(name, n_frames, seed))
-    pushed = live.pushed()
+    pushed = live.push_rows()
     assert [fresh for _, fresh in pushed] == [at % live.every == 0 for at in range(n_frames)]
     found = np.array([live.decoder.push(*packet) for packet in pushed])
     assert np.abs(found - live.motion.values).max() < 3
@@ -119,7 +119,7 @@ def test_a_file_of_the_packets_has_what_came_live(
 def test_after_a_loss_no_frame_is_wrong(name: str, lost: set[int], damaged: int) -> None:
     """Frames that need a lost or damaged one are refused up to the next that starts fresh."""
     live = Live(name, walk(name, 30))
-    pushed = live.pushed()
+    pushed = live.push_rows()
     whole, able = live.new_decoder(), False
     for at, (stream, fresh) in enumerate(pushed):
         meant = whole.push(stream, fresh)
@@ -152,9 +152,9 @@ def test_a_frame_that_is_refused_leaves_no_trace(name: str) -> None:
 
 @EVERY
 def test_a_missing_marker_is_held(name: str) -> None:
-    live = Live(name, gapped(60))
+    live = Live(name, markers_with_gaps(60))
     mask, before = live.motion.signals[0].mask, np.zeros(6)
-    for packet, row, valid in zip(live.pushed(), live.motion.values, mask, strict=True):
+    for packet, row, valid in zip(live.push_rows(), live.motion.values, mask, strict=True):
         found = live.decoder.push(*packet)
         np.testing.assert_allclose(found, np.where(valid, row, before), atol=1)
         before = np.where(valid, row, before)
@@ -163,7 +163,7 @@ def test_a_missing_marker_is_held(name: str) -> None:
 @EVERY
 def test_a_segment_that_has_nothing_before_it_is_refused(name: str) -> None:
     live = Live(name, walk(name, 12))
-    pushed = live.pushed()
+    pushed = live.push_rows()
     stale = [(stream, False) for stream, _ in pushed]
     with pytest.raises(mcz.FormatError):
         live.read(stale, 0, 12)
@@ -181,7 +181,7 @@ def test_a_damaged_packet_costs_the_frames_up_to_a_fresh_one(name: str) -> None:
     with mcz.open(out.getvalue()) as file:
         whole, row = file.only_clip().read(), file.only_clip().signals[0].rows[every + 1]
     np.testing.assert_array_equal(whole, Live(name, motion).values())
-    data = flipped(out.getvalue(), row.offset, 0)
+    data = flip_bit(out.getvalue(), row.offset, 0)
     with mcz.open(data) as file, pytest.raises(mcz.ChecksumError):
         file.only_clip().read()
     with mcz.open(data, salvage=True) as file:

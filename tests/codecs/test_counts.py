@@ -19,7 +19,7 @@ from mcz.codecs.coding.forms.rounding import bounds
 from mcz.codecs.coding.forms.units import find_units
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
-from tests.codecs.lossy import saved
+from tests.codecs.lossy import encode_file
 from tests.commands import run
 
 SIX = Grid(GridKind.GENERAL, 6)
@@ -44,7 +44,7 @@ def test_printed_counts_are_found(
     grid = Grid(GridKind.GENERAL, digits)
     ordinals = Law(scale, offset).ordinals(counts, grid)
     values = grid.values(ordinals)
-    data_bytes = saved("fast", Motion(PLATES, (Signal(values[:, None], (grid,)),)))
+    data_bytes = encode_file("fast", Motion(PLATES, (Signal(values[:, None], (grid,)),)))
     with mcz.open(data_bytes) as file:
         assert file.only_clip().read()[:, 0].tobytes() == values.tobytes()
 
@@ -58,7 +58,7 @@ def test_zeros_that_a_law_misses(codec: str, seed: int) -> None:
     counts = np.round(random.normal(0, 1, 1200) * 500)
     numbers = (counts * random.uniform(1e-4, 10)).astype(np.float32).astype(np.float64)
     values = grid.values(grid.ordinals(numbers)[0])[:, None]
-    with mcz.open(saved(codec, Motion(PLATES, (Signal(values, (grid,)),)))) as file:
+    with mcz.open(encode_file(codec, Motion(PLATES, (Signal(values, (grid,)),)))) as file:
         assert file.only_clip().read().tobytes() == values.tobytes()
 
 

@@ -18,7 +18,7 @@ from mcz.codecs.coding.forms.products import DEGREE, of_products
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources import FORMATS
-from tests.codecs.lossy import saved
+from tests.codecs.lossy import encode_file
 
 BINARY32, SIX = Grid(GridKind.BINARY32), Grid(GridKind.GENERAL, 6)
 VOLT = 10 / 65535  # of a converter of 16 bits
@@ -62,7 +62,7 @@ def test_what_a_column_hides_is_coded(name: str) -> None:
     values = grid.values(ordinals)
     motion = Motion(FORCE, (Signal(values[:, None], (grid,)),))
     for codec in ("fast", "best"):
-        data = saved(codec, motion)
+        data = encode_file(codec, motion)
         with mcz.open(data) as file:
             clip = file.only_clip()
             plainly = 1.11 if codec == "fast" else 1.02  # codes take a bit at least; heads
@@ -72,7 +72,7 @@ def test_what_a_column_hides_is_coded(name: str) -> None:
 
 def test_integers_beyond_any_float() -> None:
     values = np.array([[2**53], [-(2**53)], [0]], np.int64)
-    with mcz.open(saved("fast", Motion(FORCE, (Signal(values),)))) as file:
+    with mcz.open(encode_file("fast", Motion(FORCE, (Signal(values),)))) as file:
         np.testing.assert_array_equal(file.only_clip().read(), values)
 
 

@@ -10,7 +10,7 @@ import pytest
 import mcz
 from mcz.kinematics.angles import unwrap
 from mcz.kinematics.metrics import compare
-from tests.codecs.lossy import amc, bytes_of, saved
+from tests.codecs.lossy import amc, bytes_of, encode_file
 
 pytestmark = pytest.mark.real
 
@@ -42,7 +42,7 @@ def test_table_4_of_khan2014(
     times: float,
 ) -> None:  # fmt: skip
     motion = amc(data, name)
-    stored = saved(codec, motion, preset="khan2014", **params)
+    stored = encode_file(codec, motion, preset="khan2014", **params)
     assert error_of(motion, stored) == pytest.approx(mse, abs=within)
     assert SIZES[name] / bytes_of(stored) >= times * ratio
 
@@ -54,7 +54,7 @@ def test_annealing_halves_the_error(
     data: Path, name: str, a_w: int, mse: float, ratio: float
 ) -> None:
     motion = amc(data, name)
-    stored = saved("awt", motion, preset="khan2014", a_w=a_w)
+    stored = encode_file("awt", motion, preset="khan2014", a_w=a_w)
     assert error_of(motion, stored) < 0.5 * mse
     assert SIZES[name] / bytes_of(stored) >= 2.3 * ratio
 
@@ -63,7 +63,7 @@ def test_errors_of_dwt_along_its_threshold(data: Path) -> None:
     motion = amc(data, "10_03")
     published = (0.265, 0.595, 0.966, 1.278, 1.68, 1.974, 2.283, 2.588, 2.76)
     for t_w, mse in zip(range(3, 28, 3), published, strict=True):
-        stored = saved("dwt", motion, preset="khan2014", t_w=t_w)
+        stored = encode_file("dwt", motion, preset="khan2014", t_w=t_w)
         assert error_of(motion, stored) == pytest.approx(mse, abs=0.002), t_w
 
 
@@ -82,7 +82,7 @@ PUBLISHED = {  # T_g: rms_coordinate_error of the published implementation, CR o
 def test_table_4_of_khan2016(data: Path) -> None:
     motion = amc(data, "17_10")
     for T_g, (error, ratio) in PUBLISHED.items():
-        stored = saved("mrdwt", motion, preset="khan2016", T_g=T_g)
+        stored = encode_file("mrdwt", motion, preset="khan2016", T_g=T_g)
         with mcz.open(stored) as file:
             found = compare(motion, file.only_clip().motion(), virtual_markers=False)
         assert found.rms_coordinate_error == pytest.approx(error, abs=0.0005), T_g
@@ -93,7 +93,7 @@ def test_figure_8_of_khan2016(data: Path) -> None:
     motion = amc(data, "09_01")
     column = motion.skeleton.columns(motion.skeleton.find("rfoot"))[0]
     meant = unwrap(motion.values, motion.skeleton)[:, column]
-    stored = saved("mrdwt", motion, preset="khan2016", threshold_rule="flat", T_g=1)
+    stored = encode_file("mrdwt", motion, preset="khan2016", threshold_rule="flat", T_g=1)
     with mcz.open(stored) as file:
         for resolution, mse in ((0, 0.103), (2, 0.658), (3, 4.699)):
             found = file.only_clip().read(resolution=resolution)[:, column]
@@ -102,10 +102,10 @@ def test_figure_8_of_khan2016(data: Path) -> None:
 
 def test_defaults_of_mrdwt_need_fewer_bytes_than_the_preset(data: Path) -> None:
     motion = amc(data, "05_01")
-    published = saved("mrdwt", motion, preset="khan2016")
+    published = encode_file("mrdwt", motion, preset="khan2016")
     with mcz.open(published) as file:
         limit = float(file.only_clip().quality["mean_position_error_cm"])
-    own = saved("mrdwt", motion, mean_error_cm=limit)
+    own = encode_file("mrdwt", motion, mean_error_cm=limit)
     with mcz.open(own) as file:
         assert float(file.only_clip().quality["mean_position_error_cm"]) <= limit
     assert bytes_of(own) < 0.75 * bytes_of(published)

@@ -18,9 +18,9 @@ from tests.codecs.lossy import (
     Direct,
     amc,
     bytes_of,
-    decoded,
+    encode_and_decode,
+    encode_file,
     markers,
-    saved,
 )
 
 CODECS = ["lsdt-frame", "lsdt-clip"]
@@ -51,7 +51,7 @@ def test_a_coefficient_loses_at_most_the_threshold(
     step = 2.0**power
     params = {"step": step, "coder": coder, "basis": basis, "segment_frames": segment_frames}
     params |= {"window": 24} if codec == "lsdt-clip" else {}
-    found = decoded(codec, motion, **{k: v for k, v in params.items() if v is not None})
+    found = encode_and_decode(codec, motion, **{k: v for k, v in params.items() if v is not None})
     squares = (found - motion.values) ** 2
     parts = (
         [squares[a : a + 24] for a in range(0, n_frames, min(24, segment_frames or 24))]
@@ -68,7 +68,7 @@ def test_a_coefficient_loses_at_most_the_threshold(
 def test_errors_do_not_add_up(codec) -> None:
     """The last frames are as good as the first."""
     motion = markers(1500, 5)
-    error = np.abs(decoded(codec, motion, step=1.0) - motion.values)
+    error = np.abs(encode_and_decode(codec, motion, step=1.0) - motion.values)
     assert error[-100:].mean() < 1.5 * error[:100].mean()
 
 
@@ -77,14 +77,14 @@ def test_errors_do_not_add_up(codec) -> None:
 
 def test_a_basis_that_is_not_there_or_does_not_fit(tmp_path: Path) -> None:
     with pytest.raises(mcz.AccessError):
-        saved("lsdt-clip", markers(10), basis=str(tmp_path / "no.bases"))
+        encode_file("lsdt-clip", markers(10), basis=str(tmp_path / "no.bases"))
     other = tmp_path / "five.bases"
     other.write_bytes(basis_models.build_bases([np.eye(5)] * 3))
     with pytest.raises(mcz.OptionError, match="do not fit"):
-        saved("lsdt-clip", markers(10, 4), basis=str(other))
+        encode_file("lsdt-clip", markers(10, 4), basis=str(other))
     other.write_bytes(other.read_bytes()[:20])
     with pytest.raises(mcz.FormatError):
-        saved("lsdt-clip", markers(10, 5), basis=str(other))
+        encode_file("lsdt-clip", markers(10, 5), basis=str(other))
 
 
 # Segments and requests
@@ -162,7 +162,7 @@ def test_what_is_smaller_is_chosen() -> None:
 @pytest.mark.parametrize("codec", CODECS)
 def test_a_real_clip_at_its_target(data: Path, codec: str) -> None:
     motion = amc(data, "17_10")
-    held = saved(codec, motion, mean_error_cm=0.3)
+    held = encode_file(codec, motion, mean_error_cm=0.3)
     with mcz.open(held) as file:
         found = file.only_clip().motion()
     distance = np.sqrt(((mcz.positions(found) - mcz.positions(motion)) ** 2).sum(axis=2)).mean()
@@ -175,7 +175,7 @@ def test_a_real_clip_at_its_target(data: Path, codec: str) -> None:
 def test_the_well_known_basis_beats_cosines(data: Path) -> None:
     motion = amc(data, "49_02")
     known, plain = (
-        bytes_of(saved("lsdt-clip", motion, mean_error_cm=0.5, basis=basis))
+        bytes_of(encode_file("lsdt-clip", motion, mean_error_cm=0.5, basis=basis))
         for basis in ("known", "cosines")
     )
     assert known < 0.85 * plain

@@ -22,10 +22,10 @@ from tests.codecs.lossy import (
     Direct,
     amc,
     bytes_of,
-    decoded,
+    encode_and_decode,
+    encode_file,
     markers,
-    saved,
-    wandering,
+    random_walks,
 )
 
 NAMES = ["mdtt", "pca-rdo"]
@@ -58,7 +58,7 @@ def test_without_cuts_a_coefficient_loses_at_most_the_threshold(
     """Bases are nearly orthogonal: an error of all frames is that of the coefficients."""
     motion = markers(n_frames, n_markers)
     step = 2.0**power
-    found = decoded(codec, motion, step=step, coder=coder, window=window, **ALL)
+    found = encode_and_decode(codec, motion, step=step, coder=coder, window=window, **ALL)
     assert root_mean_square(found - motion.values) <= BOUND * step + 1e-9
 
 
@@ -82,7 +82,8 @@ def test_a_higher_rank_errs_less(codec) -> None:
     ):
         errors = [
             root_mean_square(
-                decoded(codec, motion, step=0.02, window=60, **(ALL | {name: n})) - motion.values
+                encode_and_decode(codec, motion, step=0.02, window=60, **(ALL | {name: n}))
+                - motion.values
             )
             for n in settings
         ]
@@ -93,7 +94,7 @@ def bases_of(coded: Direct) -> tuple[Basis, ...]:
     return parse_bases(coded.models[0][0].data)
 
 
-def moving(courses: np.ndarray, n_markers: int = 20, seed: int = 3) -> mcz.Motion:
+def moving_markers(courses: np.ndarray, n_markers: int = 20, seed: int = 3) -> mcz.Motion:
     """Markers that all move as ``courses`` (n_frames, n_courses) say, along random directions."""
     directions = np.random.default_rng(seed).normal(size=(courses.shape[1], 3 * n_markers))
     values = courses @ directions + 30 * np.arange(3.0 * n_markers)
@@ -104,7 +105,7 @@ def moving(courses: np.ndarray, n_markers: int = 20, seed: int = 3) -> mcz.Motio
 def test_ranks_are_those_of_the_motion(codec: str) -> None:
     """Markers that move along few directions have as many vectors."""
     random = np.random.default_rng(3)
-    motion = moving(np.cumsum(np.cumsum(random.normal(size=(600, 2)), axis=0), axis=0))
+    motion = moving_markers(np.cumsum(np.cumsum(random.normal(size=(600, 2)), axis=0), axis=0))
     coded = Direct(codec, motion, step=0.01)
     bases = bases_of(coded)
     assert root_mean_square(coded.read() - motion.values) < 0.02
@@ -124,7 +125,9 @@ def test_courses_are_as_many_as_shapes_in_time() -> None:
     """Every window of 60 frames is a mixture of three waves, none of them a cosine."""
     random = np.random.default_rng(4)
     shapes = 20 * np.sign(np.sin(np.outer([0.21, 0.55, 0.9], np.arange(60)) + 0.3))
-    motion = moving((random.normal(size=(40, 2, 3)) @ shapes).swapaxes(1, 2).reshape(2400, 2))
+    motion = moving_markers(
+        (random.normal(size=(40, 2, 3)) @ shapes).swapaxes(1, 2).reshape(2400, 2)
+    )
     coded = Direct("pca-rdo", motion, step=0.1, window=60)
     _, courses, _ = bases_of(coded)
     assert len(courses.entries) <= 5  # rounding may add one or two
@@ -136,7 +139,7 @@ def test_courses_are_as_many_as_shapes_in_time() -> None:
 def test_a_short_window_has_cosines() -> None:
     """It is as good as the others."""
     motion = markers(240 + 37, 6)
-    error = np.abs(decoded("pca-rdo", motion, step=0.05, window=120) - motion.values)
+    error = np.abs(encode_and_decode("pca-rdo", motion, step=0.05, window=120) - motion.values)
     assert error[240:].mean() < 1.5 * error[:240].mean()
 
 
@@ -155,10 +158,10 @@ def test_places_far_away() -> None:
     for away in (1e6, 1e9, 1e13):
         values = motion.values + away
         step = max(0.1, away * 1e-8)
-        found = decoded("pca-rdo", replace(motion, signals=(Signal(values),)), step=step)
+        found = encode_and_decode("pca-rdo", replace(motion, signals=(Signal(values),)), step=step)
         assert np.abs(found - values).max() < 3 * step
     values = motion.values + 1e6
-    found = decoded("pca-rdo", replace(motion, signals=(Signal(values),)), step=1e-6)
+    found = encode_and_decode("pca-rdo", replace(motion, signals=(Signal(values),)), step=1e-6)
     assert np.abs(found - values).max() < 1e-5
 
 
@@ -167,8 +170,8 @@ def test_places_far_away() -> None:
 
 @pytest.mark.parametrize("codec", NAMES)
 def test_a_clip_of_channels_becomes_places(codec) -> None:
-    motion = wandering(60, ["tx", "ty", "tz", "rx", "ry", "rz"])
-    with mcz.open(saved(codec, motion, step=0.001, virtual_markers=True)) as file:
+    motion = random_walks(60, ["tx", "ty", "tz", "rx", "ry", "rz"])
+    with mcz.open(encode_file(codec, motion, step=0.001, virtual_markers=True)) as file:
         clip = file.only_clip()
         n_points = len(point_names(motion.skeleton))
         assert len(clip.skeleton.joints) == n_points + 3 * len(motion.skeleton.joints)
@@ -179,7 +182,7 @@ def test_a_clip_of_channels_becomes_places(codec) -> None:
 @pytest.mark.parametrize("codec", NAMES)
 def test_too_many_channels(codec) -> None:
     with pytest.raises(mcz.MotionError, match="at most 2048"):
-        saved(codec, markers(2, 2100))
+        encode_file(codec, markers(2, 2100))
 
 
 # Real clips
@@ -189,7 +192,7 @@ def test_too_many_channels(codec) -> None:
 @pytest.mark.parametrize(("name", "most"), [("17_10", 21_600), ("49_02", 11_400)])
 def test_bytes_of_real_clips(data: Path, name: str, most: int) -> None:
     """Models counted; lsdt-clip, whose bases are well known, has to write none."""
-    with mcz.open(saved("mdtt", amc(data, name), mean_error_cm=0.2)) as file:
+    with mcz.open(encode_file("mdtt", amc(data, name), mean_error_cm=0.2)) as file:
         sizes = clip_sizes(file.container, file.only_clip())
         reached = float(file.only_clip().quality["mean_position_error_cm"])
     assert 0.19 <= reached <= 0.2
@@ -201,7 +204,7 @@ def test_positions_are_the_better_domain(data: Path) -> None:
     """At the same mean position error they take less than channels do."""
     sizes = {}
     for domain in ("positions", "channels"):
-        held = saved("pca-rdo", amc(data, "49_02"), mean_error_cm=0.2, domain=domain)
+        held = encode_file("pca-rdo", amc(data, "49_02"), mean_error_cm=0.2, domain=domain)
         with mcz.open(held) as file:
             found = clip_sizes(file.container, file.only_clip())
         sizes[domain] = found.payload + found.overhead + found.models

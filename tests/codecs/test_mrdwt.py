@@ -23,8 +23,8 @@ from mcz.kinematics.metrics import compare
 from mcz.model.motion import POSITION_KINDS, Motion
 from mcz.model.schema import parse
 from tests.codecs import lossy
-from tests.codecs.lossy import bones, clip_of, gapped, wandering
-from tests.formats.c3d_files import INTEL, SGI, made
+from tests.codecs.lossy import bones, clip_of, markers_with_gaps, random_walks
+from tests.formats.c3d_files import INTEL, SGI, make_c3d
 from tests.motions import smooth
 
 Array = np.ndarray
@@ -33,12 +33,12 @@ NAMES = st.sampled_from(["haar", "db2", "db3", "db8", "sym4", "bior4.4", "coif1"
 FRAMES = st.one_of(st.integers(1, 20), st.integers(1, 200))
 
 
-def saved(motion: Motion, **params: object) -> bytes:
-    return lossy.saved("mrdwt", motion, **params)
+def encode_file(motion: Motion, **params: object) -> bytes:
+    return lossy.encode_file("mrdwt", motion, **params)
 
 
-def decoded(motion: Motion, **params: object) -> Array:
-    return lossy.decoded("mrdwt", motion, **params)
+def encode_and_decode(motion: Motion, **params: object) -> Array:
+    return lossy.encode_and_decode("mrdwt", motion, **params)
 
 
 class Direct(lossy.Direct):
@@ -52,11 +52,11 @@ class Direct(lossy.Direct):
 @cache
 def small() -> Direct:
     params = {"T_g": 1.0, "N": 2, "wavelet": "db2", "segment_frames": 12}
-    return Direct(wandering(20, ["tx", "rx"]), **params)
+    return Direct(random_walks(20, ["tx", "rx"]), **params)
 
 
 @cache
-def registered(name: str) -> wavelets.Wavelet:
+def wavelet_of(name: str) -> wavelets.Wavelet:
     return wavelets.by_name(name)[1]
 
 
@@ -71,7 +71,7 @@ def gains(wavelet: wavelets.Wavelet) -> tuple[float, float]:
 
 def bound(name: str, levels: int, approximation: float, detail: float) -> float:
     """The greatest error of a value, given those of its coefficients."""
-    low, high = gains(registered(name))
+    low, high = gains(wavelet_of(name))
     error = approximation
     for _ in range(levels):
         error = low * error + high * detail
@@ -97,10 +97,10 @@ def thresholds(motion: Motion, T_g: float) -> Array:
 )
 @example(50, ["rx", "tx"], "db2", 3, 0.0, 1, 0)
 def test_errors_are_bounded(n_frames, kinds, name, levels, T_g, decimals, seed) -> None:
-    motion = wandering(n_frames, kinds, seed)
+    motion = random_walks(n_frames, kinds, seed)
     params = {} if decimals is None else {"Q": decimals}
     params |= {"T_g": T_g, "N": levels, "wavelet": name, "threshold_rule": "flat"}
-    found = decoded(motion, **params)
+    found = encode_and_decode(motion, **params)
     meant = unwrap(motion.values, motion.skeleton)
     for column, T in enumerate(thresholds(motion, T_g)):
         step = T / 0.8 * math.sqrt(5 / 4)  # step codes are quarters of an octave or a little more
@@ -122,7 +122,7 @@ def test_step_codes_are_the_nearest(ratio: float) -> None:
 
 
 def test_gaps_are_filled_by_straight_lines() -> None:
-    motion = gapped()
+    motion = markers_with_gaps()
     found = Direct(motion, Q=6, T_g=0, N=3).read()
     known = motion.signals[0].values
     line = np.linspace(known[43, 3], known[61, 3], 19)
@@ -132,18 +132,18 @@ def test_gaps_are_filled_by_straight_lines() -> None:
 
 
 def test_a_marker_that_is_never_there() -> None:
-    motion = gapped()
+    motion = markers_with_gaps()
     mask = np.ones((100, 6), bool)
     mask[:, 3:] = False
     motion = replace(motion, signals=(replace(motion.signals[0], mask=mask),))
     motion = motion.with_values(np.where(mask, motion.signals[0].values, np.nan))
-    with mcz.open(saved(motion)) as file:
+    with mcz.open(encode_file(motion)) as file:
         assert np.isnan(file.only_clip().read()[:, 3:]).all()
         assert not file.only_clip().read_masked()[0][:, 3:].any()
 
 
 def test_radians_are_coded_like_degrees() -> None:
-    motion = wandering(200, ["rx", "ry", "rz"])
+    motion = random_walks(200, ["rx", "ry", "rz"])
     for rule in ("flat", "depth", "sensitivity"):
         degrees = Direct(motion, T_g=1.0, threshold_rule=rule)
         radians = Direct(
@@ -162,7 +162,7 @@ def test_radians_are_coded_like_degrees() -> None:
 def test_c3d_keeps_gaps_that_only_nan_marks(tmp_path: Path, processor: int) -> None:
     """Their residuals say that they are valid: what fills them must not be taken for points."""
     source, target, back = (tmp_path / name for name in ("a.c3d", "a.mcz", "back.c3d"))
-    file = made(40, n_points=3, processor=processor)
+    file = make_c3d(40, n_points=3, processor=processor)
     file.points[5:9, 1, :3] = file.points[20, 2, 0] = 0x7FC00000
     source.write_bytes(file.build())
     mcz.encode(source, target, codec="mrdwt", params={"T_g": 5}, unit="mm")
@@ -180,15 +180,15 @@ def test_c3d_keeps_gaps_that_only_nan_marks(tmp_path: Path, processor: int) -> N
 @pytest.mark.parametrize("T_g", [0, 0.0, 1e-35])
 def test_a_step_is_needed(T_g: float) -> None:
     with pytest.raises(mcz.OptionError, match="T_g is .* and Q is not given"):
-        saved(smooth(20), T_g=T_g)
+        encode_file(smooth(20), T_g=T_g)
 
 
 @pytest.mark.parametrize("decimals", [12, 15])
 def test_thresholds_beyond_the_range_of_integers(decimals: int) -> None:
     """``least`` stays in its range; what then has no integer is refused as such."""
-    assert not decoded(clip_of(np.zeros((50, 2))), T_g=2.0**20, Q=decimals).any()
+    assert not encode_and_decode(clip_of(np.zeros((50, 2))), T_g=2.0**20, Q=decimals).any()
     with pytest.raises(mcz.MotionError, match="exceeds"):
-        saved(smooth(50), T_g=2.0**20, Q=decimals)
+        encode_file(smooth(50), T_g=2.0**20, Q=decimals)
 
 
 @pytest.mark.parametrize(
@@ -246,7 +246,7 @@ def test_a_cut_file_refuses_what_it_no_longer_holds() -> None:
 
 
 def test_dwt_is_mrdwt_with_a_flat_threshold() -> None:
-    motion = wandering(300, ["tx", "rx", "ry"])
+    motion = random_walks(300, ["tx", "rx", "ry"])
     for settings in ({}, {"Q": 2, "N": 3, "wavelet": "db4"}, {"segment_frames": 64}):
         own = lossy.Direct("dwt", motion, t_w=0.7, **settings)
         other = lossy.Direct("mrdwt", motion, T_g=0.7, threshold_rule="flat", **settings)

@@ -201,7 +201,7 @@ def test_a_rate_that_was_too_low_is_forgotten() -> None:
     errors = []
     for at, row in enumerate(motion.values):
         if at in (300, 500):
-            encoder.change(parsed({"bitrate": 0.001 if at == 300 else 20.0}))
+            encoder.change(parse_params({"bitrate": 0.001 if at == 300 else 20.0}))
         errors.append(np.abs(decoder.push(*encoder.push(row)) - row).mean())
     assert np.mean(errors[780:]) < 2 * np.mean(errors[100:300]) + 1
 
@@ -219,7 +219,7 @@ def test_an_intra_coded_ltr_is_never_empty(preset, rate, gof, period) -> None:
 # Live
 
 
-def parsed(params):
+def parse_params(params):
     """Parameters as an encoder is given them."""
     options = ONLINE.options(params)
     return {name: options[name] for name in params}
@@ -270,8 +270,8 @@ def test_parameters_change_at_the_border_of_a_group() -> None:
     sizes, kinds = [], []
     for at, row in enumerate(motion.values):
         if at == 15:
-            encoder.change(parsed({"step": 4.0}))
-            encoder.change(parsed({"gof": 5, "intra_period": 1}))
+            encoder.change(parse_params({"step": 4.0}))
+            encoder.change(parse_params({"gof": 5, "intra_period": 1}))
         packet = encoder.push(row)
         assert at >= 20 or packet == other.push(row)
         (unit,) = parse_units("online", packet[0], 1)
@@ -290,7 +290,7 @@ def test_parameters_change_at_the_border_of_a_group() -> None:
 def test_what_cannot_change_is_refused(options) -> None:
     encoder, _ = live_pair(markers(10, 2), step=0.5)
     with pytest.raises(mcz.OptionError):
-        encoder.change(parsed(options))
+        encoder.change(parse_params(options))
 
 
 # Real clips

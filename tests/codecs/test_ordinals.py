@@ -29,15 +29,15 @@ GRID = pytest.mark.parametrize("grid", GRIDS, ids=lambda g: f"{g.kind.name}-{g.d
 @given(data=st.data())
 def test_any_ordinals_come_back(coder: Coder, grid: Grid, data: st.DataObject) -> None:
     wanted = data.draw(columns(grid))
-    assert coder.rows(coder.coded(wanted, grid), *wanted.shape, grid) == wanted.tolist()
+    assert coder.rows(coder.encode_columns(wanted, grid), *wanted.shape, grid) == wanted.tolist()
 
 
 @EVERY
 @given(data=st.data())
 def test_a_grid_other_than_the_clips(coder: Coder, data: st.DataObject) -> None:
     wanted = data.draw(columns(GRIDS[3]))
-    stream = coder.coded(wanted, GRIDS[3], clip_grid=GRIDS[0])
-    np.testing.assert_array_equal(coder.decoded(stream, *wanted.shape, GRIDS[0]), wanted)
+    stream = coder.encode_columns(wanted, GRIDS[3], clip_grid=GRIDS[0])
+    np.testing.assert_array_equal(coder.decode_stream(stream, *wanted.shape, GRIDS[0]), wanted)
 
 
 @EVERY
@@ -45,7 +45,7 @@ def test_a_grid_other_than_the_clips(coder: Coder, data: st.DataObject) -> None:
 def test_extreme_ordinals_of_any_form(coder: Coder, extreme: int) -> None:
     wanted = np.array([[extreme], [5], [extreme], [-9]], np.int64)
     for grid in GRIDS:
-        assert coder.rows(coder.coded(wanted, grid), 4, 1, grid) == wanted.tolist()
+        assert coder.rows(coder.encode_columns(wanted, grid), 4, 1, grid) == wanted.tolist()
 
 
 @pytest.mark.parametrize("codec", ["raw", "fast", "best"])
@@ -82,11 +82,11 @@ def test_segments_of_several_lengths_at_once(grid: Grid) -> None:
 @EVERY
 def test_constants_and_copies_cost_almost_nothing(coder: Coder) -> None:
     noise = np.random.default_rng(1).integers(-(10**6), 10**6, (500, 1))
-    once = coder.coded(noise, GRIDS[0])
+    once = coder.encode_columns(noise, GRIDS[0])
     wanted = np.hstack([noise, np.full((500, 1), 7), noise, np.zeros((500, 1), int)])
-    stream = coder.coded(wanted, GRIDS[0])
+    stream = coder.encode_columns(wanted, GRIDS[0])
     assert len(stream) <= len(once) + 8
-    np.testing.assert_array_equal(coder.decoded(stream, 500, 4, GRIDS[0]), wanted)
+    np.testing.assert_array_equal(coder.decode_stream(stream, 500, 4, GRIDS[0]), wanted)
 
 
 def test_each_is_smaller_than_the_one_before() -> None:

@@ -19,7 +19,7 @@ def overlap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(codecs.CODECS, overlap_codec.CODEC.name, overlap_codec.CODEC)
 
 
-def encoded(motion: mcz.Motion, **params: object) -> bytes:
+def encode_file(motion: mcz.Motion, **params: object) -> bytes:
     out = io.BytesIO()
     mcz.write(motion, out, codec="overlap", **params)
     return out.getvalue()
@@ -51,7 +51,7 @@ def test_tiny_payloads_keep_the_overhead_bound() -> None:
 
     motion = smooth(40)
     values = np.zeros_like(motion.values)
-    with mcz.open(encoded(motion.with_values(values), length=40)) as file:
+    with mcz.open(encode_file(motion.with_values(values), length=40)) as file:
         clip = file.clips["smooth"]
         sizes = clip_sizes(file.container, clip)
         row, counts = clip.signals[0].rows[0], clip.signals[0].counts

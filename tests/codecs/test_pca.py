@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mcz.kinematics.angles import unwrap
-from tests.codecs.lossy import Direct, clip_of, decoded, wandering
+from tests.codecs.lossy import Direct, clip_of, encode_and_decode, random_walks
 from tests.motions import smooth
 
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx"]), min_size=1, max_size=8)
@@ -27,9 +27,9 @@ def test_all_components_lose_only_rounding(
     n_frames, kinds, decimals, preset, segment_frames
 ) -> None:
     """Half a step for each component, the mean, and the basis that is rounded."""
-    motion = wandering(n_frames, kinds)
+    motion = random_walks(n_frames, kinds)
     extra = {} if segment_frames is None else {"segment_frames": segment_frames}
-    found = decoded("pca", motion, preset=preset, q=len(kinds), Q=decimals, **extra)
+    found = encode_and_decode("pca", motion, preset=preset, q=len(kinds), Q=decimals, **extra)
     meant = unwrap(motion.values, motion.skeleton)
     most = (len(kinds) + 1) * 1.1 * 10.0**-decimals + 1e-9 * (1 + np.abs(meant).max())
     assert np.abs(found - meant).max() <= most
@@ -38,13 +38,13 @@ def test_all_components_lose_only_rounding(
 @given(st.integers(2, 150), KINDS, st.integers(1, 8))
 @example(2, ["rx"] * 4, 1)
 def test_the_error_is_near_that_of_the_components_left_out(n_frames, kinds, q) -> None:
-    motion = wandering(n_frames, kinds)
+    motion = random_walks(n_frames, kinds)
     meant = unwrap(motion.values, motion.skeleton)
     rest = meant - meant.mean(axis=0)
     lost = float((np.linalg.svd(rest, compute_uv=False)[q:] ** 2).sum()) / rest.size
-    found = float(np.mean((decoded("pca", motion, q=q, Q=5) - meant) ** 2))
+    found = float(np.mean((encode_and_decode("pca", motion, q=q, Q=5) - meant) ** 2))
     assert found <= lost * 1.001 + 1e-8
-    coarse = float(np.mean((decoded("pca", motion, q=q) - meant) ** 2))
+    coarse = float(np.mean((encode_and_decode("pca", motion, q=q) - meant) ** 2))
     assert coarse <= 12 * lost + 1e-4 * (1 + float(np.mean(meant**2)))
 
 

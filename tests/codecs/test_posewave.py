@@ -24,9 +24,9 @@ from tests.codecs.lossy import (
     amc,
     bytes_of,
     clip_of,
-    decoded,
-    saved,
-    wandering,
+    encode_and_decode,
+    encode_file,
+    random_walks,
 )
 from tests.motions import smooth
 
@@ -53,14 +53,14 @@ def test_what_is_read_is_what_the_encoder_had(
     n_frames: int, kinds: list[str], step: float, levels: int, seed: int
 ) -> None:
     """An encoder decodes what it codes; a file of it is closed with a hash of the values."""
-    motion = wandering(n_frames, kinds, seed)
-    with mcz.open(saved(NAME, motion, step=step, levels=levels)) as file:
+    motion = random_walks(n_frames, kinds, seed)
+    with mcz.open(encode_file(NAME, motion, step=step, levels=levels)) as file:
         assert file.only_clip().read().shape == (n_frames, len(kinds))
 
 
 @given(step=st.floats(1e-3, 1), seed=st.integers(0, 2**32 - 1))
 def test_errors_follow_the_step(step: float, seed: int) -> None:
-    motion = wandering(90, KINDS, seed)
+    motion = random_walks(90, KINDS, seed)
     values = Direct(NAME, motion, step=step).read()
     assert mean_error_cm(motion, values) < 2 * step
 
@@ -89,17 +89,17 @@ def test_channels_that_stand_still_cost_nothing() -> None:
 def test_angle_units(angle_unit: str) -> None:
     """Channels of an unknown angle unit are coded one by one."""
     motion = clip_of(
-        wandering(120, ["rx", "ry", "rz"], 1).values / 60, ["rx", "ry", "rz"], angle_unit
+        random_walks(120, ["rx", "ry", "rz"], 1).values / 60, ["rx", "ry", "rz"], angle_unit
     )
     full = {"deg": 360.0, "rad": 2 * np.pi, "": 360.0}[angle_unit]
-    missed = decoded(NAME, motion, step=0.01) - motion.values
+    missed = encode_and_decode(NAME, motion, step=0.01) - motion.values
     missed -= full * np.rint(missed / full)
     assert np.abs(missed).max() < {"deg": 1.0, "rad": 0.5, "": 6.0}[angle_unit]
 
 
 def test_a_bound_is_met_by_refining_frames() -> None:
     motion = smooth(400)
-    data = saved(NAME, motion, max_error_cm=0.2)
+    data = encode_file(NAME, motion, max_error_cm=0.2)
     with mcz.open(data) as file:
         found = file.only_clip().motion()
         quality = file.only_clip().quality
@@ -111,11 +111,11 @@ def test_a_bound_is_met_by_refining_frames() -> None:
 def test_unknown_units_have_steps_in_their_own() -> None:
     motion = smooth(60)
     motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=None))
-    assert np.isfinite(decoded(NAME, motion, step=0.05)).all()
+    assert np.isfinite(encode_and_decode(NAME, motion, step=0.05)).all()
     with pytest.raises(mcz.OptionError, match="give the unit"):
-        saved(NAME, motion, mean_error_cm=0.1)
+        encode_file(NAME, motion, mean_error_cm=0.1)
     with pytest.raises(mcz.OptionError, match="promises .*without which step is to be given"):
-        saved(NAME, motion)
+        encode_file(NAME, motion)
 
 
 @pytest.mark.parametrize(
@@ -131,17 +131,17 @@ def test_unknown_units_have_steps_in_their_own() -> None:
 )
 def test_options_out_of_reach(params: dict[str, Any], words: str) -> None:
     with pytest.raises(mcz.MczError, match=words):
-        saved(NAME, smooth(20), **params)
+        encode_file(NAME, smooth(20), **params)
 
 
 def test_errors_where_nothing_is_placed() -> None:
-    motion = wandering(20, ["rx", "ry"])
+    motion = random_walks(20, ["rx", "ry"])
     motion = replace(motion, skeleton=replace(motion.skeleton, angle_unit=""))
     with pytest.raises(mcz.OptionError, match="max_error_cm 0.5 has no meaning: .*; give step"):
-        saved(NAME, motion)
+        encode_file(NAME, motion)
     with pytest.raises(mcz.OptionError, match="no joint is one of the feet by its name"):
-        saved(NAME, motion, step=0.1, lossless="feet")
-    assert np.isfinite(decoded(NAME, motion, step=0.1)).all()
+        encode_file(NAME, motion, step=0.1, lossless="feet")
+    assert np.isfinite(encode_and_decode(NAME, motion, step=0.1)).all()
 
 
 def test_text_of_many_grids() -> None:
@@ -150,7 +150,7 @@ def test_text_of_many_grids() -> None:
     values[7], values[9, 2] = 1e-9, -0.0
     motion = clip_of(values)
     motion = replace(motion, signals=(Signal(values, (Grid(GridKind.FIXED, 3),) * 4),))
-    with mcz.open(saved(NAME, motion, step=0.05)) as file:
+    with mcz.open(encode_file(NAME, motion, step=0.05)) as file:
         found = file.only_clip().motion()
     assert not len(found.signals[0].exceptions)
     assert not np.isin([1e-9], found.values).any()
@@ -160,8 +160,8 @@ def test_text_of_many_grids() -> None:
 @pytest.mark.parametrize("name", ["16_02", "49_01"])
 def test_half_of_mrdwt_at_equal_error(data: Path, name: str) -> None:
     motion = amc(data, name)
-    ours = saved(NAME, motion, mean_error_cm=0.05)
-    theirs = saved("mrdwt", motion, mean_error_cm=0.05)
+    ours = encode_file(NAME, motion, mean_error_cm=0.05)
+    theirs = encode_file("mrdwt", motion, mean_error_cm=0.05)
     assert bytes_of(ours) < 0.6 * bytes_of(theirs)
 
 
@@ -169,27 +169,27 @@ def test_quality_by_joint() -> None:
     """The tails of the arm keep their limit; what the others weigh stays as it was."""
     motion = smooth(300)
     name = motion.skeleton.joints[-1].name
-    plain = saved(NAME, motion, step=0.2)
-    data = saved(NAME, motion, step=0.2, quality=f"{name}=0.2mm")
+    plain = encode_file(NAME, motion, step=0.2)
+    data = encode_file(NAME, motion, step=0.2, quality=f"{name}=0.2mm")
     with mcz.open(data) as file:
         clip = file.only_clip()
         figures = mcz.compare(motion, clip.motion()).by_joint[-1]
         quality = clip.quality
     assert figures.mean_position_error * motion.skeleton.unit_cm <= 0.02
     assert f"quality_reached.{name}" in quality and "param.weights" not in quality
-    assert bytes_of(plain) < bytes_of(data) < bytes_of(saved(NAME, motion, step=0.01))
+    assert bytes_of(plain) < bytes_of(data) < bytes_of(encode_file(NAME, motion, step=0.01))
 
 
 @pytest.mark.parametrize("text", ["feet", "feet=1", "feet=1furlong", "feet=0mm", "nobody=1mm"])
 def test_qualities_that_mean_nothing(text: str) -> None:
     with pytest.raises(mcz.OptionError, match="quality"):
-        saved(NAME, smooth(20), step=0.1, quality=text)
+        encode_file(NAME, smooth(20), step=0.1, quality=text)
 
 
 # Frame by frame
 
 
-def turning(n_frames: int) -> Motion:
+def sine_chain(n_frames: int) -> Motion:
     """Sines of several speeds, on a chain of joints."""
     frames = np.arange(n_frames)[:, None]
     values = 30 * np.sin(frames * np.linspace(0.05, 0.2, 8) + np.arange(8))
@@ -204,7 +204,7 @@ def pair(motion: Motion, **params: Any) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_preset_holds_in_every_frame(preset: str) -> None:
-    motion = turning(60)
+    motion = sine_chain(60)
     jump = motion.values.copy()
     jump[30:] += 25.0
     motion = replace(motion, signals=(replace(motion.signals[0], values=jump),))
@@ -219,7 +219,7 @@ def test_a_preset_holds_in_every_frame(preset: str) -> None:
 
 
 def test_a_preset_needs_a_unit_of_length() -> None:
-    motion = turning(1)
+    motion = sine_chain(1)
     unknown = replace(motion, skeleton=replace(motion.skeleton, unit_cm=None))
     with pytest.raises(mcz.OptionError, match="step has to be given"):
         pair(unknown)
@@ -228,6 +228,6 @@ def test_a_preset_needs_a_unit_of_length() -> None:
 
 
 def test_nothing_changes_while_frames_come() -> None:
-    encoder, _ = pair(turning(1), step=0.1)
+    encoder, _ = pair(sine_chain(1), step=0.1)
     with pytest.raises(mcz.OptionError, match="step cannot change"):
         encoder.change({"step": 0.2})

@@ -44,7 +44,7 @@ def biped(angle_unit: str = "deg") -> Skeleton:
     return Skeleton(tuple(joints), unit_cm=2.0, angle_unit=angle_unit)
 
 
-def walking(n_frames: int = 150, seed: int = 0, angle_unit: str = "deg") -> Motion:
+def walk_motion(n_frames: int = 150, seed: int = 0, angle_unit: str = "deg") -> Motion:
     """Knees bent, all channels smooth, some noise."""
     skeleton = biped(angle_unit)
     random = np.random.default_rng(seed)
@@ -77,7 +77,7 @@ RUNS = ("LeftFoot", 5, 40), ("RightFoot", 30, 60), ("LeftFoot", 50, 3), ("LeftFo
 @pytest.mark.parametrize("step", [0.03, 0.3])
 @pytest.mark.parametrize("unit", ["deg", "rad"])
 def test_feet_keep_their_places(step: float, unit: str) -> None:
-    motion = walking(angle_unit=unit)
+    motion = walk_motion(angle_unit=unit)
     coded = Direct("posewave", motion, step=step, contacts=RUNS)
     found = coded.read()
     assert errors_cm(motion, found, RUNS).max() <= TOLERANCE
@@ -98,7 +98,7 @@ def test_feet_keep_their_places(step: float, unit: str) -> None:
 @given(st.integers(0, 10**6), st.sampled_from([0.02, 0.2]), st.sampled_from([0.003, 0.02, 0.1]))
 def test_whatever_runs(seed: int, step: float, tolerance: float) -> None:
     random = np.random.default_rng(seed)
-    motion = walking(100, seed)
+    motion = walk_motion(100, seed)
     runs = [
         (str(random.choice(["LeftFoot", "RightFoot"])), int(first), int(random.integers(1, 30)))
         for first in random.integers(0, 70, random.integers(1, 6))
@@ -109,7 +109,7 @@ def test_whatever_runs(seed: int, step: float, tolerance: float) -> None:
 
 
 def test_contacts_go_on_across_segments() -> None:
-    motion = walking(400)
+    motion = walk_motion(400)
     runs = ("LeftFoot", 5, 300), ("RightFoot", 120, 250)
     coded = Direct("posewave", motion, step=0.2, contacts=runs, segment_frames=64)
     assert len(coded.segments) == 7
@@ -120,7 +120,7 @@ def test_contacts_go_on_across_segments() -> None:
 
 def test_two_points_of_a_foot() -> None:
     """The toe's second contact begins and ends within one of its foot, the first does not."""
-    motion = walking()
+    motion = walk_motion()
     runs = ("LeftFoot", 5, 60), ("LeftToe", 40, 60), ("LeftToe", 110, 30), ("LeftFoot", 80, 10)
     coded = Direct("posewave", motion, step=0.2, contacts=runs)
     assert errors_cm(motion, coded.read(), runs).max() <= TOLERANCE
@@ -149,7 +149,7 @@ def test_real_clips(name: str, data: Path) -> None:
 
 
 def test_contacts_are_found_of_joints_by_name() -> None:
-    motion = walking(1100)
+    motion = walk_motion(1100)
     values = np.array(motion.values)
     values[500:] = values[500]
     still = replace(motion, signals=(Signal(values),))
@@ -162,7 +162,7 @@ def test_contacts_are_found_of_joints_by_name() -> None:
 
 
 def test_no_contacts_cost_a_byte() -> None:
-    motion = walking()
+    motion = walk_motion()
     coded = Direct("posewave", motion, step=0.1, contacts=())
     assert coded.header == Direct("posewave", motion, step=0.1).header
     assert coded.header.endswith(b"\0")
@@ -196,13 +196,13 @@ def test_runs_that_cannot_be() -> None:
         choose_contacts(biped(), [(name, 0, 5) for name in names], 0.01, None)
     for contacts in ("LeftFoot:149+2", "LeftFoot,RightFoot:0+151"):
         with pytest.raises(OptionError, match="beyond 150 frames"):
-            Direct("posewave", walking(), contacts=contacts)
+            Direct("posewave", walk_motion(), contacts=contacts)
     with pytest.raises(OptionError, match="no joint 'nobody'"):
-        Direct("posewave", walking(), contacts="nobody")
+        Direct("posewave", walk_motion(), contacts="nobody")
 
 
 def test_skeletons_without_a_unit() -> None:
-    motion = walking()
+    motion = walk_motion()
     for change in ({"unit_cm": None}, {"angle_unit": ""}):
         other = replace(motion, skeleton=replace(motion.skeleton, **change))
         for contacts in ("auto", RUNS):
@@ -211,7 +211,7 @@ def test_skeletons_without_a_unit() -> None:
 
 
 def test_a_skeleton_without_feet() -> None:
-    motion = walking()
+    motion = walk_motion()
     joints = tuple(replace(j, name=f"bone {n}") for n, j in enumerate(motion.skeleton.joints))
     other = replace(motion, skeleton=replace(motion.skeleton, joints=joints))
     with pytest.raises(OptionError, match="no joint .* is a foot by its name"):
@@ -219,7 +219,7 @@ def test_a_skeleton_without_feet() -> None:
 
 
 def test_a_tolerance_that_is_too_small() -> None:
-    motion = walking()
+    motion = walk_motion()
     values = np.array(motion.values)
     values[:, :3] *= 1000
     far = replace(motion, signals=(Signal(values),))

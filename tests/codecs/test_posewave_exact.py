@@ -16,7 +16,7 @@ from mcz.cli.main import cli
 from mcz.files.editing.extraction import extract
 from mcz.model.motion import Exceptions, Signal
 from mcz.model.numbers import Grid, GridKind
-from tests.codecs.lossy import Array, amc, bytes_of, saved
+from tests.codecs.lossy import Array, amc, bytes_of, encode_file
 from tests.motions import smooth
 
 NAME = "posewave"
@@ -38,7 +38,7 @@ def read(data: bytes, **request: Any) -> Array:
 @pytest.mark.parametrize("words", ["spine", "knee,hips", "hips,spine,knee", ("spine", "knee")])
 def test_exact_joints_come_back_at_every_resolution(words: str) -> None:
     motion = smooth(90)
-    data = saved(NAME, motion, step=0.5, levels=2, lossless=words)
+    data = encode_file(NAME, motion, step=0.5, levels=2, lossless=words)
     names = words.split(",") if isinstance(words, str) else words
     columns = [c for name in names for c in motion.skeleton.columns(motion.skeleton.find(name))]
     for resolution in range(3):
@@ -51,7 +51,7 @@ def test_exact_joints_come_back_at_every_resolution(words: str) -> None:
 @pytest.mark.real
 def test_exact_joints_of_a_file_print_as_they_did(data: Path) -> None:
     motion = amc(data, "16_02")
-    coded = saved(NAME, motion, step=0.05, lossless="lfoot,hands")
+    coded = encode_file(NAME, motion, step=0.05, lossless="lfoot,hands")
     with mcz.open(coded) as file:
         text = file.only_clip().source_bytes()
     source = (data / "cmu/amc/16_02.amc").read_bytes()
@@ -60,7 +60,7 @@ def test_exact_joints_of_a_file_print_as_they_did(data: Path) -> None:
         for file in (source, text)
     ]
     assert lines[0] == lines[1] and len(lines[0]) == 2 * motion.n_frames
-    assert bytes_of(coded) < 0.5 * bytes_of(saved("fast", motion))
+    assert bytes_of(coded) < 0.5 * bytes_of(encode_file("fast", motion))
 
 
 def test_grids_exceptions_and_gaps_of_exact_channels() -> None:
@@ -79,7 +79,7 @@ def test_grids_exceptions_and_gaps_of_exact_channels() -> None:
         exceptions=Exceptions(np.array([12]), np.array([8]), (b"2.50000000001e0"[:5],)),
     )
     motion = replace(motion, signals=(signal,))
-    with mcz.open(saved(NAME, motion, step=0.5, lossless="spine")) as file:
+    with mcz.open(encode_file(NAME, motion, step=0.5, lossless="spine")) as file:
         clip = file.only_clip()
         found = clip.motion().signals[0]
         assert [row.header.first for row in clip.signals[0].rows] == [0, 40]
@@ -93,7 +93,9 @@ def test_grids_exceptions_and_gaps_of_exact_channels() -> None:
 
 def test_segments_of_exact_joints_are_those_that_fast_has() -> None:
     motion = smooth(5000)
-    with mcz.open(saved(NAME, motion, step=8.0, lossless="knee", segment_frames=5000)) as file:
+    with mcz.open(
+        encode_file(NAME, motion, step=8.0, lossless="knee", segment_frames=5000)
+    ) as file:
         clip = file.only_clip()
         assert [row.header.n_frames for row in clip.signals[0].rows] == [4096, 904]
         assert same_bits(clip.read(joints=["knee"]), motion.values[:, 9:])
@@ -101,7 +103,7 @@ def test_segments_of_exact_joints_are_those_that_fast_has() -> None:
 
 def test_extract_takes_out_exact_joints_alone() -> None:
     motion, out = smooth(90), io.BytesIO()
-    data = saved(NAME, motion, step=0.5, levels=2, lossless="spine,knee")
+    data = encode_file(NAME, motion, step=0.5, levels=2, lossless="spine,knee")
     extract(data, out, joints=["spine"])
     assert same_bits(read(out.getvalue()), motion.values[:, SPINE])
     for joints in (["hips"], ["hips", "knee"]):
@@ -117,7 +119,9 @@ def test_extract_takes_out_exact_joints_alone() -> None:
 )
 def test_targets_and_quality(target: dict[str, Any]) -> None:
     motion = smooth(200)
-    with mcz.open(saved(NAME, motion, lossless="knee", quality="spine=2mm", **target)) as file:
+    with mcz.open(
+        encode_file(NAME, motion, lossless="knee", quality="spine=2mm", **target)
+    ) as file:
         clip = file.only_clip()
         found, quality = clip.motion(), clip.quality
     assert same_bits(found.values[:, 9], motion.values[:, 9])
@@ -127,7 +131,7 @@ def test_targets_and_quality(target: dict[str, Any]) -> None:
 @pytest.mark.parametrize("words", ["", "lfoot", "spine,", "fixed", 3])
 def test_words_that_mean_nothing(words: object) -> None:
     with pytest.raises(mcz.OptionError, match="lossless"):
-        saved(NAME, smooth(20), step=0.1, lossless=words)
+        encode_file(NAME, smooth(20), step=0.1, lossless=words)
 
 
 @pytest.mark.real
@@ -135,7 +139,7 @@ def test_commands_name_exact_joints(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "clip.mcz"
-    path.write_bytes(saved(NAME, amc(data, "16_02"), step=0.5, lossless="rfoot,rtoes"))
+    path.write_bytes(encode_file(NAME, amc(data, "16_02"), step=0.5, lossless="rfoot,rtoes"))
     assert run(cli, "mcz", ["info", str(path)]) == 0
     assert "  exact      rfoot, rtoes\n" in capsys.readouterr().out
     assert run(cli, "mcz", ["diff", str(data / "cmu/amc/16_02.amc"), str(path)]) == 0

@@ -51,7 +51,7 @@ def rotations(skeleton: Skeleton, values: Floats, sequence: tuple[int, ...]) -> 
     return np.asarray(turns.as_matrix())
 
 
-def wandering(unit: str, n_frames: int, seed: int, speed: float = 0.05) -> Floats:
+def random_angles(unit: str, n_frames: int, seed: int, speed: float = 0.05) -> Floats:
     """Angles of four channels that go on and on, now and then by whole turns and half ones."""
     random = np.random.default_rng(seed)
     steps = random.normal(0, speed, (n_frames, 4))
@@ -67,7 +67,7 @@ def test_angles_come_back(
 ) -> None:
     """Turns and solutions of the source, too, but for those that gimbal lock leaves open."""
     skeleton, orders = single(own, unit), Orders({0: code}, single(own, unit))
-    source = unwrap(wandering(unit, n_frames, seed), skeleton)
+    source = unwrap(random_angles(unit, n_frames, seed), skeleton)
     place = orders.places[0]
     middle = source[:, place.columns[own[1]]] / FULL_TURN[unit]
     clear = np.abs(middle * 2 - np.floor(middle * 2) - 0.5) > 1e-6
@@ -81,7 +81,7 @@ def source_of(skeleton: Skeleton, values: Floats) -> MemorySource:
     return MemorySource(Motion(skeleton, (Signal(values),)), 0, CODEC, 2**26)
 
 
-def turning(unit: str = "deg", n_frames: int = 3000) -> tuple[Skeleton, Floats]:
+def turning_person(unit: str = "deg", n_frames: int = 3000) -> tuple[Skeleton, Floats]:
     """Someone who turns about y, which is the middle one of the source's axes."""
     steps = np.linspace(0, 20, n_frames)
     true = np.stack([0.2 * np.sin(3 * steps), 2 * np.sin(steps), 0.1 * np.cos(2 * steps)], axis=1)
@@ -93,7 +93,7 @@ def turning(unit: str = "deg", n_frames: int = 3000) -> tuple[Skeleton, Floats]:
 
 @pytest.mark.parametrize("unit", ["deg", "rad"])
 def test_the_calm_order_is_found(unit: str) -> None:
-    skeleton, values = turning(unit)
+    skeleton, values = turning_person(unit)
     assert SEQUENCES[choose_orders(source_of(skeleton, values))[0] - 1][0] == 1
     assert choose_orders(source_of(skeleton, values * [1, 1, 0, 1])) == {}
     assert choose_orders(source_of(skeleton, values[:0])) == {}
@@ -102,7 +102,7 @@ def test_the_calm_order_is_found(unit: str) -> None:
 
 
 def test_codec() -> None:
-    skeleton, values = turning()
+    skeleton, values = turning_person()
     source = source_of(skeleton, values)
     choice = choose(source, PARAMETERS)
     header = parse_header(choice.header, source.layout)

@@ -19,7 +19,7 @@ WALK = acclaim_walk()
 FORMS = ("rotvec", "quat")
 
 
-def written(motion: Motion, path: Path, **options: object) -> Motion:
+def write_and_read(motion: Motion, path: Path, **options: object) -> Motion:
     mcz.write(motion, path, codec="posewave", force=True, **options)
     with mcz.open(path) as file:
         return file.clips[motion.name].motion()
@@ -37,13 +37,13 @@ def version(path: Path) -> int:
 def test_targets_in_cm_are_met(form: str, target: str, limit: float, tmp_path: Path) -> None:
     motion = turned_by(WALK, form, np.float32)
     path = tmp_path / "walk.mcz"
-    found = mcz.compare(motion, written(motion, path, **{target: limit}))
+    found = mcz.compare(motion, write_and_read(motion, path, **{target: limit}))
     reached = found.max_position_error_cm if "max" in target else found.mean_position_error_cm
     assert reached is not None and limit / 2 < reached <= limit
     assert version(path) == 1
     # About as small as the same walk by angles.
     other = tmp_path / "angles.mcz"
-    written(WALK, other, **{target: limit})
+    write_and_read(WALK, other, **{target: limit})
     assert version(other) == 0
     assert path.stat().st_size < 1.15 * other.stat().st_size
 
@@ -52,7 +52,7 @@ def test_targets_in_cm_are_met(form: str, target: str, limit: float, tmp_path: P
 def test_parts_and_live_frames(form: str, tmp_path: Path) -> None:
     motion = turned_by(WALK, form)
     path = tmp_path / "walk.mcz"
-    whole = written(motion, path, step=0.2, segment_frames=64)
+    whole = write_and_read(motion, path, step=0.2, segment_frames=64)
     with mcz.open(path) as file:
         clip = file.clips[motion.name]
         part = clip.read(frames=(70, 90), joints=["head"])
@@ -86,10 +86,10 @@ def test_vectors_that_jump_are_coded_as_if_they_did_not(tmp_path: Path) -> None:
     values[:, root] = turned
     jumping = replace(motion, signals=(Signal(values),))
     path = tmp_path / "jumping.mcz"
-    found = written(jumping, path, max_error_cm=0.5)
+    found = write_and_read(jumping, path, max_error_cm=0.5)
     assert mcz.compare(jumping, found).max_position_error_cm <= 0.5
     still = tmp_path / "still.mcz"
-    written(motion, still, max_error_cm=0.5)
+    write_and_read(motion, still, max_error_cm=0.5)
     assert path.stat().st_size < 1.5 * still.stat().st_size
 
 
@@ -100,6 +100,6 @@ def test_parts_alone_turn_nothing(tmp_path: Path) -> None:
     values = np.insert(WALK.values, 6, [[1.0], [2.0]], axis=1)
     motion = replace(WALK, skeleton=skeleton, signals=(Signal(values),), source=None)
     path = tmp_path / "parts.mcz"
-    found = written(motion, path)
+    found = write_and_read(motion, path)
     assert version(path) == 0
     np.testing.assert_allclose(found.values[:, 6:8], values[:, 6:8], atol=0.1)

@@ -23,7 +23,7 @@ def motion(name: str = "one") -> mcz.Motion:
     return replace(found, skeleton=replace(found.skeleton, unit_cm=1.0))
 
 
-def coded(codec: str, **params: Any) -> bytes:
+def encode_preset(codec: str, **params: Any) -> bytes:
     out = io.BytesIO()
     mcz.write(motion(), out, codec, **params)
     return out.getvalue()
@@ -37,7 +37,7 @@ def presets(data: bytes) -> list[tuple[str, int]]:
 @pytest.mark.parametrize("name", SHARED)
 def test_a_clip_is_called_by_its_preset(name: str) -> None:
     codec = CODECS[name]
-    data = coded(name)
+    data = encode_preset(name)
     assert presets(data) == [(name, codec.preset)]
     with mcz.open(data) as file:
         assert [clip.name for clip in file.find(f"codec == '{name}'")] == ["one"]
@@ -46,15 +46,15 @@ def test_a_clip_is_called_by_its_preset(name: str) -> None:
 @pytest.mark.parametrize(("preset", "id_"), [("default", 0), ("mod", 1), ("rc", 2), ("rca", 3)])
 def test_presets_of_online(preset: str, id_: int) -> None:
     rate = {"bitrate": 64.0} if preset.startswith("rc") else {}
-    assert presets(coded("online", preset=preset, **rate)) == [("online", id_)]
+    assert presets(encode_preset("online", preset=preset, **rate)) == [("online", id_)]
 
 
 @pytest.mark.parametrize("name", UNKNOWN)
 def test_an_unknown_preset_is_ignored_and_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    with mcz.open(coded(name)) as file:
+    with mcz.open(encode_preset(name)) as file:
         expected = file.clips["one"].read()
     monkeypatch.setitem(CODECS, name, replace(CODECS[name], preset=99))
-    data = coded(name)
+    data = encode_preset(name)
     monkeypatch.undo()
     with mcz.open(data) as file:
         clip = file.clips["one"]

@@ -25,15 +25,15 @@ from tests.motions import smooth
 Array = np.ndarray
 
 
-def saved(motion: Motion, **params: object) -> bytes:
-    return lossy.saved("qbc", motion, **params)
+def encode_file(motion: Motion, **params: object) -> bytes:
+    return lossy.encode_file("qbc", motion, **params)
 
 
-def decoded(motion: Motion, **params: object) -> Array:
-    return lossy.decoded("qbc", motion, **params)
+def encode_and_decode(motion: Motion, **params: object) -> Array:
+    return lossy.encode_and_decode("qbc", motion, **params)
 
 
-def coded(motion: Motion, **params: object) -> Direct:
+def encode_directly(motion: Motion, **params: object) -> Direct:
     return Direct("qbc", motion, **params)
 
 
@@ -44,7 +44,7 @@ def joints_of(sizes: list[int]) -> Skeleton:
     return Skeleton(tuple(Joint(f"j{j}", j - 1, channels=c) for j, c in enumerate(found)))
 
 
-def jointed(n_frames: int, sizes: list[int], seed: int = 0, roughness: float = 4.0) -> Motion:
+def joint_walks(n_frames: int, sizes: list[int], seed: int = 0, roughness: float = 4.0) -> Motion:
     """Random walks of joints with so many channels."""
     random = np.random.default_rng(seed)
     steps = random.normal(0, roughness, (n_frames, sum(sizes)))
@@ -128,37 +128,37 @@ PRESETS = st.sampled_from(["default", "khan2014"])  # which holds it before roun
 
 @given(FRAMES, SIZES, SETTINGS, st.integers(0, 99), st.sampled_from([0.01, 1.0, 30.0]), PRESETS)
 def test_the_bound_holds(n_frames, sizes, settings, seed, roughness, preset) -> None:
-    motion = jointed(n_frames, sizes, seed, roughness)
-    clip = coded(motion, **settings, preset=preset)
+    motion = joint_walks(n_frames, sizes, seed, roughness)
+    clip = encode_directly(motion, **settings, preset=preset)
     check_bound(motion, settings["d2_lmt"], clip, closed=preset == "default")
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=60), SETTINGS, PRESETS)
 def test_the_bound_holds_for_any_values(values, settings, preset) -> None:
     motion = of_any(values)
-    clip = coded(motion, **settings, preset=preset)
+    clip = encode_directly(motion, **settings, preset=preset)
     check_bound(motion, settings["d2_lmt"], clip, closed=preset == "default")
 
 
 @given(FRAMES, SIZES, SETTINGS, st.integers(0, 99))
 def test_fewest_breaks_are_no_more(n_frames, sizes, settings, seed) -> None:
-    motion = jointed(n_frames, sizes, seed)
+    motion = joint_walks(n_frames, sizes, seed)
     counts = [
         [len(curves_of(clip, group)) for group in range(len(clip.layout.groups))]
         for breaks in ("split", "fewest")
-        for clip in (coded(motion, **{**settings, "breaks": breaks}),)
+        for clip in (encode_directly(motion, **{**settings, "breaks": breaks}),)
     ]
     assert all(fewest <= split for split, fewest in zip(*counts, strict=True))
 
 
 def test_fewest_breaks_take_fewer_bytes() -> None:
-    motion = jointed(800, [3, 3, 3, 6], roughness=0.3)
-    assert coded(motion, breaks="fewest").n_bytes < 0.97 * coded(motion).n_bytes
+    motion = joint_walks(800, [3, 3, 3, 6], roughness=0.3)
+    assert encode_directly(motion, breaks="fewest").n_bytes < 0.97 * encode_directly(motion).n_bytes
 
 
 def test_a_limit_of_0_keeps_what_decimals_hold() -> None:
     motion = smooth(90)
-    found = decoded(motion, d2_lmt=0, Q=4)
+    found = encode_and_decode(motion, d2_lmt=0, Q=4)
     np.testing.assert_allclose(found, motion.values, rtol=0, atol=1e-9)
 
 
@@ -166,18 +166,18 @@ def test_a_parabola_is_one_curve() -> None:
     frames = np.arange(41.0)[:, None]
     motion = clip_of(np.hstack([frames**2 / 40, 3 * frames - 7]), ["tx", "ty"])
     for middle in qbc.MIDDLES:
-        clip = coded(motion, d2_lmt=1e-3, middle=middle)
+        clip = encode_directly(motion, d2_lmt=1e-3, middle=middle)
         assert [curves_of(clip, group) for group in range(2)] == [[(0, 40)]] * 2
         np.testing.assert_allclose(clip.read(), motion.values, rtol=0, atol=0.04)
 
 
 def test_the_step_follows_from_the_limit() -> None:
     for limit in (1e-6, 1.0, 50.0):
-        assert step_of(coded(smooth(20), d2_lmt=limit)) == STEP_SHARE * limit**0.5
+        assert step_of(encode_directly(smooth(20), d2_lmt=limit)) == STEP_SHARE * limit**0.5
 
 
 def test_a_part_fetches_the_next_segment_only_where_it_must() -> None:
-    clip = coded(smooth(100), delta=10, segment_frames=20)
+    clip = encode_directly(smooth(100), delta=10, segment_frames=20)
     for start, stop, resolution, meant in (
         (25, 31, 0, {(1, 0), (1, 1)}),
         (25, 32, 0, {(1, 0), (1, 1), (2, 0)}),
@@ -202,12 +202,12 @@ def test_a_part_fetches_the_next_segment_only_where_it_must() -> None:
 
 def test_points_up_to_the_limit_are_coded() -> None:
     values = np.array([[2.0**40, -(2.0**40)], [-(2.0**40), 2.0**40], [0, 1], [2.0**40, 5]])
-    found = decoded(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=1)
+    found = encode_and_decode(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=1)
     np.testing.assert_array_equal(found, values)
     with pytest.raises(mcz.MotionError, match="exceeds"):  # a middle point lies beyond
-        saved(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=2)
+        encode_file(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=2)
     with pytest.raises(mcz.MotionError, match="exceeds"):
-        saved(clip_of(values + 1, ["tx", "ty"]), Q=0, d2_lmt=0)
+        encode_file(clip_of(values + 1, ["tx", "ty"]), Q=0, d2_lmt=0)
 
 
 # Parameters
@@ -216,23 +216,23 @@ def test_points_up_to_the_limit_are_coded() -> None:
 @pytest.mark.parametrize("limit", [0, 0.0, 5e-324, 1e-60])
 def test_a_step_is_needed(limit: float) -> None:
     with pytest.raises(mcz.OptionError, match="d2_lmt .*step"):
-        saved(smooth(20), d2_lmt=limit)
-    assert saved(smooth(20), d2_lmt=limit, Q=1)
+        encode_file(smooth(20), d2_lmt=limit)
+    assert encode_file(smooth(20), d2_lmt=limit, Q=1)
 
 
 def test_fewest_breaks_need_marks_near_each_other() -> None:
     with pytest.raises(mcz.OptionError, match="breaks fewest need a delta of at most 512"):
-        saved(smooth(20), breaks="fewest", delta=513)
+        encode_file(smooth(20), breaks="fewest", delta=513)
 
 
 def test_presets() -> None:
-    clip = coded(smooth(400), preset="khan2014")
+    clip = encode_directly(smooth(400), preset="khan2014")
     fields = parse(qbc.QbcHeader, clip.header, "header")
     assert (fields.delta, fields.decimals, fields.coded_frames) == (80, 2, 400)
     assert len(clip.segments) == 1
     same = {"d2_lmt": 4, "delta": 80, "Q": 2, "middle": "published"}
-    assert coded(smooth(400), preset="khan2014", **same).segments == clip.segments
-    default = parse(qbc.QbcHeader, coded(smooth(400)).header, "header")
+    assert encode_directly(smooth(400), preset="khan2014", **same).segments == clip.segments
+    default = parse(qbc.QbcHeader, encode_directly(smooth(400)).header, "header")
     assert (default.delta, default.decimals, default.step) == (40, SCALED, 0.75)
     lever = reach(smooth(1).skeleton) * math.pi / 180
     assert default.position_step == 0.75 * lever

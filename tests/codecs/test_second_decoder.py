@@ -27,7 +27,7 @@ from mcz.cli import conformance
 from mcz.errors import MczError
 from mcz.files.reading.lost_skeletons import LOST
 from tests.codecs import cases as contract
-from tests.codecs.lossy import gapped, markers, rough, saved, wandering
+from tests.codecs.lossy import encode_file, markers, markers_with_gaps, random_walks, rough
 from tests.motions import smooth
 from tests.test_vector_tools import vector_of
 from tools import make_vectors
@@ -72,18 +72,21 @@ def check(data: bytes, other: Server, what: object) -> None:
 def test_clips(codec: str, params: dict[str, Any], other: Server) -> None:
     motions = [(f"smooth({n})", smooth(n)) for n in (0, 1, 2, 3, 33, 64, 100)]
     motions += [("rough", rough(70, 1)), ("rougher", rough(73, 3))]
-    motions += [("wandering", wandering(50, ["rx", "ty", "tz"])), ("gapped", gapped())]
+    motions += [
+        ("wandering", random_walks(50, ["rx", "ty", "tz"])),
+        ("gapped", markers_with_gaps()),
+    ]
     if codec in POINTS:
         motions += [("markers", markers(90)), ("31 markers", markers(40, 31))]
     for name, motion in motions:
         timed = replace(motion, frame_rate=motion.frame_rate or Fraction(60))  # a rate needs one
-        check(saved(codec, timed, **params), other, name)
+        check(encode_file(codec, timed, **params), other, name)
 
 
 Arrays = list[tuple[str, str, np.ndarray, np.ndarray]]  # clip, signal, values, mask
 
 
-def salvaged(data: bytes) -> tuple[Arrays, set[str]]:
+def salvage_arrays(data: bytes) -> tuple[Arrays, set[str]]:
     """Arrays that this package salvages, and the names of clips without their skeleton.
 
     These a reader may give as channels without names (SPEC.md, "Salvage"); only this package does.
@@ -102,7 +105,7 @@ def salvaged(data: bytes) -> tuple[Arrays, set[str]]:
         return [], set()
 
 
-def salvaged_there(data: bytes, other: Server) -> Arrays:
+def salvage_in_javascript(data: bytes, other: Server) -> Arrays:
     """Arrays that the decoder in JavaScript salvages; it must not crash or hang."""
     told = other.ask(["--salvage"], data, MOST_OUTPUT)
     assert (told.code in (0, 1), told.fault) == (True, ""), told.errors
@@ -121,7 +124,7 @@ def salvaged_there(data: bytes, other: Server) -> Arrays:
     return found
 
 
-def damaged(data: bytes, seed: int) -> bytes:
+def damage(data: bytes, seed: int) -> bytes:
     """``data`` with a bit turned, a stretch of zeros or of rubbish, a stretch or the end gone."""
     rng = np.random.default_rng(seed)
     at = int(rng.integers(8, len(data)))
@@ -151,12 +154,14 @@ DAMAGED = ("raw", "best", "fast", "pca", "posewave", "lsdt-clip", "live")
 def test_salvage(codec: str, other: Server) -> None:
     """Both find the same in a damaged file."""
     params = {"segment_frames": 16}
-    data = live_clip(7) if codec == "live" else saved(codec, smooth(90), copies=True, **params)
+    data = (
+        live_clip(7) if codec == "live" else encode_file(codec, smooth(90), copies=True, **params)
+    )
     found = 0
     for seed in range(20):
-        bad = damaged(data, seed)
-        mine, nameless = salvaged(bad)
-        theirs = salvaged_there(bad, other)
+        bad = damage(data, seed)
+        mine, nameless = salvage_arrays(bad)
+        theirs = salvage_in_javascript(bad, other)
         mine = [one for one in mine if one[0] not in nameless]
         for one, another in zip(mine, theirs, strict=True):
             assert one[:2] == another[:2], seed

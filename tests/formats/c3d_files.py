@@ -143,7 +143,7 @@ class Made:
         return before + frames.astype(kind).tobytes() + self.tail
 
 
-def made(
+def make_c3d(
     n_frames: int = 3,
     n_points: int = 2,
     channels: int = 0,

@@ -17,7 +17,7 @@ NUMBERS = {
 NAMES = st.sampled_from(["Hip", "Ann:L Knee", "a, b", 'say "x"', "Ferse\u00e4", "LASI", "1"])
 
 
-def quoted(text: str, *, always: bool = False) -> str:
+def quote(text: str, *, always: bool = False) -> str:
     if always or any(sign in text for sign in ',;"\t'):
         return '"' + text.replace('"', '""') + '"'
     return text
@@ -42,7 +42,7 @@ def tables(
     return [list(row) for row in zip(*columns, strict=True)] if columns else [[]] * n_rows
 
 
-def joined(draw: st.DrawFn, lines: Sequence[str]) -> bytes:
+def join_lines(draw: st.DrawFn, lines: Sequence[str]) -> bytes:
     eol = draw(st.sampled_from(["\n", "\r\n"]))
     bom = draw(st.sampled_from(["", "", "\ufeff"]))
     return (bom + eol.join(lines) + draw(st.sampled_from(["", eol, eol]))).encode()
@@ -70,13 +70,13 @@ def motive_files(draw: st.DrawFn) -> bytes:
             for axis in axes:
                 entry = (kind, name, f'"A{number}"', f'"A{max(0, number - 1)}"', what, axis.strip())
                 for row, text in zip(heads, entry, strict=True):
-                    row.append(text if text[:1] == '"' else quoted(text))
+                    row.append(text if text[:1] == '"' else quote(text))
     labeled, parents = draw(st.booleans()), draw(st.booleans())
     labels = ("Type", "Name", "ID", "Parent", "", "") if labeled else ("",) * 6
     rate, first = draw(st.sampled_from([60, 120, 119.88, 240])), draw(st.integers(0, 500))
     said = [
         *("Format Version", draw(st.sampled_from(["1.20", "1.21", "1.22", "1.23", "1.25"]))),
-        *("Take Name", quoted(draw(NAMES)), "Capture Frame Rate", f"{rate:.6f}"),
+        *("Take Name", quote(draw(NAMES)), "Capture Frame Rate", f"{rate:.6f}"),
         *("Export Frame Rate", f"{rate:.6f}", "Capture Start Time", "2016-01-05 03.49.50.755 PM"),
         *(
             "Total Exported Frames",
@@ -96,7 +96,7 @@ def motive_files(draw: st.DrawFn) -> bytes:
     for row, cells in enumerate(draw(tables(n_rows, len(heads[5])))):
         moved = draw(st.sampled_from([0, 0, 0, 0.25]))
         lines.append(",".join([str(first + row), f"{(first + row + moved) / rate:.6f}", *cells]))
-    return joined(draw, lines)
+    return join_lines(draw, lines)
 
 
 @st.composite
@@ -123,7 +123,7 @@ def vicon_files(draw: st.DrawFn) -> bytes:
         n_each = draw(st.integers(1, 4)) if title == "Devices" else 1
         axes = {"Segments": ["RX", "RY", "RZ", "TX", "TY", "TZ"], "Devices": ["Fx"]}
         mine = axes.get(title, ["X", "Y", "Z"])
-        names = [quoted(draw(NAMES)) for _ in range(draw(st.integers(1, 3)))]
+        names = [quote(draw(NAMES)) for _ in range(draw(st.integers(1, 3)))]
         row = [name for one in names for name in [one, *[""] * (len(mine) - 1)]]
         lines += [title, str(100 * n_each), ",".join(["", "", *row])]
         lines.append(",".join(["Frame", "Sub Frame", *mine * len(names)]))
@@ -134,7 +134,7 @@ def vicon_files(draw: st.DrawFn) -> bytes:
         for k, cells in enumerate(table):
             lines.append(",".join([str(first + k // n_each), str(k % n_each + odd), *cells]))
         lines.append("")
-    return joined(draw, lines[:-1])
+    return join_lines(draw, lines[:-1])
 
 
 @st.composite
@@ -147,7 +147,7 @@ def column_files(draw: st.DrawFn) -> bytes:
     rows = draw(tables(n_rows, n_columns, holes))
     if all(cell in holes for row in rows for cell in row):
         rows[0][0] = "0"
-    names = [quoted(draw(NAMES)) for _ in range(n_columns)]
+    names = [quote(draw(NAMES)) for _ in range(n_columns)]
     if draw(st.booleans()):
         names.insert(0, draw(st.sampled_from(["time", "t", "Time (s)", "timestamp_ms"])))
         step = draw(st.sampled_from([0.01, 1 / 60, 5.0]))
@@ -162,4 +162,4 @@ def column_files(draw: st.DrawFn) -> bytes:
     if lines and draw(st.booleans()):
         units = draw(st.lists(st.sampled_from(["mm", "[s]", "deg"]), min_size=1))
         lines = [*lines, separator.join((units * len(names))[: len(names)])]
-    return joined(draw, [*lines, *(separator.join(row) for row in rows)])
+    return join_lines(draw, [*lines, *(separator.join(row) for row in rows)])

@@ -15,7 +15,7 @@ from tools.vectors.build.array_files import floats
 CODES = ("?", "<i2", ">i4", "<i8", "|u1", "<u8", "<f2", ">f4", "<f4", "<f8", ">f8")
 
 
-def saved(**arrays: Any) -> bytes:
+def save_npz(**arrays: Any) -> bytes:
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     return buffer.getvalue()

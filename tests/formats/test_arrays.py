@@ -25,7 +25,7 @@ from mcz.model.numbers import GridKind
 from mcz.sources import FORMATS, likely_formats
 from mcz.sources.arrays.skeletons import KINDS
 from tests.commands import run
-from tests.formats.saved_arrays import arrays, saved
+from tests.formats.saved_arrays import arrays, save_npz
 from tools.vectors.build.array_files import Member, floats, npy, npz
 
 
@@ -181,7 +181,7 @@ def test_frames_of_a_file_are_a_file_that_numpy_loads(order: Any) -> None:
     poses = np.array(floats(50, 4, 3), order=order)
     given = {"poses": poses, "force": floats(100, 2).astype(">f4"), "who": np.array("A")}
     out = io.BytesIO()
-    mcz.write(back(saved(**given)), out)
+    mcz.write(back(save_npz(**given)), out)
     with mcz.open(out.getvalue()) as file:
         part = file.only_clip().source_bytes((3, 12))
     with np.load(io.BytesIO(part)) as arrays:
@@ -211,7 +211,7 @@ def test_nothing_is_unpickled_nor_inflated(monkeypatch: pytest.MonkeyPatch) -> N
         FORMATS["npz"].read(buffer.getvalue())
 
 
-def _changed(data: bytes, at: int, format_: str, number: int) -> bytes:
+def _replace_number(data: bytes, at: int, format_: str, number: int) -> bytes:
     return data[:at] + struct.pack(format_, number) + data[at + struct.calcsize(format_) :]
 
 
@@ -221,13 +221,19 @@ def test_archives_that_lie_are_refused_by_place() -> None:
     entry, end = data.index(b"PK\1\2"), data.index(b"PK\5\6")
     second = data.index(b"PK\1\2", entry + 1)
     cases = (
-        (_changed(data, entry + 24, "<I", 999), rf"offset {entry}: .*stored, but \d+ bytes.*999"),
-        (_changed(data, entry + 42, "<I", 7), rf"offset {entry}: member 'a.npy' has no local"),
-        (_changed(data, second + 42, "<I", 0), r"offset 0: member 'b.npy' has another name"),
-        (_changed(data, 18, "<I", 5), "offset 18: member 'a.npy' has 5 bytes"),
-        (_changed(data, 8, "<H", 8), "offset 8: member 'a.npy' has two methods"),
-        (_changed(data, end + 10, "<H", 999), f"offset {end}: 999 members"),
-        (_changed(data, end + 16, "<I", 1), f"offset {end}: a directory from 1"),
+        (
+            _replace_number(data, entry + 24, "<I", 999),
+            rf"offset {entry}: .*stored, but \d+ bytes.*999",
+        ),
+        (
+            _replace_number(data, entry + 42, "<I", 7),
+            rf"offset {entry}: member 'a.npy' has no local",
+        ),
+        (_replace_number(data, second + 42, "<I", 0), r"offset 0: member 'b.npy' has another name"),
+        (_replace_number(data, 18, "<I", 5), "offset 18: member 'a.npy' has 5 bytes"),
+        (_replace_number(data, 8, "<H", 8), "offset 8: member 'a.npy' has two methods"),
+        (_replace_number(data, end + 10, "<H", 999), f"offset {end}: 999 members"),
+        (_replace_number(data, end + 16, "<I", 1), f"offset {end}: a directory from 1"),
         (data[:entry] + b"XX" + data[entry + 2 :], f"offset {entry}: no entry"),
         (b"PK", "no end of a ZIP directory"),
     )
@@ -235,8 +241,10 @@ def test_archives_that_lie_are_refused_by_place() -> None:
         with pytest.raises(SourceError, match=message):
             FORMATS["npz"].read(changed)
     size = len(plain.data)
-    big = _changed(_changed(data, entry + 20, "<I", size + 9), entry + 24, "<I", size + 9)
-    big = _changed(_changed(big, 18, "<I", size + 9), 22, "<I", size + 9)
+    big = _replace_number(
+        _replace_number(data, entry + 20, "<I", size + 9), entry + 24, "<I", size + 9
+    )
+    big = _replace_number(_replace_number(big, 18, "<I", size + 9), 22, "<I", size + 9)
     with pytest.raises(SourceError, match="overlap"):
         FORMATS["npz"].read(big)
 
@@ -250,7 +258,7 @@ def test_a_wrong_checksum_is_kept_and_said() -> None:
 def test_which_arrays_are_signals() -> None:
     times = np.arange(40) / 120
     motion = back(
-        saved(
+        save_npz(
             times=times,
             joints=floats(40, 3, 3),
             angles=floats(40, 2).astype(np.float32),
@@ -268,12 +276,12 @@ def test_which_arrays_are_signals() -> None:
     assert motion.skeleton.joint_names == ("0", "1", "2")
     assert motion.metadata == {"source-note": "mesh has 900x3 numbers, and is kept as its bytes"}
     assert motion.signals[1].channels == (mcz.Channel("", "times", "s"),)
-    uneven = back(saved(times=times**2, joints=floats(40, 3), fps=np.array(30)))
+    uneven = back(save_npz(times=times**2, joints=floats(40, 3), fps=np.array(30)))
     assert uneven.frame_rate is None
     assert uneven.metadata["source-note"] == "the times are not uniform"
     rates = {np.float32(59.94): 59.94, 29.97: 29.97, 30000 / 1001: 30000 / 1001, 100: 100.0}
     for stated, rate in rates.items():
-        found_rate = back(saved(a=floats(3, 2), framerate=stated)).frame_rate
+        found_rate = back(save_npz(a=floats(3, 2), framerate=stated)).frame_rate
         assert found_rate is not None and float(found_rate) == rate
 
 
@@ -304,7 +312,7 @@ def test_a_body_is_a_tree_of_joints(n_joints: int, name: str) -> None:
         "betas": floats(10),
         "dmpls": floats(5, 8, seed=3),
     }
-    motion = back(saved(**given))
+    motion = back(save_npz(**given))
     assert motion.skeleton.name == name and motion.skeleton.n_joints == n_joints
     assert motion.skeleton.joints[0].name == "pelvis"
     assert [s.name for s in motion.signals] == ["motion", "dmpls"]
@@ -332,7 +340,7 @@ def model_file(path: Path, n_shapes: int) -> np.ndarray:
 def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: Path) -> None:
     """Pictures and files of other formats would look fine and mean nothing."""
     said = "no bone has a length: all joints lie where the root is, until rest offsets are given"
-    body = back(saved(poses=floats(5, 72), trans=floats(5, 3)))
+    body = back(save_npz(poses=floats(5, 72), trans=floats(5, 3)))
     for to in ("bvh", "c3d", "glb", "trc"):
         assert mcz.left_out(body, to)[0] == said
     assert said not in mcz.left_out(body, "csv")
@@ -384,7 +392,7 @@ def test_models_that_do_not_fit(
 
 
 def test_bones_without_a_length_have_no_errors_in_cm() -> None:
-    motion = FORMATS["npz"].read(saved(poses=BODY[:, :72], trans=BODY[:, :3]), "body")
+    motion = FORMATS["npz"].read(save_npz(poses=BODY[:, :72], trans=BODY[:, :3]), "body")
     for codec, params in (("mrdwt", {"mean_error_cm": 1.0}), ("lsdt-clip", {}), ("posewave", {})):
         with pytest.raises(OptionError, match="no bone has a length"):
             mcz.write(motion, io.BytesIO(), codec, **params)
@@ -394,17 +402,17 @@ def test_bones_without_a_length_have_no_errors_in_cm() -> None:
 def test_parts_of_a_body() -> None:
     trans = floats(5, 3, seed=2)
     parts = {"root_orient": BODY[:, :3], "pose_body": BODY[:, 3:66]}
-    assert back(saved(**parts)).skeleton.n_joints == 22
+    assert back(save_npz(**parts)).skeleton.n_joints == 22
     hands = {"left_hand_pose": BODY[:, 75:120], "right_hand_pose": BODY[:, 120:]}
-    assert back(saved(**parts, **hands, transl=trans)).skeleton.n_joints == 52
+    assert back(save_npz(**parts, **hands, transl=trans)).skeleton.n_joints == 52
     face = {"pose_jaw": BODY[:, 66:69], "pose_eye": BODY[:, 69:75]}
-    motion = back(saved(**face, **hands, **parts, trans=trans))
+    motion = back(save_npz(**face, **hands, **parts, trans=trans))
     assert motion.skeleton.n_joints == 55
     np.testing.assert_array_equal(motion.values[:, 3:], BODY)
-    twice = back(saved(**face, **hands, poses=BODY, **parts))
+    twice = back(save_npz(**face, **hands, poses=BODY, **parts))
     assert len(twice.signals) == 1
     parts["pose_body"] = parts["pose_body"] + 1e-9
-    other = back(saved(poses=BODY, **parts))
+    other = back(save_npz(poses=BODY, **parts))
     assert [s.name for s in other.signals] == ["motion", "pose_body"]
 
 
@@ -458,7 +466,7 @@ def test_files_without_a_motion_are_refused_with_the_reason() -> None:
         with pytest.raises(SourceError, match=message):
             FORMATS["npy"].read(data)
     with pytest.raises(SourceError, match="no array has a row for each frame; 'betas' is of shape"):
-        FORMATS["npz"].read(saved(betas=floats(16)))
+        FORMATS["npz"].read(save_npz(betas=floats(16)))
     with pytest.raises(SourceError, match="no array"):
         FORMATS["npz"].read(npz(()))
     deflated = io.BytesIO()
@@ -467,7 +475,7 @@ def test_files_without_a_motion_are_refused_with_the_reason() -> None:
     with pytest.raises(SourceError, match=again):
         FORMATS["npz"].read(deflated.getvalue())
     assert likely_formats(npy(floats(2, 2))) == ("npy",)
-    assert likely_formats(saved(a=floats(2, 2))) == ("npz",)
+    assert likely_formats(save_npz(a=floats(2, 2))) == ("npz",)
 
 
 def test_what_a_folder_has_of_motions(tmp_path: Path) -> None:

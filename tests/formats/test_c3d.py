@@ -14,7 +14,7 @@ from hypothesis import given
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton, SourceError
 from mcz.model.numbers import Grid, GridKind
 from mcz.sources.c3d import c3d
-from tests.formats.c3d_files import DEC, INTEL, SGI, Made, c3d_files, made, real_of
+from tests.formats.c3d_files import DEC, INTEL, SGI, Made, c3d_files, make_c3d, real_of
 
 ORDERS = (INTEL, DEC, SGI)
 POSITION = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
@@ -62,7 +62,7 @@ def test_what_words_mean(file: Made) -> None:
 @pytest.mark.parametrize("convention", ["trial", "long", "header only", "wrapped"])
 def test_more_frames_than_a_word_counts(processor: int, convention: str) -> None:
     n = 66_000
-    file = made(n, 1, processor=processor, size=2, last=65_535)
+    file = make_c3d(n, 1, processor=processor, size=2, last=65_535)
     file.parameters["POINT"] = {"FRAMES": file.number(65_535)}
     if convention == "trial":
         file.parameters["TRIAL"] = {
@@ -81,7 +81,7 @@ def test_more_frames_than_a_word_counts(processor: int, convention: str) -> None
 
 
 def test_first_frames_beyond_a_word_are_in_trial() -> None:
-    file = made(5, 1, first=65_535, last=65_535)
+    file = make_c3d(5, 1, first=65_535, last=65_535)
     file.parameters["TRIAL"] = {
         "ACTUAL_START_FIELD": file.long(70_000),
         "ACTUAL_END_FIELD": file.long(70_004),
@@ -95,7 +95,7 @@ def test_first_frames_beyond_a_word_are_in_trial() -> None:
 
 
 def test_labels_go_on_and_may_be_too_few() -> None:
-    file = made(1, 5, labels=[b"LASI ", b"  "])
+    file = make_c3d(1, 5, labels=[b"LASI ", b"  "])
     file.parameters["POINT"] = {"LABELS2": file.texts([b"S\xfcd"]), "UNITS": file.texts([b"M "])}
     motion = c3d.read(file.build(), "few")
     names = [joint.name for joint in motion.skeleton.joints]
@@ -120,12 +120,12 @@ def test_labels_go_on_and_may_be_too_few() -> None:
     ],
 )
 def test_rates(stated: float, rate: Fraction | None, exact: bool) -> None:
-    motion = c3d.read(made(rate=stated).build(), "rate")
+    motion = c3d.read(make_c3d(rate=stated).build(), "rate")
     assert (motion.frame_rate, motion.frame_rate_exact) == (rate, exact)
 
 
 def test_unsigned_analog() -> None:
-    file = made(2, 1, 2, 2, size=2)
+    file = make_c3d(2, 1, 2, 2, size=2)
     file.analog[0, 0] = (65_535, 40_000)
     file.parameters["ANALOG"] = {
         "FORMAT": file.texts([b"UNSIGNED"]),
@@ -145,11 +145,11 @@ def test_unsigned_analog() -> None:
 
 
 def test_the_data_win_over_a_wrong_header() -> None:
-    file = made(40, 2, 2, 7, header_samples=2, last=900)
+    file = make_c3d(40, 2, 2, 7, header_samples=2, last=900)
     motion = c3d.read(file.build(), "wrong")
     assert motion.n_frames == 40 and motion.signals[2].samples_per_frame == 7
     assert "2 analog samples a frame are declared, 14 are taken" in motion.metadata["source-note"]
-    cut = made(40, 2).build()[:-200]
+    cut = make_c3d(40, 2).build()[:-200]
     motion = c3d.read(cut, "cut")
     assert motion.n_frames == 33 and c3d.write(motion) == cut
     assert motion.metadata["source-note"] == "40 frames are declared, 33 are there"
@@ -157,8 +157,8 @@ def test_the_data_win_over_a_wrong_header() -> None:
 
 @pytest.mark.parametrize("processor", ORDERS)
 def test_rotations_are_a_signal(processor: int) -> None:
-    file = made(5, 0, processor=processor)
-    words = made(5, 0, 17, 2 * 2, processor=processor).analog
+    file = make_c3d(5, 0, processor=processor)
+    words = make_c3d(5, 0, 17, 2 * 2, processor=processor).analog
     kind = ">u4" if processor == SGI else "<u4"
     gap = bytes(512)
     file.tail = gap + words.astype(kind).tobytes() + b"end"
@@ -199,7 +199,7 @@ def test_rotations_are_a_signal(processor: int) -> None:
 )
 def test_what_cannot_be_read_is_refused(change: object, message: str) -> None:
     assert callable(change)
-    data = made(3, 2).build()
+    data = make_c3d(3, 2).build()
     if message == "offset 1024":
         data = data[:1024].replace(b"USED", b"XSED")
         data = data[:2] + b"\xff\x7f" + data[4:]

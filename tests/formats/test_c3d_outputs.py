@@ -14,12 +14,12 @@ import mcz
 from mcz import Channel, Joint, Motion, MotionError, Signal, Skeleton
 from mcz.sources.c3d import c3d
 from mcz.sources.c3d.outputs import Split
-from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made
+from tests.formats.c3d_files import DEC, INTEL, SGI, Made, make_c3d
 
 ORDERS = (INTEL, DEC, SGI)
 
 
-def listed(file: Made, **lists: list[str]) -> Made:
+def add_point_lists(file: Made, **lists: list[str]) -> Made:
     """The file with parameters of POINT that list labels, or units."""
     more = {name: file.texts([text.encode() for text in texts]) for name, texts in lists.items()}
     file.parameters.setdefault("POINT", {}).update(more)
@@ -33,10 +33,10 @@ def signal_of(motion: Motion, name: str) -> Signal:
 @pytest.mark.parametrize("processor", ORDERS)
 @pytest.mark.parametrize("size", [2, 4])
 def test_outputs_between_points_are_a_signal_of_their_own(processor: int, size: int) -> None:
-    file = made(6, 5, 2, 2, processor=processor, size=size)
-    listed(file, ANGLES=["p1"], ANGLE_UNITS=["deg"], POWERS=["p3"], POWER_UNITS=["W"])
+    file = make_c3d(6, 5, 2, 2, processor=processor, size=size)
+    add_point_lists(file, ANGLES=["p1"], ANGLE_UNITS=["deg"], POWERS=["p3"], POWER_UNITS=["W"])
     data = file.build()
-    whole = c3d.read(made(6, 5, 2, 2, processor=processor, size=size).build(), "whole")
+    whole = c3d.read(make_c3d(6, 5, 2, 2, processor=processor, size=size).build(), "whole")
     motion = c3d.read(data, "apart")
     assert [signal.name for signal in motion.signals] == [
         "motion",
@@ -73,7 +73,7 @@ def test_whatever_is_listed_comes_back(
     lists: dict[str, list[str]], processor: int, size: int, n_points: int, draw: st.DataObject
 ) -> None:
     """In two lists, in none, twice, of no point; invalid points; no points at all."""
-    file = listed(made(4, n_points, 1, 2, processor=processor, size=size), **lists)
+    file = add_point_lists(make_c3d(4, n_points, 1, 2, processor=processor, size=size), **lists)
     for frame, point in draw.draw(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3)))):
         if point < n_points:
             file.points[frame, point, 3] = 0xFFFF if size == 2 else 0xFFFFFFFF
@@ -100,20 +100,20 @@ def test_whatever_is_listed_comes_back(
     ],
 )
 def test_units_are_those_of_the_list_or_unknown(lists: dict[str, list[str]], unit: str) -> None:
-    motion = c3d.read(listed(made(2, 3), **lists).build(), "units")
+    motion = c3d.read(add_point_lists(make_c3d(2, 3), **lists).build(), "units")
     channels = signal_of(motion, "outputs").channels
     assert channels is not None
     assert {c.unit for c in channels if c.name.startswith("p1")} == {unit}
 
 
 def test_without_outputs_the_format_is_the_old_one() -> None:
-    motion = c3d.read(listed(made(2, 3), ANGLES=["", "p9"]).build(), "old")
+    motion = c3d.read(add_point_lists(make_c3d(2, 3), ANGLES=["", "p9"]).build(), "old")
     assert motion.source is not None and motion.source.format == "c3d"
     assert len(motion.signals[0].grids) == 9
 
 
 def test_a_file_of_before_still_says_what_it_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = listed(made(5, 4), ANGLES=["p1"]).build()
+    data = add_point_lists(make_c3d(5, 4), ANGLES=["p1"]).build()
     with monkeypatch.context() as before:
         everything = Split(np.arange(4), np.arange(0))
         before.setattr(c3d, "find_outputs", lambda parameters, n: everything)
@@ -128,7 +128,7 @@ def test_a_file_of_before_still_says_what_it_said(monkeypatch: pytest.MonkeyPatc
 
 
 def test_lossy_codecs_and_distances_leave_them_alone() -> None:
-    file = listed(made(64, 4), ANGLES=["p1"], ANGLE_UNITS=["deg"])
+    file = add_point_lists(make_c3d(64, 4), ANGLES=["p1"], ANGLE_UNITS=["deg"])
     motion = c3d.read(file.build(), "clip")
     stream = io.BytesIO()
     mcz.write(motion, stream, codec="mrdwt", mean_error_cm=0.1)
@@ -147,8 +147,8 @@ def test_lossy_codecs_and_distances_leave_them_alone() -> None:
 
 @pytest.mark.parametrize("size", [2, 4])
 def test_a_plain_file_lists_them_again(size: int) -> None:
-    file = made(9, 5, 2, 2, size=size)
-    listed(file, ANGLES=["p0"], ANGLE_UNITS=["deg"], MOMENTS=["p3"], MOMENT_UNITS=["Nmm"])
+    file = make_c3d(9, 5, 2, 2, size=size)
+    add_point_lists(file, ANGLES=["p0"], ANGLE_UNITS=["deg"], MOMENTS=["p3"], MOMENT_UNITS=["Nmm"])
     file.points[3, 3, 3] = 0xFFFF if size == 2 else 0xBF800000
     motion = c3d.read(file.build(), "clip")
     again = c3d.read(c3d.write(replace(motion, source=None)), "clip")

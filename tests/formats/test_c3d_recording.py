@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz import Motion, MotionError, OptionError, Signal
 from mcz.sources.c3d import c3d
-from tests.formats.c3d_files import DEC, INTEL, SGI, Made, made, real, word
+from tests.formats.c3d_files import DEC, INTEL, SGI, Made, make_c3d, real, word
 
 ORDERS = (INTEL, DEC, SGI)
 
@@ -47,7 +47,7 @@ def recording_of(file: Made) -> mcz.Recording:
 @pytest.mark.parametrize("processor", ORDERS)
 @pytest.mark.parametrize("size", [2, 4])
 def test_analog_is_in_units_and_words_are_kept(processor: int, size: int) -> None:
-    file = made(5, 2, 3, 4, processor=processor, size=size)
+    file = make_c3d(5, 2, 3, 4, processor=processor, size=size)
     scales = [0.25, -2.0, 0.1]
     with_analog(
         file,
@@ -95,14 +95,14 @@ def test_analog_is_in_units_and_words_are_kept(processor: int, size: int) -> Non
     ],
 )
 def test_the_sign_of_an_offset(format_: bytes, word_: int, offset: float) -> None:
-    file = made(2, 1, 1, 1, size=2)
+    file = make_c3d(2, 1, 1, 1, size=2)
     with_analog(file, FORMAT=file.texts([format_]), OFFSET=integers(file, [word_]))
     scaling = analog_of(c3d.read(file.build(), "clip")).scaling
     assert scaling is not None and scaling.offsets.tolist() == [offset]
 
 
 def test_what_is_missing_is_0_and_1() -> None:
-    file = made(2, 1, 3)
+    file = make_c3d(2, 1, 3)
     assert analog_of(c3d.read(file.build(), "clip")).scaling is None
     with_analog(file, SCALE=reals(file, [2.0]), OFFSET=reals(file, [1.5, 2.0]))
     scaling = analog_of(c3d.read(file.build(), "clip")).scaling
@@ -112,7 +112,7 @@ def test_what_is_missing_is_0_and_1() -> None:
 
 
 def test_numbers_go_on_in_the_next_parameter() -> None:
-    file = made(1, 0, 3, size=2)
+    file = make_c3d(1, 0, 3, size=2)
     with_analog(file, SCALE=reals(file, [2.0, 3.0]), SCALE2=reals(file, [4.0]))
     scaling = analog_of(c3d.read(file.build(), "clip")).scaling
     assert scaling is not None and scaling.scales.tolist() == [2.0, 3.0, 4.0]
@@ -120,7 +120,7 @@ def test_numbers_go_on_in_the_next_parameter() -> None:
 
 @given(st.lists(st.sampled_from([0.0, -1.0, 1e-30, 3e38, float("nan"), float("inf")]), min_size=3))
 def test_any_scale_gives_the_words_back(scales: list[float]) -> None:
-    file = made(3, 1, 2, 2, size=2)
+    file = make_c3d(3, 1, 2, 2, size=2)
     with_analog(file, SCALE=reals(file, scales[:2]), GEN_SCALE=reals(file, scales[2:3]))
     data = file.build()
     motion = c3d.read(data, "clip")
@@ -132,7 +132,7 @@ def test_any_scale_gives_the_words_back(scales: list[float]) -> None:
 
 
 def test_changed_values_become_the_nearest_words() -> None:
-    file = made(2, 1, 1, 2, size=2)
+    file = make_c3d(2, 1, 1, 2, size=2)
     with_analog(file, SCALE=reals(file, [0.5]), OFFSET=integers(file, [100]))
     motion = c3d.read(file.build(), "clip")
     analog = analog_of(motion)
@@ -146,7 +146,7 @@ def test_changed_values_become_the_nearest_words() -> None:
 
 def test_without_its_source_a_clip_has_the_values() -> None:
     """Nothing would say what the words mean."""
-    file = made(3, 1, 2, size=2)
+    file = make_c3d(3, 1, 2, size=2)
     with_analog(file, SCALE=reals(file, [0.5, 2.0]), UNITS=file.texts([b"N", b"V"]))
     motion = c3d.read(file.build(), "clip")
     stream = io.BytesIO()
@@ -158,7 +158,7 @@ def test_without_its_source_a_clip_has_the_values() -> None:
 
 
 def test_a_scaling_that_the_source_does_not_say_is_refused() -> None:
-    file = made(3, 1, 1, size=2)
+    file = make_c3d(3, 1, 1, size=2)
     with_analog(file, SCALE=reals(file, [0.5]))
     motion = c3d.read(file.build(), "clip")
     analog = analog_of(motion)
@@ -171,7 +171,7 @@ def test_a_scaling_that_the_source_does_not_say_is_refused() -> None:
 
 @pytest.mark.parametrize("size", [2, 4])
 def test_a_plain_file_says_what_words_mean(size: int) -> None:
-    file = made(3, 1, 2, 2, size=size)
+    file = make_c3d(3, 1, 2, 2, size=size)
     with_analog(
         file,
         SCALE=reals(file, [0.5, 0.1]),
@@ -200,7 +200,7 @@ def test_a_plain_file_says_what_words_mean(size: int) -> None:
     ],
 )
 def test_the_axis_that_points_up(x: str, y: str, up: str) -> None:
-    file = made(1, 1)
+    file = make_c3d(1, 1)
     axes = {"X_SCREEN": x, "Y_SCREEN": y}
     file.parameters["POINT"] = {k: file.texts([v.encode()]) for k, v in axes.items() if v}
     motion = c3d.read(file.build(), "clip")
@@ -211,7 +211,7 @@ def test_the_axis_that_points_up(x: str, y: str, up: str) -> None:
 
 @pytest.mark.parametrize("processor", ORDERS)
 def test_events_of_the_parameters(processor: int) -> None:
-    file = made(1, 1, processor=processor)
+    file = make_c3d(1, 1, processor=processor)
     file.parameters["EVENT"] = {
         "USED": file.number(2),
         "TIMES": reals(file, [0.0, 1.5, 2.0, 0.25, 9.0, 9.0], 2, 3),
@@ -228,7 +228,7 @@ def test_events_of_the_parameters(processor: int) -> None:
 @pytest.mark.parametrize("processor", ORDERS)
 @pytest.mark.parametrize(("key", "n"), [(12_345, 2), (12_345, 99), (0, 2)])
 def test_events_of_the_header(processor: int, key: int, n: int) -> None:
-    data = bytearray(made(1, 1, processor=processor).build())
+    data = bytearray(make_c3d(1, 1, processor=processor).build())
     data[298:302] = word(key, processor) + word(n, processor)
     data[304:312] = real(0.5, processor) + real(2.0, processor)
     data[396:404] = b"LHS RTO "
@@ -243,7 +243,7 @@ def test_events_of_the_header(processor: int, key: int, n: int) -> None:
 
 @pytest.mark.parametrize("processor", ORDERS)
 def test_force_platforms(processor: int) -> None:
-    file = made(1, 1, 12, processor=processor)
+    file = make_c3d(1, 1, 12, processor=processor)
     corners = [float(k) for k in range(24)]
     matrix = [float(k) for k in range(72)]
     file.parameters["FORCE_PLATFORM"] = {
@@ -270,7 +270,7 @@ def test_force_platforms(processor: int) -> None:
 
 
 def test_names_units_and_descriptions() -> None:
-    file = made(2, 2, 2, 3, first=41)
+    file = make_c3d(2, 2, 2, 3, first=41)
     file.parameters["POINT"] = {
         "DESCRIPTIONS": file.texts([b"left knee"]),
         "ANGLES": file.texts([b"p1"]),
@@ -293,7 +293,7 @@ def test_names_units_and_descriptions() -> None:
 
 
 def test_parameters_behind_the_data() -> None:
-    file = made(4, 2, 1, size=2)
+    file = make_c3d(4, 2, 1, size=2)
     with_analog(file, SCALE=reals(file, [0.5]))
     file.parameters["POINT"] = {"Y_SCREEN": file.texts([b"+Y"])}
     data = file.build()
@@ -309,7 +309,7 @@ def test_parameters_behind_the_data() -> None:
 
 @given(st.binary(max_size=400), st.integers(0, 255))
 def test_any_parameters_say_something(junk: bytes, at: int) -> None:
-    data = bytearray(made(2, 1, 1, size=2).build())
+    data = bytearray(make_c3d(2, 1, 1, size=2).build())
     data[512 + at : 512 + at + len(junk)] = junk[: len(data) - 512 - at]
     try:
         motion = c3d.read(bytes(data), "junk")

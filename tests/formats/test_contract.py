@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 import mcz
 from mcz.sources import FORMATS, likely_formats
 from mcz.sources.tables.source import join_table_notes
-from tests.formats.c3d_files import c3d_files, made
+from tests.formats.c3d_files import c3d_files, make_c3d
 from tests.formats.csv_files import column_files, motive_files, vicon_files
-from tests.formats.saved_arrays import archives, arrays, saved
+from tests.formats.saved_arrays import archives, arrays, save_npz
 from tests.formats.tab_files import storage_files, trc_files
 from tests.formats.text_files import AMC, ASF, ASF_OF_ALL_KINDS, BVH, amc_texts, bvh_texts
 from tools.vectors.build.array_files import floats, npy, plain_npz
@@ -35,7 +35,7 @@ from tools.vectors.build.table_files import (
 )
 
 SKELETON = FORMATS["asf"].read(ASF, "small")
-C3D = made(2, 1, 1, size=2, tail=b"\1").build()
+C3D = make_c3d(2, 1, 1, size=2, tail=b"\1").build()
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Case:
         return found
 
 
-def built(file: Any) -> bytes:
+def build_file(file: Any) -> bytes:
     data: bytes = file.build()
     return data
 
@@ -85,13 +85,13 @@ CASES = {
     "amc": Case("amc", (AMC,), amc_texts(), (SKELETON,)),
     "amc alone": Case("amc", (AMC,), amc_texts(), (None,)),
     "asf": Case("asf", (ASF, ASF_OF_ALL_KINDS.encode()), st.just(ASF)),
-    "c3d": Case("c3d", (C3D,), c3d_files().map(built)),
+    "c3d": Case("c3d", (C3D,), c3d_files().map(build_file)),
     "trc": Case("trc", (MARKERS,), trc_files(), step=5),
     "sto": Case("sto", (QUATERNIONS,), storage_files(), step=5),
     "mot": Case("mot", (FORCES,), storage_files(), step=5),
     "csv": Case("csv", TABLES, motive_files() | vicon_files() | column_files(), step=17),
     "npy": Case("npy", (npy(floats(4, 3)),), arrays().map(saved_array)),
-    "npz": Case("npz", (plain_npz({"a": floats(3, 2)}), saved(a=floats(2, 2))), archives()),
+    "npz": Case("npz", (plain_npz({"a": floats(3, 2)}), save_npz(a=floats(2, 2))), archives()),
 }
 REFUSING = ("c3d", "npy", "asf")  # formats of which a file at random may say what cannot be
 CLIPS = [name for name in CASES if name != "asf"]
@@ -205,7 +205,7 @@ def test_a_shifted_clip_is_of_the_same_format(case: Case, data: bytes) -> None:
     assert [s.name for s in again.signals] == [s.name for s in motion.signals]
 
 
-def damaged(source: mcz.Source, data: st.DataObject) -> Iterator[mcz.Source]:
+def damage_source(source: mcz.Source, data: st.DataObject) -> Iterator[mcz.Source]:
     noise = data.draw(st.binary(max_size=40))
     for key in ("template", "detail"):
         good: bytes = getattr(source, key)
@@ -221,7 +221,7 @@ def test_hostile_templates_are_refused_or_written(
     case: Case, data: bytes, choice: st.DataObject
 ) -> None:
     motion = case.read(data)
-    sources = damaged(motion.source, choice)
+    sources = damage_source(motion.source, choice)
     while True:
         try:
             source = next(sources, None)

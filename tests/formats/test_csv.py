@@ -23,7 +23,7 @@ def back(data: bytes) -> Motion:
     return motion
 
 
-def said(motion: Motion) -> str:
+def source_format(motion: Motion) -> str:
     assert motion.source is not None
     return motion.source.format
 
@@ -151,7 +151,7 @@ def test_a_motion_from_elsewhere_is_no_csv_file() -> None:
 
 @pytest.mark.parametrize("data", [MOTIVE, VICON, DEVICES, COLUMNS, b"1 2\n"])
 def test_kinds_of_files(data: bytes) -> None:
-    assert kind_of(data) == said(back(data)) == likely_formats(data)[0]
+    assert kind_of(data) == source_format(back(data)) == likely_formats(data)[0]
 
 
 INDEX = b'"Subject","Trial #","Description"\n1,1,"forward jumps, turn"\n1,2,"climb"\n'

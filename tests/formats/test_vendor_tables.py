@@ -31,7 +31,7 @@ def back(data: bytes) -> Motion:
     return motion
 
 
-def meaning(motion: Motion) -> list[object]:
+def table_facts(motion: Motion) -> list[object]:
     """A table's content beside its bytes and its metadata texts."""
     numbers = motion.frame_numbers
     return [
@@ -109,7 +109,7 @@ def test_a_spreadsheet_that_saves_a_table_changes_nothing(
     eol = choice.draw(st.sampled_from(["\n", "\r\n"]), "end of line")
     mark = choice.draw(st.sampled_from([b"", b"\xef\xbb\xbf"]), "mark")
     saved = mark + table_of(rows, separator, quoting, eol)
-    assert meaning(back(saved)) == meaning(back(data))
+    assert table_facts(back(saved)) == table_facts(back(data))
 
 
 TEXTS = {
@@ -145,7 +145,7 @@ def test_columns_of_text_stay_beside_the_numbers(data: bytes, kind: str) -> None
     usual = back(with_texts(data, kind, 2, 0))
     for n_texts in (1, 2):
         motion = back(with_texts(data, kind, 2, n_texts))
-        assert meaning(motion) == meaning(usual)
+        assert table_facts(motion) == table_facts(usual)
         assert " text: " in motion.metadata["source-note"]
         assert "Clock0" in motion.metadata["source-note"]
 
@@ -334,29 +334,31 @@ STO = (
 @pytest.mark.parametrize(("text", "name"), [(TRC, "trc"), (STO, "sto"), (STO, "mot")])
 def test_tables_of_tabs_that_a_spreadsheet_fills_up(text: str, name: str) -> None:
     form = FORMATS[name]
-    usual = meaning(form.read(text.encode(), "table"))
+    usual = table_facts(form.read(text.encode(), "table"))
     rows = [line.split("\t") for line in text.splitlines()]
     for width, eol, mark in itertools.product((8, 11), ("\n", "\r\n"), ("", "\ufeff")):
         filled = ["\t".join([*row, *[""] * (width - len(row))]) for row in rows]
         data = (mark + "".join(line + eol for line in filled)).encode()
         motion = form.read(data, "table")
-        assert meaning(motion) == usual and form.write(motion) == data
+        assert table_facts(motion) == usual and form.write(motion) == data
     with pytest.raises(SourceError, match="has a decimal comma"):
         form.read(text.replace("1.", "1,").replace("0.", "0,").encode(), "table")
 
 
 def test_a_spreadsheet_may_name_its_separator() -> None:
     take_of_motive = MOTIVE.removeprefix(b"\xef\xbb\xbf")
-    usual = meaning(back(take_of_motive.replace(b", ", b"; ")))
+    usual = table_facts(back(take_of_motive.replace(b", ", b"; ")))
     for mark in (b"", b"\xef\xbb\xbf"):
-        assert meaning(back(mark + b"sep=;\r\n" + take_of_motive.replace(b",", b";"))) == usual
-    assert meaning(back(b"sep=,\r\n" + VICON)) == meaning(back(VICON))
-    assert meaning(back(b"sep=;\r\n" + COLUMNS)) == meaning(back(COLUMNS))
+        assert table_facts(back(mark + b"sep=;\r\n" + take_of_motive.replace(b",", b";"))) == usual
+    assert table_facts(back(b"sep=,\r\n" + VICON)) == table_facts(back(VICON))
+    assert table_facts(back(b"sep=;\r\n" + COLUMNS)) == table_facts(back(COLUMNS))
 
 
 @pytest.mark.parametrize("data", [MOTIVE, VICON])
 def test_semicolons_between_numbers_with_points(data: bytes) -> None:
-    assert meaning(back(data.replace(b",", b";"))) == meaning(back(data.replace(b", ", b"; ")))
+    assert table_facts(back(data.replace(b",", b";"))) == table_facts(
+        back(data.replace(b", ", b"; "))
+    )
 
 
 def test_a_folder_takes_tables_with_text_whose_rows_are_frames() -> None:
@@ -380,7 +382,7 @@ def test_names_may_have_line_breaks() -> None:
     assert [joint.name for joint in motion.skeleton.joints] == ["x  (mm)", "y"]
     assert motion.frame_rate == 1
     data = MOTIVE.replace(b",Name,", b',"Name",').replace(b"Take Name,", b'"Take\nName",')
-    assert b'"Take\n' in data and meaning(back(data)) == meaning(back(MOTIVE))
+    assert b'"Take\n' in data and table_facts(back(data)) == table_facts(back(MOTIVE))
 
 
 def test_fewer_names_than_columns_are_said() -> None:
@@ -407,9 +409,9 @@ def test_the_times_of_motive_are_where_their_name_is() -> None:
     for cells in lines[5:-1]:
         cells[1], cells[2] = cells[2], cells[1]
     moved = back(b"\r\n".join(map(b",".join, lines)))
-    assert meaning(moved) == meaning(back(take(5)))
+    assert table_facts(moved) == table_facts(back(take(5)))
     assert moved.frame_rate == 120
 
 
 def test_blanks_around_cells_of_motive() -> None:
-    assert meaning(back(take(5).replace(b",", b", "))) == meaning(back(take(5)))
+    assert table_facts(back(take(5).replace(b",", b", "))) == table_facts(back(take(5)))

@@ -25,7 +25,7 @@ class Answer(NamedTuple):
 
 
 @contextmanager
-def serving(*paths: object, **facts: Any) -> Iterator[Server]:
+def serve_files(*paths: object, **facts: Any) -> Iterator[Server]:
     """A server of the page and of files."""
     shelf = Shelf(facts)
     for path in paths:

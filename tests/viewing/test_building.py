@@ -30,7 +30,7 @@ def checkout(tmp_path: Path) -> Path:
         path = tmp_path / page.VIEWER / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("")
-        changed(path, 100)
+        set_mtime(path, 100)
     return tmp_path
 
 
@@ -53,7 +53,7 @@ def programs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return ran
 
 
-def changed(path: Path, seconds: int) -> None:
+def set_mtime(path: Path, seconds: int) -> None:
     """Set a file's modification time, in seconds after 1970."""
     os.utime(path, (seconds, seconds))
 
@@ -70,13 +70,13 @@ def test_it_is_built_once_and_when_sources_change(checkout: Path, programs: list
     made = (built_page, viewer / "node_modules" / ".package-lock.json")
     for name in ("tools/js/mcz.js", f"{page.VIEWER}/src/main.js"):
         for path in made:
-            changed(path, 200)
-        changed(checkout / name, 300)
+            set_mtime(path, 200)
+        set_mtime(checkout / name, 300)
         programs.clear()
         built(said.append, checkout)
         assert programs == ["node build.mjs"]
-        changed(checkout / name, 100)
-    changed(viewer / "package-lock.json", 2**32)  # the one thing that what was fetched depends on
+        set_mtime(checkout / name, 100)
+    set_mtime(viewer / "package-lock.json", 2**32)  # the one thing that what was fetched depends on
     programs.clear()
     built(said.append, checkout)
     assert programs == ["npm ci --no-audit --no-fund", "node build.mjs"]
@@ -91,7 +91,7 @@ def test_without_npm_the_command_is_said(
     built_page = checkout / page.VIEWER / "dist" / "viewer.html"
     built_page.parent.mkdir()
     built_page.write_bytes(PAGE.read_bytes())
-    changed(built_page, 50)
+    set_mtime(built_page, 50)
     said: list[str] = []
     assert built(said.append, checkout) == built_page
     assert "older than its sources" in said[0]

@@ -35,7 +35,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @contextmanager
-def started(*words: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def start_view(*words: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """``mcz view`` in a process of its own, and the address that it says."""
     command = [sys.executable, "-m", "mcz.cli.main", "view", *map(str, words), "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -56,7 +56,7 @@ def get(url: str, path: str) -> bytes:
     return data
 
 
-def opened(url: str) -> http.client.HTTPResponse:
+def open_events(url: str) -> http.client.HTTPResponse:
     """The event stream of a page."""
     at = urlsplit(url)
     connection = http.client.HTTPConnection(at.netloc, timeout=30)
@@ -69,7 +69,7 @@ def opened(url: str) -> http.client.HTTPResponse:
 def test_a_page_hears_that_the_server_ends(samples: Path) -> None:
     with mcz.view(samples / "walk.bvh", browser=False) as shown:
         assert shown.url is not None
-        stream = opened(shown.url)
+        stream = open_events(shown.url)
     assert stream.read() == b"\nevent: end\ndata: \n\n"
 
 
@@ -77,7 +77,7 @@ def test_a_page_hears_that_the_server_ends(samples: Path) -> None:
 def test_a_signal_ends_it_and_nothing_is_left(
     samples: Path, temporary: Path, number: int, code: int
 ) -> None:
-    with started(samples / "walk.bvh") as (process, url):
+    with start_view(samples / "walk.bvh") as (process, url):
         assert get(url, "files/0").startswith(b"\x89MCZ")
         assert len(list(temporary.iterdir())) == 1
         process.send_signal(number)
@@ -94,7 +94,7 @@ def test_it_ends_with_its_pages(
 
     def visit(url: str) -> bool:
         def pages() -> None:
-            first, second = opened(url), opened(url)
+            first, second = open_events(url), open_events(url)
             seen.append(first.headers["Content-Type"])
             first.close()
             seen.append(get(url, "files/0")[:4])

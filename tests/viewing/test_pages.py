@@ -61,7 +61,7 @@ class Parsed(HTMLParser):
         self._within = False
 
 
-def embedded(path: Path) -> dict:
+def embedded_data(path: Path) -> dict:
     """Data embedded in a page, the rest of which must be unchanged."""
     text = path.read_text("utf-8")
     found = Parsed(text)
@@ -80,7 +80,7 @@ def test_a_source_is_held_without_loss(samples: Path, tmp_path: Path, call: Call
     out = tmp_path / "take.html"
     code, printed, errors = call(samples / "walk.bvh", "-o", out)
     assert (code, errors) == (0, "")
-    document = embedded(out)
+    document = embedded_data(out)
     (file,) = files_of(document)
     assert document["files"][0]["name"] == "walk.bvh"
     assert file["walk"].source_bytes() == (samples / "walk.bvh").read_bytes()
@@ -98,7 +98,7 @@ def test_an_mcz_is_held_as_it_is(samples: Path, tmp_path: Path, call: Call) -> N
     damaged[len(damaged) // 2] ^= 1
     (tmp_path / "b.mcz").write_bytes(damaged[:-100])
     assert call(tmp_path / "a.mcz", tmp_path / "b.mcz", "-o", tmp_path / "x.html")[0] == 0
-    document = embedded(tmp_path / "x.html")
+    document = embedded_data(tmp_path / "x.html")
     held = [base64.b64decode(file["base64"]) for file in document["files"]]
     assert held == [(tmp_path / "a.mcz").read_bytes(), bytes(damaged[:-100])]
     (found,) = document["diffs"]
@@ -112,13 +112,13 @@ def test_clips_are_copied(samples: Path, tmp_path: Path, call: Call) -> None:
         names = list(file.clips)
     out = tmp_path / "x.html"
     assert call(tmp_path / "all.mcz", "-o", out, "--clip", names[1])[0] == 0
-    (one,) = files_of(embedded(out))
+    (one,) = files_of(embedded_data(out))
     assert list(one.clips) == [names[1]]
     words = ("-o", out, "--force", "--where", "source.format == 'c3d'")
     assert call(tmp_path / "all.mcz", *words)[0] in (0, 2)
     code, _, errors = call(tmp_path / "all.mcz", "-o", out, "--force", "--clip", "none")
     assert (code, "none" in errors) == (2, True)
-    assert list(files_of(embedded(out))[0].clips)  # the page that was there still is
+    assert list(files_of(embedded_data(out))[0].clips)  # the page that was there still is
 
 
 def test_a_codec_makes_it_small_and_says_how_far_it_is(
@@ -128,16 +128,16 @@ def test_a_codec_makes_it_small_and_says_how_far_it_is(
     words = ("--codec", "mrdwt", "--param", "T_g=4", "-o", tmp_path / "x.html", "--json")
     code, printed, _ = call(tmp_path / "a.mcz", *words)
     assert code == 0
-    (file,) = files_of(embedded(tmp_path / "x.html"))
+    (file,) = files_of(embedded_data(tmp_path / "x.html"))
     assert file["walk"].codec == "mrdwt"
     assert file["walk"].quality["param.T_g"] == "4.0"
     told = json.loads(printed)
     assert told["size"] == (tmp_path / "x.html").stat().st_size
     assert told["files"] == [{"name": "a.mcz", "size": file.size, "n_clips": 1}]
-    held = embedded(tmp_path / "x.html")["files"][0]["base64"]
+    held = embedded_data(tmp_path / "x.html")["files"][0]["base64"]
     (tmp_path / "b.mcz").write_bytes(base64.b64decode(held))
     assert call(tmp_path / "a.mcz", tmp_path / "b.mcz", "-o", tmp_path / "y.html")[0] == 0
-    (difference,) = embedded(tmp_path / "y.html")["diffs"]
+    (difference,) = embedded_data(tmp_path / "y.html")["diffs"]
     assert (difference["a"], difference["b"]) == ("a.mcz", "b.mcz")
     (clip,) = difference["clips"]
     record = float(file["walk"].quality["mean_position_error_cm"])
@@ -150,13 +150,13 @@ def test_a_page_tells_what_an_mcz_does_not_say(samples: Path, tmp_path: Path, ca
     code, _, errors = call(*words, "-o", tmp_path / "x.html")
     assert (code, errors.count("\n")) == (0, 1)
     assert "a.mcz: copied as it is, without the unit, up that you give" in errors
-    document = embedded(tmp_path / "x.html")
+    document = embedded_data(tmp_path / "x.html")
     assert document["diffs"][0]["clips"][0]["mean_position_error_cm"] == 0
     copied, made = files_of(document)
     assert (copied["walk"].skeleton.unit_cm, made["walk"].skeleton.unit_cm) == (None, 0.1)
     code, _, errors = call(*words, "-o", tmp_path / "y.html", "--effort", "fast")
     assert (code, errors) == (0, "")
-    for file in files_of(embedded(tmp_path / "y.html")):
+    for file in files_of(embedded_data(tmp_path / "y.html")):
         assert (file["walk"].skeleton.unit_cm, file["walk"].skeleton.up_axis) == (0.1, "z")
 
 
@@ -167,7 +167,7 @@ def test_the_limit_of_decoded_bytes_holds_for_pages(
     words = (tmp_path / "a.mcz", tmp_path / "a.mcz", "-o", tmp_path / "x.html", "--force")
     for limit, is_enough in (("10M", True), ("10k", False)):
         assert call(*words, "--max-decoded", limit)[0] == 0
-        (found,) = embedded(tmp_path / "x.html")["diffs"]
+        (found,) = embedded_data(tmp_path / "x.html")["diffs"]
         assert bool(found["clips"]) == is_enough
         assert ("--max-decoded" in " ".join(found["notes"])) != is_enough
 
@@ -210,7 +210,7 @@ def test_no_text_of_a_file_becomes_markup(name: str, tmp_path: Path, call: Call)
     safe = re.sub(r"[/\0]", "_", name)
     mcz.write(smooth(4, name=name.replace("\0", "")), tmp_path / f"{safe}.mcz")
     assert call(tmp_path / f"{safe}.mcz", "-o", tmp_path / "x.html")[0] == 0
-    assert embedded(tmp_path / "x.html")["files"][0]["name"] == f"{safe}.mcz"
+    assert embedded_data(tmp_path / "x.html")["files"][0]["name"] == f"{safe}.mcz"
 
 
 # Tables --------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from mcz.show.viewing.page import Page, page
 from mcz.show.viewing.requests import Refused, range_of
 from mcz.show.viewing.server import Server
 from tests.motions import smooth
-from tests.viewing.asking import Answer, ask, ask_anywhere, convert, form, post, raw, serving
+from tests.viewing.asking import Answer, ask, ask_anywhere, convert, form, post, raw, serve_files
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def folder(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def server(samples: Path, folder: Path) -> Iterator[Server]:
     paths = folder / "walk.mcz", samples / "walk.amc", folder / "broken.bvh"
-    with serving(*paths, unit="cm") as server:
+    with serve_files(*paths, unit="cm") as server:
         yield server
 
 
@@ -125,7 +125,7 @@ def test_what_cannot_be_converted_says_why(server: Server) -> None:
 def test_a_source_that_changed_is_converted_anew(samples: Path, tmp_path: Path) -> None:
     source = tmp_path / "walk.bvh"
     source.write_bytes(b"nothing yet")
-    with serving(source) as server:
+    with serve_files(source) as server:
         assert ask(server, "files/0").status == 422
         source.write_bytes((samples / "walk.bvh").read_bytes())
         before = ask(server, "files/0")
@@ -199,7 +199,7 @@ def test_a_url_is_read_by_ranges(folder: Path) -> None:
 
     data = (folder / "walk.mcz").read_bytes()
     far = web_server.Server(data)
-    with web_server.served(far), serving(far.address) as server:
+    with web_server.serve(far), serve_files(far.address) as server:
         assert ask(server, "files/0", Range="bytes=8-99").body == data[8:100]
         assert ask(server, "files/0").body == data
         assert ask(server, "api.json").json["files"][0]["name"] == "a.mcz"
@@ -265,7 +265,7 @@ def test_another_file_has_another_tag(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "a.mcz"
     data = (folder / "walk.mcz").read_bytes()
     path.write_bytes(data)
-    with serving(path) as server:
+    with serve_files(path) as server:
         tag = ask(server, "files/0").headers["ETag"]
         path.write_bytes(data)
         os.utime(path, ns=(1, 1))
@@ -289,7 +289,7 @@ def test_ranges_at_once(server: Server, folder: Path) -> None:
 
 def test_a_file_without_a_byte(tmp_path: Path) -> None:
     (tmp_path / "a.mcz").write_bytes(b"")
-    with serving(tmp_path / "a.mcz") as server:
+    with serve_files(tmp_path / "a.mcz") as server:
         assert ask(server, "files/0").body == b""
         answer = ask(server, "files/0", Range="bytes=-100")
         assert (answer.status, answer.headers["Content-Range"]) == (416, "bytes */0")
@@ -448,7 +448,7 @@ def test_a_unit_can_be_said_later(tmp_path: Path) -> None:
     motion = smooth(12)
     motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=None))
     mcz.write(motion, tmp_path / "a.mcz")
-    with serving(tmp_path / "a.mcz") as server:
+    with serve_files(tmp_path / "a.mcz") as server:
         asked = {"url": "files/0", "codec": "mrdwt", "params": {"mean_error_cm": 1}}
         refused = post(server, "encode", asked)
         assert (refused.status, refused.json["error"]["class"]) == (422, "OptionError")
@@ -460,7 +460,7 @@ def test_what_an_mcz_does_not_say_is_told(tmp_path: Path) -> None:
     motion = smooth(12)
     skeleton = replace(motion.skeleton, unit_cm=None, up_axis="")
     mcz.write(replace(motion, skeleton=skeleton, frame_rate=None), tmp_path / "a.mcz")
-    with serving(tmp_path / "a.mcz", rate=50, unit="mm", up="z", skeleton=None) as server:
+    with serve_files(tmp_path / "a.mcz", rate=50, unit="mm", up="z", skeleton=None) as server:
         made = post(server, "encode", {"url": "files/0", "codec": "mrdwt", "params": {"T_g": 4}})
         with mcz.open(ask(server, made.json["url"]).body) as file:
             clip = file.only_clip()
@@ -529,7 +529,7 @@ def test_a_form_is_no_json(server: Server) -> None:
 
 def test_results_are_few(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shelf_module, "MOST_RESULTS", 2)
-    with serving(folder / "walk.mcz") as server:
+    with serve_files(folder / "walk.mcz") as server:
         asked = {"url": "files/0", "codec": "mrdwt", "params": {"T_g": 8}}
         urls = [post(server, "encode", asked).json["url"] for _ in range(4)]
         assert [ask(server, url).status for url in urls] == [404, 404, 200, 200]
