@@ -67,7 +67,7 @@ class Child:
         self.hangs = False
         self._timer: threading.Timer | None = None
         self.process = subprocess.Popen(
-            _limited(command, limits.memory, max_file), start_new_session=POSIX, **files
+            _limit_command(command, limits.memory, max_file), start_new_session=POSIX, **files
         )
         self._inherited = peak_of("self")
 
@@ -130,7 +130,7 @@ def peak_of(process: int | str) -> int:
     return 0
 
 
-def _limited(command: Sequence[str], memory: int, max_file: int) -> list[str]:
+def _limit_command(command: Sequence[str], memory: int, max_file: int) -> list[str]:
     if not POSIX:
         return list(command)
     data = str(memory // 1024) if memory else "unlimited"
@@ -149,7 +149,7 @@ class Once:
     def ask(self, arguments: Sequence[str], data: Path | bytes, max_output: int) -> Answer:
         started = time.monotonic()
         with (
-            _stored(data) as stdin,
+            _store_bytes(data) as stdin,
             tempfile.TemporaryFile() as output,
             tempfile.TemporaryFile() as errors,
         ):
@@ -194,7 +194,7 @@ def excess(child: Child, peak: int, written: int, max_output: int) -> tuple[str,
     return "", ""
 
 
-def _stored(data: Path | bytes) -> IO[bytes]:
+def _store_bytes(data: Path | bytes) -> IO[bytes]:
     if isinstance(data, Path):
         return data.open("rb")
     file = tempfile.TemporaryFile()  # noqa: SIM115 - the caller closes it

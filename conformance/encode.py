@@ -98,7 +98,7 @@ def try_encoder(
     found = [task for tasks in spread(_tasks, wanted, decoder, jobs) for task in tasks]
     unique = {(task.content, task.skeleton, task.format): task for task in found}
     with tempfile.TemporaryDirectory() as folder:
-        paths = _stored(Path(folder), unique.values())
+        paths = _store_skeletons(Path(folder), unique.values())
 
         def work(pair: Pair, task: Task) -> Result:
             return _encode(pair, task, paths)
@@ -109,7 +109,7 @@ def try_encoder(
         return list(spread(work, list(unique.values()), start, jobs))
 
 
-def _stored(folder: Path, tasks: Iterable[Task]) -> dict[bytes, Path]:
+def _store_skeletons(folder: Path, tasks: Iterable[Task]) -> dict[bytes, Path]:
     """A file of each skeleton, before several processes read it."""
     skeletons = dict.fromkeys(task.skeleton for task in tasks if task.skeleton is not None)
     paths = {content: folder / f"{number}.asf" for number, content in enumerate(skeletons)}
@@ -155,7 +155,7 @@ def _encode(pair: Pair, task: Task, paths: Mapping[bytes, Path]) -> Result:
     first = pair.encoder.ask(arguments, task.content, limit)
     if first.code == UNSUPPORTED and not first.fault:
         return Result(task, declined=True, seconds=first.seconds)
-    fault = _encoder_fault(first) or _restored(pair.decoder, task, first.output)
+    fault = _encoder_fault(first) or _check_restored(pair.decoder, task, first.output)
     second = first if fault else pair.encoder.ask(arguments, task.content, limit)
     fault = fault or _encoder_fault(second)
     same = second.output == first.output
@@ -171,7 +171,7 @@ def _encoder_fault(answer: Answer) -> Fault | None:
     return Fault(kind, f"exit {answer.code}: {last}")
 
 
-def _restored(decoder: Asker, task: Task, data: bytes) -> Fault | None:
+def _check_restored(decoder: Asker, task: Task, data: bytes) -> Fault | None:
     """Fault of the .mcz ``data``, None if it restores the source file."""
     limit = len(task.content) + len(task.skeleton or b"") + SPARE_OUTPUT
     decoded = decoder.ask([], data, 2**30)

@@ -60,7 +60,7 @@ def document(report: Report) -> dict[str, Any]:
         ],
     }
     if report.results is not None:
-        found["encoder"] = [_encoded(result) for result in report.results]
+        found["encoder"] = [_encoder_row(result) for result in report.results]
     return found
 
 
@@ -78,7 +78,7 @@ def _row(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _encoded(result: Result) -> dict[str, Any]:
+def _encoder_row(result: Result) -> dict[str, Any]:
     return {
         "file": result.task.vector["file"],
         "source": result.task.name,

@@ -76,7 +76,7 @@ def judge(request: Request, code: int, output: bytes) -> Fault | None:
     if code != OK:
         return None
     try:
-        _compare(listed(output, request.listing), request)
+        _compare(parse_output(output, request.listing), request)
     except Wrong as wrong:
         return wrong.fault
     return None
@@ -122,7 +122,7 @@ def _first_difference(got: list[Any], wanted: list[Any], listing: str) -> str:
     )
 
 
-def listed(output: bytes, listing: str) -> list[dict[str, Any]]:
+def parse_output(output: bytes, listing: str) -> list[dict[str, Any]]:
     """The rows of a decoder's ``output``, each with the hash of its bytes; Wrong if bad."""
     rows, body = listing_of(output, listing)
     found, at = [], 0

@@ -113,7 +113,7 @@ def spread(
 
     pool = ThreadPoolExecutor(len(askers))
     try:
-        yield from _shown(pool.map(one, items), len(items))
+        yield from _show_progress(pool.map(one, items), len(items))
     except BaseException:  # an interrupt, too: nothing may be left running
         pool.shutdown(wait=False, cancel_futures=True)
         for asker in askers:
@@ -125,7 +125,7 @@ def spread(
             asker.close()
 
 
-def _shown(results: Iterable[Result], total: int) -> Iterator[Result]:
+def _show_progress(results: Iterable[Result], total: int) -> Iterator[Result]:
     """``results``, counted on a terminal."""
     shows = sys.stderr.isatty()
     for done, result in enumerate(results, 1):

@@ -33,7 +33,7 @@ class Server:
     def ask(self, arguments: Sequence[str], data: Path | bytes, max_output: int) -> Answer:
         started = time.monotonic()
         content = data if isinstance(data, bytes) else data.read_bytes()
-        child = self._running()
+        child = self._start_child()
         said = size_of(self._errors)
         child.watch()
         try:
@@ -43,12 +43,12 @@ class Server:
             if fault:
                 self._stop()
         except _Lost as lost:
-            code, fault, detail = self._lost(child, lost)
+            code, fault, detail = self._lost_answer(child, lost)
             output = b""
         errors = tail(self._errors, said)
         return Answer(code, output, errors, time.monotonic() - started, fault, detail)
 
-    def _running(self) -> Child:
+    def _start_child(self) -> Child:
         if self._child is None:
             pipe = subprocess.PIPE
             self._child = Child(
@@ -61,7 +61,7 @@ class Server:
             )
         return self._child
 
-    def _lost(self, child: Child, lost: _Lost) -> tuple[int, str, str]:
+    def _lost_answer(self, child: Child, lost: _Lost) -> tuple[int, str, str]:
         """Exit code, fault and detail of a process that gave no answer."""
         if lost.args:  # it is there, but what it says is no use
             child.unwatch()

@@ -31,7 +31,9 @@ def parts_of(data: bytes) -> Parts:
 
 def join_parts(parts: Parts) -> bytes:
     """The file of these chunks, without an index."""
-    return repair.joined([*(replace(piece, payload=data) for piece, data in parts), Piece(b"FOOT")])
+    return repair.join_pieces(
+        [*(replace(piece, payload=data) for piece, data in parts), Piece(b"FOOT")]
+    )
 
 
 def replace_payload(parts: Parts, which: int, payload: bytes) -> Parts:

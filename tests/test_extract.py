@@ -31,7 +31,7 @@ from tests import overlap_codec
 from tests.commands import run
 from tests.motions import rich, smooth
 from tests.repair import flip_bit, flips, join_parts, parts_of, replace_payload, use
-from tools.records import built, update
+from tools.records import build_record, update
 
 JOINTS = ("hips", "spine", "fixed", "knee")
 
@@ -286,7 +286,7 @@ def test_all_clips_are_cut_alike_and_the_rest_is_kept() -> None:
     out = io.BytesIO()
     writer = Writer(out, head_extension=b"later")
     writer.ancillary(b"abCD", b"before all clips")
-    writer.shared(b"MODL", built(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
+    writer.shared(b"MODL", build_record(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
     writer.attachment("notes.txt", b"kept")
     writer.alias("more.txt", payloads.OF_ATTACHMENT, b"notes.txt")
     for name in ("a", "b"):
@@ -553,8 +553,8 @@ def clip_with(
         cend = parse(payloads.Cend, parts[end][1], "CEND")
         cend.missing, fields.time_base.missing = fields.time_base.missing, []
         assert cend.missing
-        parts = replace_payload(parts, end, built(payloads.Cend, cend, "CEND"))
-    return join_parts(replace_payload(parts, which, built(payloads.Clip, fields, "CLIP")))
+        parts = replace_payload(parts, end, build_record(payloads.Cend, cend, "CEND"))
+    return join_parts(replace_payload(parts, which, build_record(payloads.Clip, fields, "CLIP")))
 
 
 def test_a_clip_without_an_end_shows_what_is_there() -> None:

@@ -17,7 +17,14 @@ from tools.fuzz import __main__ as command
 from tools.fuzz import differential, files, guard, readers
 from tools.fuzz.guard import BrokenError, HangError, Record
 from tools.fuzz.mutation import STEPS, WEIGHTS, Mutation, plain_change
-from tools.fuzz.repair import joined, pieces_of, table_of, with_hashes, with_header, with_streams
+from tools.fuzz.repair import (
+    join_pieces,
+    pieces_of,
+    table_of,
+    with_hashes,
+    with_header,
+    with_streams,
+)
 from tools.fuzz.seeds import VECTORS
 from tools.fuzz.targets import TARGETS
 
@@ -49,7 +56,7 @@ def vectors() -> list[Path]:
 def test_what_is_taken_apart_goes_together_again(path: Path) -> None:
     data = path.read_bytes()
     pieces = pieces_of(data)
-    assert joined(pieces) == data
+    assert join_pieces(pieces) == data
     assert with_hashes(data) == data
     for piece in pieces:
         if piece.type == b"DATA" and piece.packets is None:
@@ -68,7 +75,9 @@ def test_hashes_are_those_of_what_is_decoded() -> None:
     stream = bytearray(table.streams[-1])
     stream[-1] ^= 1
     payload = with_streams(pieces[which].payload, table, [*table.streams[:-1], bytes(stream)])
-    changed = joined([*pieces[:which], type(pieces[0])(b"DATA", 0, payload), *pieces[which + 1 :]])
+    changed = join_pieces(
+        [*pieces[:which], type(pieces[0])(b"DATA", 0, payload), *pieces[which + 1 :]]
+    )
     with pytest.raises(mcz.ChecksumError, match="value hash"):
         use(changed)
     use(with_hashes(changed))
@@ -83,11 +92,11 @@ def test_steps_change_files_behind_their_checksums(step: object) -> None:
         rng = random.Random(seed)
         data = path.read_bytes()
         pieces = step(Mutation(rng, plain_change(rng)), pieces_of(data))  # type: ignore[operator]
-        if pieces is None or joined(pieces) == data:
+        if pieces is None or join_pieces(pieces) == data:
             continue
         changed += 1
         try:
-            scan(open_source(joined(pieces)))
+            scan(open_source(join_pieces(pieces)))
         except mcz.ChecksumError as error:
             assert "crc of packet" in str(error)  # of a packet that is now another frame
         except mcz.MczError as error:
@@ -131,7 +140,7 @@ def test_properties_can_break(monkeypatch: pytest.MonkeyPatch) -> None:
         return values + 1, mask
 
     monkeypatch.setattr(files, "_whole", wrong)
-    monkeypatch.setattr(files, "_salvaged", lambda *_: None)  # it would break for some of them
+    monkeypatch.setattr(files, "_check_salvage", lambda *_: None)  # it would break for some of them
     with pytest.raises(BrokenError, match="a part differs"):
         for data in some:  # which part is drawn from the bytes
             files.check_decoder(data)
@@ -181,7 +190,7 @@ def test_a_hang_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert finding.startswith("HangError")
     assert count == 1
     with pytest.raises(HangError):
-        guard.timed(forever, b"")
+        guard.call_in_time(forever, b"")
 
 
 def test_memory_is_limited() -> None:

@@ -20,7 +20,7 @@ def test_ordinals_are_those_that_the_text_says() -> None:
 
 
 def test_lines_of_the_text_are_those_of_the_decoder() -> None:
-    assert "\n".join([*LINES, ""]) == spec_trace.traced()
+    assert "\n".join([*LINES, ""]) == spec_trace.trace_bits()
     bits = [line.split() for line in LINES if line[:3].strip().isdigit()]
     assert len(bits) >= 10
     assert [int(bit[0]) for bit in bits] == list(range(1, len(bits) + 1))

@@ -47,7 +47,7 @@ from mcz.model.schema import build, parse
 from tests import live_codec
 from tests.clocked_files import bvh
 from tests.repair import flip_bit, parts_of, use
-from tools.records import built
+from tools.records import build_record
 
 NAMES = ("a", "b", "c")
 CODECS = {
@@ -738,7 +738,7 @@ def test_behind_a_gap_among_several_signals_numbers_are_not_known() -> None:
     clip = repeated_chunks(opening.removeprefix(SIGNATURE), 0)[-1]
     fields = parse(payloads.Clip, clip.payload, "CLIP")
     fields.signals.append(replace(fields.signals[0], role=0))
-    two = build_chunk(b"CLIP", built(payloads.Clip, fields, "CLIP"))
+    two = build_chunk(b"CLIP", build_record(payloads.Clip, fields, "CLIP"))
     other = build_segment(SegmentHeader(1, 0, 1), [bytes([2] * 9)])
     chunk = [
         told(0),

@@ -17,7 +17,7 @@ from tests.codecs.cases import CASES
 from tests.commands import run
 from tests.motions import smooth
 from tools import known_answers as maker
-from tools.vectors.engine.edits import edited
+from tools.vectors.engine.edits import edit_file
 
 WRONG = 'CEND.value_sha256.0 = "vvvvvvvvvvvvvvvvvvvvvvvvvvvvvvvv"'
 OPTIONAL = {"raw", "fast"}
@@ -28,7 +28,7 @@ def wrong_hash_file(codec: str) -> bytes:
     """A clip whose hash is that of other values."""
     out, case = BytesIO(), CASES[codec]
     mcz.write(smooth(12), out, codec, **case.params)
-    return edited(out.getvalue(), [WRONG])
+    return edit_file(out.getvalue(), [WRONG])
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -55,7 +55,7 @@ def wrong(tmp_path: Path, samples: Path) -> Path:
     """A clip of a BVH whose hash is that of other values; its source is right."""
     path = tmp_path / "walk.mcz"
     mcz.encode(samples / "walk.bvh", path)
-    path.write_bytes(edited(path.read_bytes(), [WRONG]))
+    path.write_bytes(edit_file(path.read_bytes(), [WRONG]))
     return path
 
 

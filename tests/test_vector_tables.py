@@ -14,7 +14,7 @@ from tests.test_spec import SPEC
 from tools.vectors.bases import base_bytes
 from tools.vectors.build import by_hand
 from tools.vectors.engine import tables
-from tools.vectors.engine.edits import edited
+from tools.vectors.engine.edits import edit_file
 from tools.vectors.engine.notation import read_bytes
 
 DANCE = base_bytes("dance(8)", {"segment_frames": 3})
@@ -58,14 +58,14 @@ def test_no_notation() -> None:
     ],
 )
 def test_files_are_repaired_behind_an_edit(edit: str) -> None:
-    with mcz.open(edited(DANCE, [edit])) as archive:
+    with mcz.open(edit_file(DANCE, [edit])) as archive:
         assert archive["dance"].n_frames == 8
 
 
 @pytest.mark.parametrize("edit", ["drop CEND", "DATA#1.first = 4", "DATA:[-1] ^= 01"])
 def test_faults_stay(edit: str, tmp_path: Path) -> None:
     path = tmp_path / "faulty.mcz"
-    path.write_bytes(edited(DANCE, [edit]))
+    path.write_bytes(edit_file(DANCE, [edit]))
     with pytest.raises(MczError):
         mcz.read(path)
 
@@ -73,7 +73,7 @@ def test_faults_stay(edit: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("edit", ["CLIP", "drop CLIP#1", "copy", "CLIP.nobody = 00", "DATA#9 ="])
 def test_edits_of_what_is_not_there(edit: str) -> None:
     with pytest.raises((ValueError, KeyError)):
-        edited(DANCE, [edit])
+        edit_file(DANCE, [edit])
 
 
 @pytest.mark.parametrize(

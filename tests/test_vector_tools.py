@@ -117,7 +117,7 @@ def test_every_invalid_vector_has_a_fault() -> None:
 def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     names = ["valid/raw/plain", "valid/raw/widths", "uncommon/container/open-clip"]
     monkeypatch.setattr(requirements, "ARGUED", {})
-    monkeypatch.setattr(requirements, "caught", dict)
+    monkeypatch.setattr(requirements, "read_catches", dict)
     monkeypatch.setattr(requirements, "table_rows", dict)
     monkeypatch.setattr(requirements, "VECTORS", {"RAW-01": ("valid/*",), "A-02": ("*/plain",)})
     assert requirements.requirements(names) == {

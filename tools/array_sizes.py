@@ -26,7 +26,7 @@ ZSTD = {"codec": blosc2.Codec.ZSTD, "clevel": 9, "filters": [blosc2.Filter.SHUFF
 NAMES = ("npz", "npz_compressed", "xz -9e", "blosc2", "pcodec", *EFFORTS)
 
 
-def compressed(arrays: dict[str, Any]) -> int:
+def compressed_size(arrays: dict[str, Any]) -> int:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.tell()
@@ -56,7 +56,7 @@ def measure(path: Path, folder: Path, times: dict[str, float]) -> dict[str, int]
         arrays = {name: file[name] for name in file.files}
     sizes = {
         "npz": len(data),
-        "npz_compressed": compressed(arrays),
+        "npz_compressed": compressed_size(arrays),
         "xz -9e": len(lzma.compress(data, preset=9 | lzma.PRESET_EXTREME)),
         "blosc2": sum(map(blosc, arrays.values())),
         "pcodec": sum(map(pco, arrays.values())),

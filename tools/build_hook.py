@@ -37,7 +37,7 @@ class Hook(BuildHookInterface):  # type: ignore[type-arg]
         """Zig, where there is no compiler and Zig can be fetched."""
         if self.target_name != "wheel" or MODE == "interpreted":
             return []
-        compiling = self._compiling()
+        compiling = self._import_compiling()
         if compiling.compiler() or not compiling.has_headers():
             return []
         return ["ziglang>=0.13"] if MODE or can_fetch("ziglang") else []
@@ -62,7 +62,7 @@ class Hook(BuildHookInterface):  # type: ignore[type-arg]
     def _add_kernels(self, version: str, build_data: dict[str, Any]) -> None:
         mode = MODE or "compiled"
         inside = f"mcz/kernels/{mode}"
-        compiling = self._compiling()
+        compiling = self._import_compiling()
         folder, kept = Path(self.root, inside), compiling.KEPT
         if version != "editable":
             self.temporary = tempfile.TemporaryDirectory()
@@ -79,7 +79,7 @@ class Hook(BuildHookInterface):  # type: ignore[type-arg]
         if version != "editable":
             build_data["force_include"].update({str(p): f"{inside}/{p.name}" for p in made})
 
-    def _compiling(self) -> Any:
+    def _import_compiling(self) -> Any:
         if self.root not in sys.path:
             sys.path.insert(0, self.root)
         from tools.kernels import compiling

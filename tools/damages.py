@@ -70,7 +70,7 @@ def bursts_beyond(data: bytearray, has: mcz.Protection, chance: random.Random) -
 
 
 @contextmanager
-def timed(times: list[float]) -> Iterator[None]:
+def measure_time(times: list[float]) -> Iterator[None]:
     start = time.perf_counter()
     yield
     times.append(time.perf_counter() - start)
@@ -86,7 +86,7 @@ def within(whole: bytes, has: mcz.Protection, work: Path, runs: int, chance: ran
         n = runs // len(WITHIN)
         for _ in range(n):
             (work / "bad.mcz").write_bytes(kind(bytearray(whole), has, chance))
-            with timed(times):
+            with measure_time(times):
                 report = mcz.repair(work / "bad.mcz", work / "out.mcz", force=True)
             found = hashlib.sha256((work / "out.mcz").read_bytes()).digest()
             n_good += report.restored and found == wanted
@@ -131,7 +131,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         work, times = Path(folder), list[float]()
         shutil.copyfile(given.file, work / "whole.mcz")
-        with timed(times):
+        with measure_time(times):
             (has,) = mcz.protect(work / "whole.mcz", given.redundancy)
         print(f"{has}, made in {times[0]:.2f} s")
         whole = (work / "whole.mcz").read_bytes()

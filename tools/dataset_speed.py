@@ -28,7 +28,7 @@ WINDOW = 64
 FIELDS = "rot6d,positions,root"
 
 
-def packed(folder: Path, target: Path, copies: int) -> None:
+def pack_copies(folder: Path, target: Path, copies: int) -> None:
     """One archive a copy: the same bytes under other names would be found as duplicates."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -50,17 +50,17 @@ def windows_a_second(
     return done / (time.perf_counter() - start)
 
 
-def decoded(count: list[int]) -> Callable[[], None]:
+def count_decoded(count: list[int]) -> Callable[[], None]:
     """Count the frames that are decoded, from now on; returns what stops it."""
     from mcz.files.reading.signal_reader import SignalReader
 
     whole = SignalReader._decode
 
-    def counting(self: Any, spans: Any, start: int, stop: int) -> Any:
+    def count_read(self: Any, spans: Any, start: int, stop: int) -> Any:
         count[0] += stop - start
         return whole(self, spans, start, stop)
 
-    SignalReader._decode = counting  # type: ignore[method-assign]
+    SignalReader._decode = count_read  # type: ignore[method-assign]
 
     def stop() -> None:
         SignalReader._decode = whole  # type: ignore[method-assign]
@@ -88,7 +88,7 @@ def of_mcz(folder: Path, n_windows: int) -> None:
         for name, numbers in orders.items():
             data = mcz.dataset(folder, fields, **arguments)
             count = [0]
-            stop = decoded(count)
+            stop = count_decoded(count)
             numbers = numbers[:n_windows]
             rate = windows_a_second(data.__getitem__, numbers)
             stop()
@@ -218,7 +218,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         for part in ("one", "many", "arrays"):
             (Path(name) / part).mkdir()
-        packed(given.folder, Path(name) / "one", 1)
+        pack_copies(given.folder, Path(name) / "one", 1)
         of_arrays(Path(name) / "one", Path(name) / "arrays", given.windows)
         for copy in range(given.copies):
             data = (Path(name) / "one" / "0.mcz").read_bytes()

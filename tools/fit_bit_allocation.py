@@ -58,7 +58,7 @@ def _n_points(clip: Clip) -> int:
         return 0
 
 
-def fitted(clips: Sequence[Clip]) -> Fit | None:
+def fit_clips(clips: Sequence[Clip]) -> Fit | None:
     """Prints what each clip gives."""
     points: list[Point] = []
     for clip in clips:
@@ -92,7 +92,7 @@ def main(*paths: str) -> None:
     for kind, what in GROUPS.items():
         clips = list(training_clips(cases, kind))
         print(f"{what}: {len(clips)} clips")
-        found = fitted(clips)
+        found = fit_clips(clips)
         if found is None:
             print("  too few points for a fit")
             continue

@@ -77,7 +77,7 @@ def row(vector: Vector, ids: Sequence[str] = (), fault: Fault | None = None) -> 
         "sha256": _hash(vector.data),
         "exit": list(vector.exit),
         "modes": list(vector.modes),
-        "expected": _expected(vector),
+        "expected": _expected_modes(vector),
     }
     if "sources" in vector.modes:
         fields["formats"] = formats_of(vector)
@@ -87,22 +87,22 @@ def row(vector: Vector, ids: Sequence[str] = (), fault: Fault | None = None) -> 
         fields["seed"] = vector.seed
     if vector.parts:
         fields["parts"] = [
-            {"arguments": list(arguments), "arrays": _listed(arrays)}
+            {"arguments": list(arguments), "arrays": _array_rows(arrays)}
             for arguments, arrays in vector.parts
         ]
     return fields
 
 
-def _expected(vector: Vector) -> dict[str, Any]:
+def _expected_modes(vector: Vector) -> dict[str, Any]:
     if OK not in vector.exit:
         return {"refusal": "invalid" if REFUSED in vector.exit else "unsupported"}
     return {
-        mode: _listed(vector.arrays) if mode == "arrays" else _sources(vector.sources)
+        mode: _array_rows(vector.arrays) if mode == "arrays" else _sources(vector.sources)
         for mode in vector.modes
     }
 
 
-def _listed(arrays: Sequence[tuple[dict[str, Any], bytes]]) -> list[dict[str, Any]]:
+def _array_rows(arrays: Sequence[tuple[dict[str, Any], bytes]]) -> list[dict[str, Any]]:
     return [fields | {"sha256": _hash(data)} for fields, data in arrays]
 
 

@@ -41,7 +41,7 @@ def counting_learn_small(state: Ints, context: int, target: int) -> None:
     state[len(state) // 3 * (2 if target else 1) + context] += 1
 
 
-def tripled(states: Ints) -> Ints:
+def triple_states(states: Ints) -> Ints:
     return np.concatenate([states, np.zeros(2 * len(states), np.int64)])
 
 
@@ -52,10 +52,10 @@ class Counting:
         fresh = row_coder.fresh_coder
         decision_kernels.learn_bit = counting_learn
         mixing._learn = counting_learn_small
-        segment.fresh_coder = lambda start: tripled(fresh(start))
+        segment.fresh_coder = lambda start: triple_states(fresh(start))
         row_coder.make_model = self.make_model
 
     def make_model(self, classes: Ints, start: Start, coder: Ints, prior: Prior | None) -> Model:
         model = make_model(classes, start, coder, prior)
-        self.model = model._replace(slots=tripled(model.slots))
+        self.model = model._replace(slots=triple_states(model.slots))
         return self.model

@@ -59,7 +59,7 @@ def _inner(type_: Any) -> Any:
     return type_.thensubcon if isinstance(type_, construct.IfThenElse) else type_.subcon
 
 
-def built(kind: type[Record], fields: Any, where: str) -> bytes:
+def build_record(kind: type[Record], fields: Any, where: str) -> bytes:
     """The bytes of the record of kind ``kind`` with these fields."""
     return build(record_of(kind, fields), where)
 

@@ -43,15 +43,17 @@ def registry(text: str) -> dict[str, Any]:
     parts = PARTS.read_text("utf-8")
     return {
         "format_version": version[1],
-        "identification": _keyed(
+        "identification": _rows_by_column(
             rows_after(text, "**Identification**"), "what", "value", "meaning"
         ),
-        "chunk_types": _keyed(rows_after(text, "**Chunk types.**"), "type", "flags", "meaning"),
+        "chunk_types": _rows_by_column(
+            rows_after(text, "**Chunk types.**"), "type", "flags", "meaning"
+        ),
         "profiles": [
             {"id": id_, "name": name, "limits": {row[0]: _number(row[at]) for row in limits}}
             for id_, name, at in ((0, "base", 2), (1, "large", 3), (2, "small", 1))
         ],
-        "codecs": _keyed(
+        "codecs": _rows_by_column(
             rows_after(text, "## Codecs\n"),
             *("id", "name", "version", "decodes", "groups", "resolutions", "presets"),
         ),
@@ -60,33 +62,35 @@ def registry(text: str) -> dict[str, Any]:
             for row in rows_after(text, "## Codecs\n")
             for id_, name in enumerate(filter(None, row[6].split(", ")), 1)
         ],
-        "point_sets": _keyed(rows_after(text, "**Points.**"), "id", "of", "points"),
-        "source_formats": _keyed(
+        "point_sets": _rows_by_column(rows_after(text, "**Points.**"), "id", "of", "points"),
+        "source_formats": _rows_by_column(
             rows_after(text, "## Source reconstruction\n"),
             *("name", "id", "suffixes", "template", "detail", "frame_notes", "restored_from"),
         ),
-        "roles": _keyed(rows_after(text, "**Roles of signals**"), "id", "name", "meaning"),
+        "roles": _rows_by_column(rows_after(text, "**Roles of signals**"), "id", "name", "meaning"),
         "channel_kinds": list(_kinds(rows_after(text, "**Channel kinds**"))),
-        "metadata_keys": _keyed(
+        "metadata_keys": _rows_by_column(
             rows_after(text, "**Metadata keys**"), "key", "value", "type", "dublin_core", "others"
         ),
-        "cut_keys": _keyed(rows_after(parts, "## Keys of cuts\n"), "key", "value"),
-        "edit_keys": _keyed(rows_after(parts, "## Keys of replaced joints\n"), "key", "value"),
+        "cut_keys": _rows_by_column(rows_after(parts, "## Keys of cuts\n"), "key", "value"),
+        "edit_keys": _rows_by_column(
+            rows_after(parts, "## Keys of replaced joints\n"), "key", "value"
+        ),
         "metrics": [
             {"id": name, "unit": unit, "meaning": meaning}
             for page, heading in zip(MEASURES, ("## Metrics\n", "# Contacts\n"), strict=True)
             for names, unit, meaning in rows_after(page.read_text("utf-8"), heading)
             for name in names.split(", ")
         ],
-        "bases": _keyed(
+        "bases": _rows_by_column(
             rows_after(text, "Some models are well known."), "name", "annex", "id", "meaning"
         ),
-        "wavelets": _keyed(rows_after(text, "## Wavelets\n"), "id", "name", "taps"),
-        "annexes": _keyed(rows_after(text, "**Annexes**"), "file", "sha256", "meaning"),
+        "wavelets": _rows_by_column(rows_after(text, "## Wavelets\n"), "id", "name", "taps"),
+        "annexes": _rows_by_column(rows_after(text, "**Annexes**"), "file", "sha256", "meaning"),
     }
 
 
-def _keyed(rows: Rows, *names: str) -> list[dict[str, Any]]:
+def _rows_by_column(rows: Rows, *names: str) -> list[dict[str, Any]]:
     """Each row by the names of its columns; whole numbers as such."""
     return [
         {name: int(cell) if cell.isdigit() else cell for name, cell in zip(names, row, strict=True)}

@@ -29,7 +29,7 @@ MCZ = [sys.executable, "-c", "from mcz.cli.main import main; main()"]
 PYTHON = [sys.executable, "-c"]
 
 
-def measured(what: str, command: list[str], times: int = 1) -> None:
+def measure(what: str, command: list[str], times: int = 1) -> None:
     """Run a command, and print a row for the fastest of so many times."""
     best: tuple[float, float, float] | None = None
     for _ in range(times):
@@ -66,30 +66,30 @@ def local(folder: Path, work: Path, jobs: int, options: list[str]) -> None:
     share = ["--jobs", str(jobs)]
     work.mkdir(parents=True, exist_ok=True)
     print(f"{'':44} {'wall':>10} {'CPU':>10} {'memory':>12}")
-    measured("pack", [*MCZ, "pack", str(folder), file, *share, *options])
+    measure("pack", [*MCZ, "pack", str(folder), file, *share, *options])
     take = ["--match", "{path}", "--take", "subject,session,description"]
     with_sizes(archive)
-    measured("meta --from (3 keys of each clip)", [*MCZ, "meta", file, "--from", str(table), *take])
-    measured("open", [*PYTHON, OPEN, file], 3)
-    measured("100 frames of one clip", [*PYTHON, PART, file], 3)
-    measured("list", [*MCZ, "list", file], 3)
+    measure("meta --from (3 keys of each clip)", [*MCZ, "meta", file, "--from", str(table), *take])
+    measure("open", [*PYTHON, OPEN, file], 3)
+    measure("100 frames of one clip", [*PYTHON, PART, file], 3)
+    measure("list", [*MCZ, "list", file], 3)
     columns = "name,subject,description"
-    measured(f"list --columns {columns}", [*MCZ, "list", file, "--columns", columns], 3)
+    measure(f"list --columns {columns}", [*MCZ, "list", file, "--columns", columns], 3)
     query = "subject == '003' and duration > 2"
-    measured("list --where, of subject and duration", [*MCZ, "list", file, "--where", query], 3)
-    measured("append of one", [*MCZ, "append", str(one_more(folder, work)), file])
+    measure("list --where, of subject and duration", [*MCZ, "list", file, "--where", query], 3)
+    measure("append of one", [*MCZ, "append", str(one_more(folder, work)), file])
     some = ["--where", "subject == '003'", "--force"]
-    measured("unpack of 100", [*MCZ, "unpack", file, str(work / "some"), *some])
-    measured("verify --quick", [*MCZ, "verify", file, "--quick"])
-    measured("verify", [*MCZ, "verify", file, *share])
-    measured("protect, 5 %", [*MCZ, "protect", file])
-    measured("append of one, and its recovery data", appended_again(folder, work, file))
-    measured("delete of one", [*MCZ, "delete", file, "one more"])
+    measure("unpack of 100", [*MCZ, "unpack", file, str(work / "some"), *some])
+    measure("verify --quick", [*MCZ, "verify", file, "--quick"])
+    measure("verify", [*MCZ, "verify", file, *share])
+    measure("protect, 5 %", [*MCZ, "protect", file])
+    measure("append of one, and its recovery data", append_command(folder, work, file))
+    measure("delete of one", [*MCZ, "delete", file, "one more"])
     with_sizes(archive)
     shutil.rmtree(work / "some")
 
 
-def appended_again(folder: Path, work: Path, file: str) -> list[str]:
+def append_command(folder: Path, work: Path, file: str) -> list[str]:
     again = work / "again.bvh"
     again.write_bytes(one_more(folder, work).read_bytes() + b"\n")
     return [*MCZ, "append", str(again), file]

@@ -155,10 +155,10 @@ def contents(text: str) -> str:
             blocks += [[f"**{link}**"], []]
         else:
             blocks[-1].append(link)
-    return "\n".join("\n" + _wrapped(block) for block in blocks if block).strip() + "\n"
+    return "\n".join("\n" + _wrap_links(block) for block in blocks if block).strip() + "\n"
 
 
-def _wrapped(links: list[str]) -> str:
+def _wrap_links(links: list[str]) -> str:
     """The links as a paragraph; none is broken over two lines."""
     lines = [""]
     for link in links:
@@ -173,17 +173,17 @@ def anchor(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
-def generated(text: str) -> str:
+def generate(text: str) -> str:
     """``text`` with every marked table, the traced stream and the contents made anew."""
     known = structures()
     text = MARK.sub(lambda match: match[1] + table(known[match[2]]), text)
-    text = TRACE.sub(lambda match: match[1] + spec_trace.traced() + match[2], text)
+    text = TRACE.sub(lambda match: match[1] + spec_trace.trace_bits() + match[2], text)
     return CONTENTS.sub(lambda match: f"{match[1]}{contents(match[4])}{match[3]}{match[4]}", text)
 
 
 def main() -> int:
     text = SPEC.read_text()
-    fresh = generated(text)
+    fresh = generate(text)
     if "--check" in sys.argv[1:]:
         if fresh != text:
             print("SPEC.md: a table, the contents or the trace is old; run tools/spec_tables.py")

@@ -95,7 +95,7 @@ class Decoder:
             value = 2 * value + self.decode(32768)[0]
         return value
 
-    def mixed(self, kind: int, places: tuple[int, int, int], more: int = 0) -> int:
+    def mix_bit(self, kind: int, places: tuple[int, int, int], more: int = 0) -> int:
         """A bit of ``kind`` from its contexts at these places; of MORE, ``more`` mixers on."""
         contexts = [kind + place for place in places]
         mixer = MIXERS[kind] + more
@@ -123,16 +123,16 @@ class Decoder:
         bf, bs = (0 if k < 28 else (k - 24) // 4 for k in (kf, ks))
         q = clamp(near + 3, 0, 7)
         base = max(0, min(bf, bs) - 2)
-        if base > 0 and self.mixed(BELOW, (cf, 32 + cs, 64 + q)):
+        if base > 0 and self.mix_bit(BELOW, (cf, 32 + cs, 64 + q)):
             n = base - 1
-            while n > 0 and self.mixed(LESS, (min(base - n, 15), 16 + cf, 48 + cs)):
+            while n > 0 and self.mix_bit(LESS, (min(base - n, 15), 16 + cf, 48 + cs)):
                 n -= 1
         else:
             n = base
             while True:
                 x, y = clamp(n - bf + 4, 0, 23), clamp(n - bs + 4, 0, 23)
                 third = 1536 + 48 * q + 2 * x + int(bf > bs)
-                if not self.mixed(MORE, (24 * cf + x, 768 + 24 * cs + y, third), min(x, 11)):
+                if not self.mix_bit(MORE, (24 * cf + x, 768 + 24 * cs + y, third), min(x, 11)):
                     break
                 n += 1
         if n == 0:
@@ -140,18 +140,18 @@ class Decoder:
         x, y, e = clamp(n - bf + 4, 0, 15), clamp(n - bs + 4, 0, 15), min(n, 31)
         v = 1
         if n > 1:
-            v = 2 + self.mixed(SECOND, (4 * x + kf % 4, 64 + 4 * y + ks % 4, 128 + e))
+            v = 2 + self.mix_bit(SECOND, (4 * x + kf % 4, 64 + 4 * y + ks % 4, 128 + e))
         if n > 2:
             b = v % 2
             places = 8 * x + 2 * (kf % 4) + b, 128 + 8 * y + 2 * (ks % 4) + b, 256 + 2 * e + b
-            v = 2 * v + self.mixed(THIRD, places)
+            v = 2 * v + self.mix_bit(THIRD, places)
         if n > 3:
             v = v * 2 ** (n - 3) + self.number(n - 3)
-        side = self.mixed(SIDE, (side1, 3 + 3 * side1 + side2, 12 + other))
+        side = self.mix_bit(SIDE, (side1, 3 + 3 * side1 + side2, 12 + other))
         return -v if side == 1 else v
 
 
-def bounded(v: float) -> float:
+def bound(v: float) -> float:
     return v if -LIMIT < v < LIMIT else 0.0
 
 
@@ -165,7 +165,7 @@ class Regression:
         total = 0.0
         for w, one in zip(self.w, f, strict=True):
             total = total + w * one
-        return bounded(total)
+        return bound(total)
 
     def learn(self, f: list[float], target: float, guess: float, r: int) -> None:
         e = target - guess
@@ -221,7 +221,7 @@ class Channel:
             for two in o[i:]:
                 now, before = one.level[0] * two.level[0], one.level[1] * two.level[1]
                 quadratic.append((now - before) * 64)
-        p = bounded((16 >> 5) / self.unit)
+        p = bound((16 >> 5) / self.unit)
         return linear, quadratic, [self.linear.value(linear), self.quadratic.value(quadratic), p]
 
     def decode(self, decoder: Decoder, r: int, near: int, other: int) -> tuple[Step, int]:
@@ -306,7 +306,7 @@ def rows() -> Iterator[list[Step]]:
         yield steps
 
 
-def traced() -> str:
+def trace_bits() -> str:
     """The bits of the first rows, what comes of them, and the figures of a later one."""
     head = "bit  name    contexts        p of these         mixer  one    low      high     code"
     out = [f"{head}      middle    bit"]

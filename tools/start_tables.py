@@ -20,7 +20,7 @@ class Kept(np.ndarray):
         return self.view(np.ndarray)
 
 
-def untrained(state: np.ndarray) -> np.ndarray:
+def reset_state(state: np.ndarray) -> np.ndarray:
     """``state`` without knowledge: even weights, even probabilities, counts of 0."""
     state = state.copy()
     state[mixing.WEIGHTS : mixing.MODELS] = 26214

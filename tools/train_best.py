@@ -20,7 +20,7 @@ from mcz.codecs.coding.start_states import start_states
 from mcz.codecs.lossless import best_streams
 from mcz.codecs.lossless.best import CODEC
 from mcz.files.writing.signal_source import MemorySource
-from tools.start_tables import Kept, table, untrained
+from tools.start_tables import Kept, reset_state, table
 
 MAX_COUNT = 20
 FRAMES = 600  # a segment
@@ -30,7 +30,7 @@ def train(paths: list[Path]) -> np.ndarray:
     """The mean state after the files of the second round."""
     state = np.zeros(mixing.MODELS + 2 * residuals.N_CONTEXTS, np.int64)
     state[: mixing.WEIGHTS] = start_states("best")[0][: mixing.WEIGHTS]
-    state = untrained(state)
+    state = reset_state(state)
     best_streams.start_states = lambda _: (state.view(Kept),)  # type: ignore[assignment]
     total = np.zeros_like(state)
     for number, path in enumerate([*paths, *paths]):

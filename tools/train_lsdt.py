@@ -53,7 +53,7 @@ def main(out: str, *given: str) -> None:
     as_bvh = out == "--bvh"
     if as_bvh:
         out, *clips = clips
-    found = training_set(_converted(clip) if as_bvh else mcz.read(clip) for clip in clips)
+    found = training_set(_convert_to_bvh(clip) if as_bvh else mcz.read(clip) for clip in clips)
     tries = []
     for start, growth in TRIES:
         tries.append(replace(SHIPPED, start=start, growth=growth).learn(found))
@@ -65,7 +65,7 @@ def main(out: str, *given: str) -> None:
         print(line, file=sys.stderr)
 
 
-def _converted(clip: str) -> mcz.Motion:
+def _convert_to_bvh(clip: str) -> mcz.Motion:
     motion = mcz.read(clip)
     return mcz.convert(replace(motion, frame_rate=motion.frame_rate or Fraction(120)), "bvh")
 

@@ -255,7 +255,7 @@ def train(
     return now.table()
 
 
-def written(document: dict[str, Any]) -> str:
+def format_document(document: dict[str, Any]) -> str:
     """JSON, with a list of numbers on one line."""
     sets = [
         ",\n".join(
@@ -279,4 +279,4 @@ if __name__ == "__main__":
         for index, steps in enumerate(SETS):
             document["sets"].append(train(given, steps, starts[index], share))
             starts[index] = start_of(document["sets"][index], COUNTS)
-        Path(sys.argv[1]).write_text(written(document))
+        Path(sys.argv[1]).write_text(format_document(document))

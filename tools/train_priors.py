@@ -123,7 +123,7 @@ def train(name: str, files: Sequence[str]) -> dict[str, object]:
     }
 
 
-def written(priors: Sequence[dict[str, object]]) -> str:
+def format_priors(priors: Sequence[dict[str, object]]) -> str:
     """JSON, with a list on one line, but for digits."""
     tables = []
     for prior in priors:
@@ -139,4 +139,4 @@ if __name__ == "__main__":
     jobs: list[list[str]] = [[]]
     for word in sys.argv[2:]:
         jobs.append([]) if word == "--" else jobs[-1].append(word)
-    Path(sys.argv[1]).write_text(written([train(name, files) for name, *files in jobs]))
+    Path(sys.argv[1]).write_text(format_priors([train(name, files) for name, *files in jobs]))

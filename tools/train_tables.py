@@ -41,7 +41,7 @@ from mcz.codecs.wavelet import streams as wavelet_streams
 from mcz.files.writing.planning import prepare
 from mcz.files.writing.signal_source import MemorySource
 from mcz.model.motion import Motion
-from tools.start_tables import Kept, table, untrained
+from tools.start_tables import Kept, reset_state, table
 
 SEGMENT_BYTES = 2**26
 
@@ -158,7 +158,7 @@ PLANS = {
 
 def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
     """The mean state of every set after the files of the second round."""
-    states = [untrained(state) for state in plan.module._start_states()]
+    states = [reset_state(state) for state in plan.module._start_states()]
     kept = tuple(state.view(Kept) for state in states)
     plan.module._start_states = lambda: kept  # type: ignore[attr-defined]
     totals = [np.zeros_like(state) for state in states]
@@ -167,7 +167,9 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
         sizes = []
         for setting in plan.settings:
             options = plan.codec.options(setting)
-            source = MemorySource(given(plan.codec, setting, motion), 0, plan.codec, SEGMENT_BYTES)
+            source = MemorySource(
+                prepare_clip(plan.codec, setting, motion), 0, plan.codec, SEGMENT_BYTES
+            )
             encoded = plan.codec.encode(source, options)
             sizes.append(sum(len(s) for part in encoded.segments for s in part.streams))
             if number >= len(motions):
@@ -178,7 +180,7 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
     return [total // rounds for total in totals]
 
 
-def given(codec: Codec, params: Mapping[str, Any], motion: Motion) -> Motion:
+def prepare_clip(codec: Codec, params: Mapping[str, Any], motion: Motion) -> Motion:
     """A clip as input of the codec."""
     return prepare(motion, codec, params).motion
 

@@ -26,7 +26,7 @@ Way = Callable[[Path, Path, Path], tuple[list[object], Path]]  # source, .mcz, f
 OF_CLIPS = ("frames", "extract")  # ways that a skeleton alone does not have
 
 
-def ran(*words: object) -> tuple[int, bytes]:
+def run_command(*words: object) -> tuple[int, bytes]:
     """The exit code of a command and what it prints."""
     printed, before = io.BytesIO(), sys.stdout
     sys.stdout = io.TextIOWrapper(printed, write_through=True)
@@ -38,7 +38,7 @@ def ran(*words: object) -> tuple[int, bytes]:
         sys.stdout = before
 
 
-def _named(name: Callable[[Path], str], *words: str) -> Way:
+def _decode_to(name: Callable[[Path], str], *words: str) -> Way:
     """``decode`` to a name made of the source's."""
 
     def way(source: Path, archive: Path, folder: Path) -> tuple[list[object], Path]:
@@ -56,16 +56,16 @@ def _beside(source: Path, archive: Path, folder: Path) -> tuple[list[object], Pa
     return ["decode", archive], archive.parent / source.name
 
 
-def _unpacked(source: Path, archive: Path, folder: Path) -> tuple[list[object], Path]:
+def _unpack_command(source: Path, archive: Path, folder: Path) -> tuple[list[object], Path]:
     return ["unpack", archive, folder], folder / source.name
 
 
-def _extracted(source: Path, archive: Path, folder: Path) -> tuple[list[object], Path]:
-    assert ran("extract", archive, folder / "part.mcz", "--frames", "0:")[0] == 0, source
-    return _named(lambda path: f"of-part{path.suffix}")(source, folder / "part.mcz", folder)
+def _extract_command(source: Path, archive: Path, folder: Path) -> tuple[list[object], Path]:
+    assert run_command("extract", archive, folder / "part.mcz", "--frames", "0:")[0] == 0, source
+    return _decode_to(lambda path: f"of-part{path.suffix}")(source, folder / "part.mcz", folder)
 
 
-def _converted(source: Path, archive: Path, folder: Path) -> tuple[list[object], Path]:
+def _convert_command(source: Path, archive: Path, folder: Path) -> tuple[list[object], Path]:
     words = ["--skeleton", "none"] if source.suffix.lower() == ".amc" else []
     return ["convert", source, folder / f"copy{source.suffix}", *words], folder / (
         f"copy{source.suffix}"
@@ -73,15 +73,15 @@ def _converted(source: Path, archive: Path, folder: Path) -> tuple[list[object],
 
 
 WAYS: dict[str, Way] = {
-    "-o NAME.ext": _named(lambda path: f"back{path.suffix.lower()}"),
-    "-o NAME.EXT": _named(lambda path: f"BACK{path.suffix.upper()}"),
-    "-o NAME": _named(lambda _: "back"),
+    "-o NAME.ext": _decode_to(lambda path: f"back{path.suffix.lower()}"),
+    "-o NAME.EXT": _decode_to(lambda path: f"BACK{path.suffix.upper()}"),
+    "-o NAME": _decode_to(lambda _: "back"),
     "-o FOLDER/": _into_folder,
     "no -o": _beside,
-    "frames": _named(lambda path: f"all{path.suffix}", "--frames", "0:"),
-    "extract": _extracted,
-    "convert": _converted,
-    "unpack": _unpacked,
+    "frames": _decode_to(lambda path: f"all{path.suffix}", "--frames", "0:"),
+    "extract": _extract_command,
+    "convert": _convert_command,
+    "unpack": _unpack_command,
 }
 
 
@@ -93,27 +93,27 @@ def ways_of(source: Path, folder: Path) -> Iterator[tuple[str, bool]]:
     archive, data = folder / "one" / "a.mcz", source.read_bytes()
     archive.parent.mkdir()
     words = ["encode", source, "-o", archive, "--archive"]
-    if ran(*words)[0] and ran(*words, "--skeleton", "none", "--force")[0]:
+    if run_command(*words)[0] and run_command(*words, "--skeleton", "none", "--force")[0]:
         return
     is_skeleton = format_of(source, data).is_skeleton
-    yield "-o -", ran("decode", archive, "-o", "-", "--max-decoded", "2G") == (0, data)
+    yield "-o -", run_command("decode", archive, "-o", "-", "--max-decoded", "2G") == (0, data)
     for name, way in WAYS.items():
         if is_skeleton and name in OF_CLIPS:
             continue
         own = folder / name.replace("/", "")
         own.mkdir()
         command, output = way(source, archive, own)
-        code, printed = ran(*command, "--json", "--max-decoded", "2G")
+        code, printed = run_command(*command, "--json", "--max-decoded", "2G")
         found = json.loads(printed) if code == 0 else {}
         results = {row["result"] for row in found.get("outputs", found.get("files", ()))}
         is_same = code == 0 and output.read_bytes() == data
         yield name, is_same and results == {"restored"}
 
 
-def packed(root: Path, paths: list[Path], folder: Path) -> tuple[int, int]:
+def count_restored(root: Path, paths: list[Path], folder: Path) -> tuple[int, int]:
     """Number of files that ``unpack`` restores of one archive, and number that it holds."""
-    assert ran("pack", root, folder / "all.mcz", "--verbatim", "--jobs", "1")[0] == 0
-    assert ran("unpack", folder / "all.mcz", folder / "all")[0] == 0
+    assert run_command("pack", root, folder / "all.mcz", "--verbatim", "--jobs", "1")[0] == 0
+    assert run_command("unpack", folder / "all.mcz", folder / "all")[0] == 0
     held = [(folder / "all" / path.relative_to(root), path) for path in paths]
     there = [(output, path) for output, path in held if output.is_file()]
     return sum(a.read_bytes() == b.read_bytes() for a, b in there), len(held)
@@ -136,7 +136,7 @@ def main() -> int:
             if not is_same:
                 print(f"{source}: {way} differs")
     with TemporaryDirectory() as name:
-        same, held = packed(root, paths, Path(name))
+        same, held = count_restored(root, paths, Path(name))
     print(f"{sum(kinds.values())} files: {', '.join(f'{n} {k}' for k, n in sorted(kinds.items()))}")
     print(f"refused: {', '.join(refused) or 'none'}")
     for way in ("-o -", *WAYS):

@@ -87,7 +87,7 @@ def vectors_of(rule: str, known: Iterable[Catch] = ()) -> list[str]:
     They are those that are said to (requirements.txt), or all that the manifest names.
     """
     named = answers.of_rules()[rule]
-    said = requirements.caught().get(rule) or named[:MOST]
+    said = requirements.read_catches().get(rule) or named[:MOST]
     return list(dict.fromkeys([*(c.vector for c in known if c.vector in named), *said]))
 
 
@@ -135,7 +135,7 @@ def write(rows: dict[str, list[Catch]]) -> None:
 
 def rules() -> list[str]:
     """The rules of which vectors say that they notice when they are broken (requirements.txt)."""
-    return sorted(requirements.caught())
+    return sorted(requirements.read_catches())
 
 
 def main(wanted: Sequence[str]) -> int:

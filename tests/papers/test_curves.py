@@ -13,7 +13,7 @@ from mcz.bench.cases import Case, Variant, load
 from mcz.bench.tasks import Task, perform
 from mcz.errors import OptionError
 from tools.papers import curves
-from tools.papers.curves import curve, point_of, referenced, references, walk
+from tools.papers.curves import curve, point_of, reference_cases, references, walk
 from tools.papers.kinds import KINDS
 
 FRAME = Variant("lsdt-frame")
@@ -64,7 +64,7 @@ def test_bases_that_are_given_are_in_the_file(case: Case) -> None:
     points = curve(case, FRAME, trained["data"])
     assert len(points) >= 4
     assert all(p["model_bytes"] > len(base64.b64decode(trained["data"])) for p in points)
-    assert referenced(references([case])) == [case]
+    assert reference_cases(references([case])) == [case]
 
 
 def test_without_a_unit_there_is_no_curve(samples: Path) -> None:

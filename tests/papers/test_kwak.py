@@ -41,7 +41,7 @@ from tools.papers.kwak.clips import (
     motion_in_positions,
 )
 from tools.papers.kwak.fit import Point
-from tools.papers.kwak.losses import INTRA, LTR, STR, received, regardless
+from tools.papers.kwak.losses import INTRA, LTR, STR, receive, regardless
 from tools.papers.kwak.measure import (
     errors,
     rates,
@@ -98,7 +98,7 @@ def test_a_set_of_41_markers_in_mm(folder: Path) -> None:
     assert made.values[:, ours : ours + 3] == pytest.approx(expected)
     with pytest.raises(OptionError, match="no virtual marker"):
         bvh = mcz.read(folder / "unknown.bvh")
-        clips._made(replace(bvh, skeleton=replace(bvh.skeleton, unit_cm=1.0)))
+        clips._virtual_markers(replace(bvh, skeleton=replace(bvh.skeleton, unit_cm=1.0)))
 
 
 # Rates and errors
@@ -147,9 +147,9 @@ def test_a_live_decoder_goes_on_where_it_can(clip: Clip) -> None:
     motion, codec = motion_in_positions(clip), codec_by_name("online")
     pushed = losses.pushed_by(codec, motion, {"step": 0.5, "gof": 10, "intra_period": 2})
     lost = np.zeros(motion.n_frames, np.bool_)
-    whole, _ = received(codec, pushed, lost)
+    whole, _ = receive(codec, pushed, lost)
     lost[25] = lost[30] = True  # an STR frame, and an LTR that is not intra coded
-    out, decoded = received(codec, pushed, lost)
+    out, decoded = receive(codec, pushed, lost)
     assert np.flatnonzero(~decoded).tolist() == list(range(25, 40))
     assert (out[25:40] == whole[24]).all()
     assert (out[40:] == whole[40:]).all()

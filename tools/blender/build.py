@@ -70,7 +70,7 @@ def build_zip(wheels: Iterable[Path] = ()) -> tuple[str, bytes]:
     files["blender_manifest.toml"] = manifest.replace("\n[", listed, 1).encode()
     files["LICENSE"] = (ROOT / "LICENSE").read_bytes()
     files |= {f"wheels/{name}": wheel, f"wheels/{construct}": construct_wheel}
-    return f"mcz-blender-{version()}.zip", zipped(files)
+    return f"mcz-blender-{version()}.zip", zip_files(files)
 
 
 def compiled_kernels(wheels: Iterable[Path]) -> dict[str, bytes]:
@@ -149,14 +149,14 @@ def wheel_of(name: str, version: str, files: Mapping[str, bytes]) -> tuple[str, 
     placed[f"{folder}/WHEEL"] = WHEEL
     rows = [f"{path},sha256={_digest(data)},{len(data)}" for path, data in sorted(placed.items())]
     placed[f"{folder}/RECORD"] = "\n".join([*rows, f"{folder}/RECORD,,", ""]).encode()
-    return f"{name}-{version}-py3-none-any.whl", zipped(placed)
+    return f"{name}-{version}-py3-none-any.whl", zip_files(placed)
 
 
 def _digest(data: bytes) -> str:
     return base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
 
 
-def zipped(files: Mapping[str, bytes]) -> bytes:
+def zip_files(files: Mapping[str, bytes]) -> bytes:
     """A zip of these files, in order of their names, without a time."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:

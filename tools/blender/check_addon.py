@@ -41,12 +41,14 @@ def main() -> None:
     register(asked.addon or str(Path(__file__).parent))
     options = dict(map(option, asked.option))
     start = time.perf_counter()
-    (made,) = imported(asked.path, **options)
+    (made,) = import_file(asked.path, **options)
     report: dict[str, Any] = {"seconds": time.perf_counter() - start}
-    motion, numbers = expected(asked.path, options)
-    report |= compared(made, motion, numbers, options)
+    motion, numbers = read_expected(asked.path, options)
+    report |= compare_positions(made, motion, numbers, options)
     if asked.job == "export":
-        report["export"] = exported(made, asked.target, dict(map(option, asked.out)), motion)
+        report["export"] = export_and_compare(
+            made, asked.target, dict(map(option, asked.out)), motion
+        )
     unregister()
     report["loaded"] = sorted(OTHERS & {name.partition(".")[0] for name in sys.modules})
     print(json.dumps(report))
@@ -76,21 +78,21 @@ def unregister() -> None:
     mcz_blender.unregister()
 
 
-def imported(path: str, **options: Any) -> list[Any]:
+def import_file(path: str, **options: Any) -> list[Any]:
     """The armatures, and the empties above markers, that come of a file."""
     before = set(bpy.data.objects)
     bpy.ops.import_anim.mcz(filepath=path, **options)
     return [thing for thing in bpy.data.objects if thing not in before and thing.parent is None]
 
 
-def expected(path: str, options: dict[str, Any]) -> tuple[mcz.Motion, np.ndarray]:
+def read_expected(path: str, options: dict[str, Any]) -> tuple[mcz.Motion, np.ndarray]:
     """The motion, and the numbers of the frames that are wanted of it."""
     motion = mcz.read(path, clip=options.get("clip")) if path.endswith(".mcz") else mcz.read(path)
     stop = options.get("stop") or motion.n_frames
     return motion, np.arange(options.get("first", 0), stop, options.get("step", 1))
 
 
-def compared(
+def compare_positions(
     made: Any, motion: mcz.Motion, numbers: np.ndarray, options: dict[str, Any]
 ) -> dict[str, Any]:
     """The greatest distance on sampled frames."""
@@ -98,7 +100,7 @@ def compared(
     unit_cm = skeleton.unit_cm or {"cm": 1.0, "m": 100.0, "in": 2.54}[options.get("unit", "cm")]
     scale = unit_cm / 100 / scene.unit_settings.scale_length
     up = skeleton.up_axis or options.get("up", "y")
-    wanted = turned(mcz.positions(motion), up) * scale
+    wanted = turn_up(mcz.positions(motion), up) * scale
     rate = float(motion.frame_rate or options.get("rate", 120))
     apart = scene.render.fps / scene.render.fps_base / rate
     rows = numbers[:: max(1, len(numbers) // SAMPLED)]
@@ -130,7 +132,7 @@ def figure(wanted: np.ndarray, skeleton: mcz.Skeleton, scale: float) -> float:
     return reach(skeleton) * scale
 
 
-def turned(places: np.ndarray, up: str) -> np.ndarray:
+def turn_up(places: np.ndarray, up: str) -> np.ndarray:
     """With z up; written out here, so that the add-on's own matrices are not trusted."""
     x, y, z = np.moveaxis(places, 2, 0)
     return np.stack({"x": (-y, -z, x), "y": (x, -z, y), "z": (x, y, z)}[up], axis=2)
@@ -172,7 +174,9 @@ def markers(made: Any, skeleton: mcz.Skeleton) -> np.ndarray:
     return found
 
 
-def exported(made: Any, target: str, options: dict[str, Any], motion: mcz.Motion) -> dict[str, Any]:
+def export_and_compare(
+    made: Any, target: str, options: dict[str, Any], motion: mcz.Motion
+) -> dict[str, Any]:
     """Export, read that again: how far its positions are from those of ``motion``."""
     start = time.perf_counter()
     bpy.ops.object.select_all(action="DESELECT")
@@ -180,7 +184,7 @@ def exported(made: Any, target: str, options: dict[str, Any], motion: mcz.Motion
     bpy.context.view_layer.objects.active = made
     bpy.ops.export_anim.mcz(filepath=target, **options)
     seconds = time.perf_counter() - start
-    (again,) = imported(target)
+    (again,) = import_file(target)
     second = mcz.read(target)
     numbers = np.arange(second.n_frames)
     return {
@@ -191,7 +195,7 @@ def exported(made: Any, target: str, options: dict[str, Any], motion: mcz.Motion
         "unit_cm": second.skeleton.unit_cm,
         "up": second.skeleton.up_axis,
         "frames": second.n_frames,
-        "again": compared(again, second, numbers, {}),
+        "again": compare_positions(again, second, numbers, {}),
         "same": apart(motion, second, options),
     }
 
@@ -208,8 +212,8 @@ def apart(first: mcz.Motion, second: mcz.Motion, options: dict[str, Any]) -> flo
         one, other = (origins_of(m.skeleton, m.values) for m in (first, second))
         size = figure(one, first.skeleton, 1.0)
     unit = (second.skeleton.unit_cm or 1.0) / (first.skeleton.unit_cm or options.get("cm", 1.0))
-    one = turned(one, first.skeleton.up_axis or "y")
-    other = turned(other, second.skeleton.up_axis) * unit
+    one = turn_up(one, first.skeleton.up_axis or "y")
+    other = turn_up(other, second.skeleton.up_axis) * unit
     return float(np.nanmax(np.linalg.norm(one - other, axis=2)) / size)
 
 

@@ -23,7 +23,7 @@ if not hasattr(np, "bool"):
 FIRST = {".glb": 0, ".bvh": 1}  # the frame at which the importer puts time 0
 
 
-def imported(path: str, rate: float) -> Any:
+def import_armature(path: str, rate: float) -> Any:
     """The armature of a GLB or BVH, in a scene of its frame rate."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     render = bpy.context.scene.render
@@ -45,7 +45,9 @@ def _mend_import_of_bvh() -> None:
     import_bvh.open = lambda path, mode: open(path, mode.strip("U"))  # noqa: SIM115
 
 
-def compared(armature: Any, first: int, names: list[str], places: np.ndarray) -> dict[str, Any]:
+def compare_heads(
+    armature: Any, first: int, names: list[str], places: np.ndarray
+) -> dict[str, Any]:
     """The greatest distance of a bone's head, over all frames."""
     bones = [armature.pose.bones[name] for name in names]
     worst: dict[str, Any] = {"distance": -1.0}
@@ -65,8 +67,8 @@ def main() -> None:
     path, expected = sys.argv[sys.argv.index("--") + 1 :]
     with np.load(expected) as arrays:
         names, places, rate = arrays["names"].tolist(), arrays["places"], float(arrays["rate"])
-    armature = imported(path, rate)
-    print(json.dumps(compared(armature, FIRST[path[-4:]], names, places)))
+    armature = import_armature(path, rate)
+    print(json.dumps(compare_heads(armature, FIRST[path[-4:]], names, places)))
 
 
 main()

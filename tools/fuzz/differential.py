@@ -86,7 +86,7 @@ def _run(given: argparse.Namespace, other: Other, found: Comparison) -> None:
         name = rng.choice(names)
         data = Mutation(rng, plain_change(rng)).of(seeds[name], LARGEST)
         if rng.random() < HASHED:
-            data = _hashed(data)
+            data = _add_hashes(data)
         if found.compare(number, name, data, [], other):
             # A fault that only other requests meet need not be found by these.
             for request in requests(data, rng):
@@ -97,7 +97,7 @@ def _run(given: argparse.Namespace, other: Other, found: Comparison) -> None:
             break
 
 
-def _hashed(data: bytes) -> bytes:
+def _add_hashes(data: bytes) -> bytes:
     try:
         return with_hashes(data)
     except (MczError, AssertionError):
@@ -134,7 +134,7 @@ def ours(data: bytes, request: list[str]) -> Answer:
 
     output: list[bytes] = []
     try:
-        guard.timed(ask, data)
+        guard.call_in_time(ask, data)
     except UnsupportedError as error:
         return Answer(UNSUPPORTED, message=f"{type(error).__name__}: {error}")
     except MczError as error:

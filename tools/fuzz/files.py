@@ -24,7 +24,7 @@ from mcz.files.reading.report import info
 from mcz.files.reading.signal_reader import SignalReader
 from mcz.model.clock import TIMES, times_fault
 from tools.fuzz.guard import hold
-from tools.fuzz.repair import unhashed
+from tools.fuzz.repair import without_hash_checks
 
 DECODED = 2**19  # bytes that most inputs may decode to, so that there are many of them a second
 MOST_FRAMES = 20_000  # of a live stream that are looked at
@@ -41,10 +41,10 @@ def check_file(data: bytes) -> bool:
         found = _strict(data, most, rng)
     except MczError:
         if rng.random() < 0.5:
-            _salvaged(data, most, None)
+            _check_salvage(data, most, None)
         raise
     if rng.random() < 0.6:
-        _salvaged(data, most, found)
+        _check_salvage(data, most, found)
     if rng.random() < 0.6:
         _live(data, found)
     if rng.random() < 0.3:
@@ -59,10 +59,10 @@ def check_decoder(data: bytes) -> bool:
     """Whole and in parts, hashes not compared: streams that no encoder made decode, too."""
     rng = random.Random(zlib.crc32(data))
     most = None if rng.random() < 0.03 else DECODED
-    with unhashed():
+    with without_hash_checks():
         found = _strict(data, most, rng)
     if rng.random() < 0.1:
-        _salvaged(data, most, found)
+        _check_salvage(data, most, found)
     if rng.random() < 0.1:
         _tolerant(data, rng)
     return True
@@ -159,7 +159,9 @@ def _others(clip: Clip, rng: random.Random) -> None:
         hold(_bits(part, rows, columns) == _bits(whole, rows, columns, cut=True), "filtered part")
 
 
-def _salvaged(data: bytes, most: int | None, strict: dict[tuple[str, int], Arrays] | None) -> None:
+def _check_salvage(
+    data: bytes, most: int | None, strict: dict[tuple[str, int], Arrays] | None
+) -> None:
     """Salvage gives what a strict reader gives, where that gives something."""
     try:
         found = _salvage(data, most)
@@ -241,11 +243,13 @@ def _tolerant(data: bytes, rng: random.Random) -> None:
     """A reader that survives losses: what it gives, it gives in any pieces."""
     lost: Any = rng.choice(("missing", "hold", "linear", "refuse"))
     join = rng.random() < 0.5
-    found = [_streamed(data, size, lost, join) for size in (len(data) + 1, len(data) // 32 + 7)]
+    found = [
+        _stream_frames(data, size, lost, join) for size in (len(data) + 1, len(data) // 32 + 7)
+    ]
     hold(found[0] == found[1], "a stream in pieces differs")
 
 
-def _streamed(data: bytes, size: int, lost: Any, join: bool) -> list[Any]:
+def _stream_frames(data: bytes, size: int, lost: Any, join: bool) -> list[Any]:
     pieces = [data[at : at + size] for at in range(0, len(data), size)]
     found: list[Any] = []
     try:

@@ -60,15 +60,15 @@ def _too_long(number: int, frame: FrameType | None) -> None:
     raise HangError(f"more than {SECONDS} s of processor time")
 
 
-def timed(call: Callable[[bytes], Result], data: bytes) -> Result:
+def call_in_time(call: Callable[[bytes], Result], data: bytes) -> Result:
     """``call(data)`` within ``SECONDS``; a first excess may be that of a compiler."""
     try:
-        return _timed(call, data)
+        return _call_with_timer(call, data)
     except HangError:
-        return _timed(call, data)
+        return _call_with_timer(call, data)
 
 
-def _timed(call: Callable[[bytes], Result], data: bytes) -> Result:
+def _call_with_timer(call: Callable[[bytes], Result], data: bytes) -> Result:
     signal.setitimer(signal.ITIMER_VIRTUAL, SECONDS)
     try:
         return call(data)
@@ -93,7 +93,7 @@ class Record:
         """Check one input; ``check`` tells whether it was decoded, and may raise MczError."""
         self.executions += 1
         try:
-            self.decoded += timed(check, data)
+            self.decoded += call_in_time(check, data)
         except MczError as error:
             self.refused[type(error).__name__] += 1
         except (Exception, HangError) as error:

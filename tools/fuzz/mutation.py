@@ -20,7 +20,7 @@ from mcz.model.schema import MAX_COUNT, build, parse
 from tools.fuzz.repair import (
     Piece,
     Pieces,
-    joined,
+    join_pieces,
     pieces_of,
     table_of,
     with_header,
@@ -58,7 +58,7 @@ class Mutation:
             pieces = step(self, pieces) or pieces
         if self.rng.random() < 0.04:
             index = self._index
-        made = joined(pieces, index)
+        made = join_pieces(pieces, index)
         return made if len(made) <= most else self.change(data, most)
 
     def _index(self, content: bytes) -> bytes:
@@ -151,7 +151,7 @@ class Mutation:
             last = parse_header(pieces[data[-1]].payload)[0]
             more = self._near(last.n_frames) - last.n_frames
             changed = list(pieces)
-            changed[data[-1]] = _edited(pieces[data[-1]], n_frames=last.n_frames + more)
+            changed[data[-1]] = _edit_header(pieces[data[-1]], n_frames=last.n_frames + more)
             fields.n_frames += more
             changed[end] = replace(pieces[end], payload=build(fields, "CEND"))
             begin = parse(payloads.Clip, pieces[clip].payload, "CLIP")
@@ -289,7 +289,7 @@ class Mutation:
         return _with_packets(pieces, which, tuple(packets))
 
 
-def _edited(piece: Piece, **fields: int) -> Piece:
+def _edit_header(piece: Piece, **fields: int) -> Piece:
     return replace(piece, payload=with_header(piece.payload, **fields))
 
 

@@ -157,7 +157,7 @@ def _bones() -> list[Skeleton]:
 
 def _check(name: str, data: bytes, *skeleton: Skeleton) -> bool:
     read = FORMATS[name].read
-    rows = _arrived(name, data, *skeleton)
+    rows = _parse_rows(name, data, *skeleton)
     motion: Motion = read(data, "fuzz", *skeleton)
     hold(same(motion, read(data, "fuzz", *skeleton)), "read twice, it differs")
     hold(FORMATS[name].write(motion) == data, "written again, it differs")
@@ -175,7 +175,7 @@ def _check(name: str, data: bytes, *skeleton: Skeleton) -> bool:
     return True
 
 
-def _arrived(name: str, data: bytes, *skeleton: Skeleton) -> Floats | None:
+def _parse_rows(name: str, data: bytes, *skeleton: Skeleton) -> Floats | None:
     """The rows of a text that is read line by line, None where it cannot be."""
     arrive = FORMATS[name].arrive
     if arrive is None:

@@ -90,7 +90,9 @@ def pieces_of(data: bytes) -> Pieces:
     return pieces
 
 
-def joined(pieces: Sequence[Piece], change_index: Callable[[bytes], bytes] | None = None) -> bytes:
+def join_pieces(
+    pieces: Sequence[Piece], change_index: Callable[[bytes], bytes] | None = None
+) -> bytes:
     """The file of these pieces. ``change_index`` changes the inflated content of its last INDX."""
     out, due, index_end = SIGNATURE, 0, 0
     last = max((n for n, piece in enumerate(pieces) if piece.type == b"FOOT"), default=-1)
@@ -210,14 +212,14 @@ def table_of(payload: bytes) -> Table | None:
     crc = zlib.crc32(payload[:start])
     for size in range(start, min(len(payload) - 3, MOST_TABLE)):
         if struct.unpack_from("<I", payload, size)[0] == crc:
-            table = _split(payload, start, size)
+            table = _split_table(payload, start, size)
             if table is not None:
                 return table
         crc = zlib.crc32(payload[size : size + 1], crc)
     return None
 
 
-def _split(payload: bytes, start: int, end: int) -> Table | None:
+def _split_table(payload: bytes, start: int, end: int) -> Table | None:
     """The table from ``start`` to ``end``: a bitmap as long as makes the lengths come out even."""
     for n_bitmap in range(end - start + 1):
         present = int.from_bytes(payload[start : start + n_bitmap], "little").bit_count()
@@ -274,11 +276,11 @@ def with_hashes(data: bytes, max_decoded: int | None = None) -> bytes:
             if pending[1] is not None:
                 fields.source_sha256 = hashlib.sha256(pending[1]).digest()
             pieces[n] = replace(piece, payload=build(fields, "CEND"))
-    return joined(pieces)
+    return join_pieces(pieces)
 
 
 @contextmanager
-def unhashed() -> Iterator[None]:
+def without_hash_checks() -> Iterator[None]:
     """Nobody compares the hashes of values and sources of clips."""
     with mock.patch.object(Clip, "_compare"), mock.patch.object(Clip, "_check_source"):
         yield
@@ -286,7 +288,7 @@ def unhashed() -> Iterator[None]:
 
 def _hashes(clip: Clip) -> tuple[list[bytes], bytes | None]:
     """The value hash of each signal, and the restored source where there is one."""
-    with unhashed():
+    with without_hash_checks():
         hashes = [value_hash(*clip.read_masked(signal=info.index)) for info in clip.signals]
         if clip.source is None or not all(info.codec.lossless for info in clip.signals):
             return hashes, None

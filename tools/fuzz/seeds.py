@@ -27,13 +27,13 @@ def sources(name: str) -> dict[str, bytes]:
     """The source files with the suffix ``name`` that valid vectors restore, each once."""
     found: dict[bytes, str] = {}
     for path in sorted((VECTORS / "valid").rglob("*.mcz")):
-        for source, data in _restored(path):
+        for source, data in _restore_sources(path):
             if PurePosixPath(source).suffix.lower() == f".{name}" and len(data) <= LARGEST:
                 found.setdefault(data, f"{path.parent.name}-{path.stem}")
     return {f"{where}-{n}.{name}": data for n, (data, where) in enumerate(found.items())}
 
 
-def _restored(path: Path) -> Iterator[tuple[str, bytes]]:
+def _restore_sources(path: Path) -> Iterator[tuple[str, bytes]]:
     with mcz.open(path.read_bytes()) as file:
         for source, restore in named_files(file):
             yield source, restore()

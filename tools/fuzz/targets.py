@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 from tools.fuzz import files, readers
-from tools.fuzz.guard import HangError, timed
+from tools.fuzz.guard import HangError, call_in_time
 from tools.fuzz.mutation import Mutation
 from tools.fuzz.repair import with_hashes
 from tools.fuzz.seeds import vectors
@@ -57,7 +57,7 @@ def mutator(raw: float, seeds: Callable[[], dict[str, bytes]], hashed: float = 0
         made = Mutation(rng, atheris.Mutate).of(begin, most, raw)
         if rng.random() < hashed:
             with suppress(Exception, HangError):  # what goes wrong does so in the check, too
-                right = timed(partial(with_hashes, max_decoded=files.DECODED), made)
+                right = call_in_time(partial(with_hashes, max_decoded=files.DECODED), made)
                 made = right if len(right) <= most else made
         return made
 

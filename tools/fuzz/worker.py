@@ -32,7 +32,7 @@ def main() -> None:
     if lacks_compiled_kernels():
         sys.exit(f"kernels are not compiled, or have changed: python -m tools.kernels {MODE}")
     target = TARGETS[given.target]
-    seeds = _chosen(target.seeds(), given)
+    seeds = _choose_seeds(target.seeds(), given)
     for data in list(seeds.values())[:: 1 + len(seeds) // WARM]:
         _try(target.check, data)  # what is compiled and cached now is not charged to an input
     record = Record(target.name, given.findings, given.figures)
@@ -80,7 +80,7 @@ def _name(path: Path) -> str:
     return ".".join(part for part in parts if part != "__init__")
 
 
-def _chosen(seeds: dict[str, bytes], given: argparse.Namespace) -> dict[str, bytes]:
+def _choose_seeds(seeds: dict[str, bytes], given: argparse.Namespace) -> dict[str, bytes]:
     if len(seeds) <= given.most_seeds:
         return seeds
     names = sorted(random.Random(given.seed).sample(sorted(seeds), given.most_seeds))
@@ -101,12 +101,12 @@ def _options(given: argparse.Namespace, words: Any, seeds: dict[str, bytes]) -> 
     options += [f"-runs={given.runs}", "-print_final_stats=1"]
     if words:
         path = given.figures.with_suffix(".words")
-        path.write_text("".join(f'"{_escaped(word)}"\n' for word in words))
+        path.write_text("".join(f'"{_escape_word(word)}"\n' for word in words))
         options.append(f"-dict={path}")
     return [*options, str(given.corpus), str(given.seeds)]
 
 
-def _escaped(word: str) -> str:
+def _escape_word(word: str) -> str:
     return word if word.startswith("\\x") else word.replace('"', '\\"')
 
 

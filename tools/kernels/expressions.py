@@ -25,7 +25,7 @@ from tools.kernels.annotations import (
     Tuple,
     Type,
 )
-from tools.kernels.source import Source, is_constant, mangled, source
+from tools.kernels.source import Source, is_constant, mangle_name, source
 
 Root = str | tuple[str, str]  # what an array is a part of: a variable, or a record's field
 Typed = tuple[str, Type]
@@ -96,7 +96,7 @@ class Expressions:
 
     def expr(self, node: ast.expr) -> Typed:
         """Text and type of an expression."""
-        fixed = self.fixed(node)
+        fixed = self.constant_of(node)
         if fixed is not None:
             return self._literal(node, fixed)
         method = getattr(self, "of_" + type(node).__name__, None)
@@ -105,7 +105,7 @@ class Expressions:
         found: Typed = method(node)
         return found
 
-    def fixed(self, node: ast.expr) -> Any:
+    def constant_of(self, node: ast.expr) -> Any:
         """The constant that an expression is, or None."""
         if isinstance(node, ast.Constant):
             return node.value if is_constant(node.value) else None
@@ -117,7 +117,7 @@ class Expressions:
             module, original = self.source.imported.get(node.value.id, ("", "other"))
             return None if original else self._constant(source(module), node.attr)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            operand = self.fixed(node.operand)
+            operand = self.constant_of(node.operand)
             return -operand if isinstance(operand, int | float) else None
         return None
 
@@ -177,15 +177,15 @@ class Expressions:
     def of_Subscript(self, node: ast.Subscript) -> Typed:  # noqa: N802
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
             text, type_ = self.expr(node.value.value)
-            axis = self.fixed(node.slice)
+            axis = self.constant_of(node.slice)
             if isinstance(type_, Array) and isinstance(axis, int) and axis < type_.rank:
                 return f"<long long>{text}.shape[{axis}]", INT
-        fixed = self.fixed(node.value)
+        fixed = self.constant_of(node.value)
         if isinstance(fixed, tuple):
             return self._table_item(node, fixed)
         text, type_ = self.expr(node.value)
         if isinstance(type_, Tuple):
-            index = self.fixed(node.slice)
+            index = self.constant_of(node.slice)
             if not isinstance(index, int):
                 raise self.error(node, "the index of a tuple is a constant")
             return f"{text}[{index}]", type_.items[index]
@@ -194,7 +194,7 @@ class Expressions:
         return self._part(node, text, type_)
 
     def _table_item(self, node: ast.Subscript, values: tuple[Any, ...]) -> Typed:
-        index = self.fixed(node.slice)
+        index = self.constant_of(node.slice)
         if isinstance(index, int):
             return self._literal(node, values[index])
         name, type_ = self.table(node, values)
@@ -229,7 +229,7 @@ class Expressions:
 
     def _index(self, node: ast.expr) -> str:
         if not isinstance(node, ast.Slice):
-            fixed = self.fixed(node)
+            fixed = self.constant_of(node)
             if isinstance(fixed, int) and fixed < 0:
                 raise self.error(node, "an index counts from the front")
             return str(fixed) if isinstance(fixed, int) else self.int_of(node)
@@ -381,19 +381,19 @@ class Expressions:
         texts: list[str] = []
         for item, type_ in zip(node.args, wanted, strict=True):
             text, given = self.expr(item)
-            texts.append(self.converted(item, text, given, type_))
+            texts.append(self.convert(item, text, given, type_))
         roots = [
             self.root(item) if isinstance(type_, Array) else None
             for item, type_ in zip(node.args, wanted, strict=True)
         ]
-        full = mangled(where.name, name)
+        full = mangle_name(where.name, name)
         self.effects.calls.append((full, roots))
         self.called[node] = full
         if called.returns is None:
             raise self.error(node, "does not say what it returns")
         return f"{full}({', '.join(texts)})", where.type_of(called.returns)
 
-    def converted(self, node: ast.AST, text: str, given: Type, wanted: Type) -> str:
+    def convert(self, node: ast.AST, text: str, given: Type, wanted: Type) -> str:
         """The text of a value where another type is wanted; arrays only lose what is known."""
         if isinstance(given, Scalar) and isinstance(wanted, Scalar):
             if _widens(given, wanted):

@@ -18,7 +18,7 @@ from tools.kernels.annotations import (
     Type,
 )
 from tools.kernels.expressions import Expressions, Root
-from tools.kernels.source import Source, mangled
+from tools.kernels.source import Source, mangle_name
 
 DTYPES = {
     "np.int64": "int64",
@@ -34,7 +34,7 @@ class Function(Expressions):
 
     def __init__(self, source: Source, name: str) -> None:
         super().__init__(source, source.functions[name])
-        self.name = mangled(source.name, name)
+        self.name = mangle_name(source.name, name)
         self.parameters: list[tuple[str, Type]] = []
         for argument in self.node.args.args:
             if argument.annotation is None:
@@ -77,7 +77,7 @@ class Function(Expressions):
         if len(self.lines) == before:
             self.line("pass")
 
-    def _indented(self, nodes: list[ast.stmt]) -> None:
+    def _write_block(self, nodes: list[ast.stmt]) -> None:
         self.depth += 1
         self._block(nodes)
         self.depth -= 1
@@ -100,18 +100,18 @@ class Function(Expressions):
             self.line("return 0")
             return
         text, type_ = self.expr(node.value)
-        self.line(f"return {self.converted(node, text, type_, self.returns)}")
+        self.line(f"return {self.convert(node, text, type_, self.returns)}")
 
     def do_If(self, node: ast.If) -> None:  # noqa: N802
         self.line(f"if {self.truth(node.test)}:")
-        self._indented(node.body)
+        self._write_block(node.body)
         if node.orelse:
             self.line("else:")
-            self._indented(node.orelse)
+            self._write_block(node.orelse)
 
     def do_While(self, node: ast.While) -> None:  # noqa: N802
         self.line(f"while {self.truth(node.test)}:")
-        self._indented(node.body)
+        self._write_block(node.body)
 
     def do_AnnAssign(self, node: ast.AnnAssign) -> None:  # noqa: N802
         if node.value is not None:
@@ -145,7 +145,7 @@ class Function(Expressions):
             return
         text, type_ = self.expr(value)
         root = self.root(value) if isinstance(type_, Array) else None
-        if len(targets) > 1 and isinstance(type_, Scalar) and self.fixed(value) is None:
+        if len(targets) > 1 and isinstance(type_, Scalar) and self.constant_of(value) is None:
             name = self.temporary(type_)
             self.line(f"{name} = {text}")
             text = name
@@ -166,7 +166,7 @@ class Function(Expressions):
                 continue
             text, type_ = self.expr(item)
             root = self.root(item) if isinstance(type_, Array) else None
-            if self.fixed(item) is None and (simple & used or stored or calls):
+            if self.constant_of(item) is None and (simple & used or stored or calls):
                 name = self.temporary(type_, root)
                 self.line(f"{name} = {text}")
                 text, root = name, name if root is not None else None
@@ -207,7 +207,7 @@ class Function(Expressions):
             if isinstance(root, tuple) and self.stores[name] == 1 and self._is_parameter(text):
                 self.shared[name] = text  # a memoryview of its own would cost two atomic steps
                 return
-        self.line(f"{name} = {self.converted(node, text, type_, self.types[name])}")
+        self.line(f"{name} = {self.convert(node, text, type_, self.types[name])}")
 
     def _is_parameter(self, text: str) -> bool:
         """True if a text is a field of a given record, not a part of that field."""
@@ -241,7 +241,7 @@ class Function(Expressions):
             self.effects.written.add(whole)
         place, kind = self.expr(target)
         if isinstance(kind, Scalar):
-            self.line(f"{place} = {self.converted(target, text, type_, kind)}")
+            self.line(f"{place} = {self.convert(target, text, type_, kind)}")
             return
         assert isinstance(kind, Array)
         into = self.temporary(kind, whole)
@@ -261,9 +261,9 @@ class Function(Expressions):
         if isinstance(node.iter, ast.Call) and ast.unparse(node.iter.func) == "range":
             self._for_range(node, node.iter)
             return
-        fixed = self.fixed(node.iter)
+        fixed = self.constant_of(node.iter)
         if not isinstance(fixed, tuple) and isinstance(node.iter, ast.Tuple):
-            values = tuple(map(self.fixed, node.iter.elts))
+            values = tuple(map(self.constant_of, node.iter.elts))
             fixed = values if None not in values else None
         if isinstance(fixed, tuple):
             self._for_constants(node, fixed)
@@ -283,12 +283,12 @@ class Function(Expressions):
         item = {"float64": FLOAT, "bool": BOOL}.get(type_.item, INT)
         self._assign(node.target, f"{text}[{at}]", part or item, self.root(node.iter))
         self.depth -= 1
-        self._indented(node.body)
+        self._write_block(node.body)
 
     def _for_range(self, node: ast.For, call: ast.Call) -> None:
         ends = [self.int_of(item) for item in call.args]
         if len(ends) == 3:
-            step = self.fixed(call.args[2])
+            step = self.constant_of(call.args[2])
             if not isinstance(step, int):
                 raise self.error(call, "the step of a range is a constant")
             ends[2] = str(step)
@@ -306,7 +306,7 @@ class Function(Expressions):
         self.line(f"for {at} in range({', '.join(ends)}):")
         if changed:
             self.line(f"    {name} = {at}")
-        self._indented(node.body)
+        self._write_block(node.body)
 
     def _for_constants(self, node: ast.For, values: tuple[Any, ...]) -> None:
         at = self.temporary(INT)
@@ -320,9 +320,9 @@ class Function(Expressions):
             name, type_ = self.table(node.iter, values)
             self._assign(node.target, f"{name}[{at}]", type_, None)
         self.depth -= 1
-        self._indented(node.body)
+        self._write_block(node.body)
 
-    def unordered(self) -> Iterator[tuple[ast.AST, list[str]]]:
+    def find_unordered_calls(self) -> Iterator[tuple[ast.AST, list[str]]]:
         """Expressions with calls in several operands, whose order C leaves open; the calls."""
         for node in ast.walk(self.node):
             called = [
@@ -336,10 +336,10 @@ class Function(Expressions):
         """The types of variables that are no parameters."""
         own = {name for name, _ in self.parameters}
         names = (name for name in self.types if name not in own | self.shared.keys())
-        return [f"    cdef {spelled(self.types[name], name in written)} {name}" for name in names]
+        return [f"    cdef {type_text(self.types[name], name in written)} {name}" for name in names]
 
 
-def spelled(type_: Type, written: bool) -> str:
+def type_text(type_: Type, written: bool) -> str:
     """The type in Cython."""
     return type_.c(written=written) if isinstance(type_, Array) else type_.c
 

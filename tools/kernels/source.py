@@ -90,7 +90,7 @@ class Source:
             for n in self.classes[name].body
             if isinstance(n, ast.AnnAssign)
         ]
-        return Record(mangled(self.name, name), self.name, tuple(fields))
+        return Record(mangle_name(self.name, name), self.name, tuple(fields))
 
     def constant(self, name: str) -> Any:
         """The number, or tuple of numbers, that a name stands for here, or None."""
@@ -148,6 +148,6 @@ def is_constant(value: object) -> bool:
     return isinstance(value, bool | int | float | str)
 
 
-def mangled(module: str, name: str) -> str:
+def mangle_name(module: str, name: str) -> str:
     """A name for all of a unit."""
     return f"{module.removeprefix('mcz.').replace('.', '_')}__{name}"

@@ -9,8 +9,8 @@ from typing import Any
 
 from tools.kernels.annotations import INT, NOTHING, Array, Record, Scalar, Tuple, Type
 from tools.kernels.expressions import Root
-from tools.kernels.functions import Function, spelled
-from tools.kernels.source import ROOT, Source, mangled, source, sources_behind
+from tools.kernels.functions import Function, type_text
+from tools.kernels.source import ROOT, Source, mangle_name, source, sources_behind
 
 HEAD = """# Written by tools/kernels from the sources that SOURCES names.
 from operator import index
@@ -80,11 +80,11 @@ class Unit:
         self.fields: set[Root] = set()
         self._spread_writes()
         self._check_order()
-        self.raising = self._raising()
+        self.raising = self._find_raising()
 
     def _add(self, where: Source, name: str) -> None:
         """Translate a function, after those that it calls."""
-        full = mangled(where.name, name)
+        full = mangle_name(where.name, name)
         if full in self.functions:
             return
         function = Function(where, name)
@@ -124,7 +124,7 @@ class Unit:
     def _check_order(self) -> None:
         """Refuse expressions that depend on which of several calls comes first."""
         for function in self.functions.values():
-            for node, called in function.unordered():
+            for node, called in function.find_unordered_calls():
                 if any(map(self._writes, called)):
                     raise function.error(node, "C leaves open which call comes first")
 
@@ -133,7 +133,7 @@ class Unit:
         parameters = {parameter for parameter, _ in self.functions[name].parameters}
         return any(isinstance(r, tuple) or r in parameters for r in self.written[name])
 
-    def _raising(self) -> set[str]:
+    def _find_raising(self) -> set[str]:
         """The functions in which an exception can be raised."""
         if self.checked:
             return set(self.functions)
@@ -188,7 +188,7 @@ class Unit:
         if record.is_struct:
             fields = [f"    {type_.c} {name}" for name, type_ in record.fields]
             made = [
-                f"    found.{name} = {self._taken(f'given.{name}', type_, False)}"
+                f"    found.{name} = {self._convert_argument(f'given.{name}', type_, False)}"
                 for name, type_ in record.fields
             ]
             return "\n".join(
@@ -207,11 +207,12 @@ class Unit:
         made = []
         for name, type_ in record.fields:
             is_written = (record.name, name) in self.fields
-            lines.append(f"    cdef {spelled(type_, is_written)} {name}")
-            made.append(f"        self.{name} = {self._taken(f'given.{name}', type_, is_written)}")
+            lines.append(f"    cdef {type_text(type_, is_written)} {name}")
+            value = self._convert_argument(f"given.{name}", type_, is_written)
+            made.append(f"        self.{name} = {value}")
         return "\n".join([*lines, "    def __init__(self, object given, list moved):", *made, ""])
 
-    def _taken(self, text: str, type_: Type, is_written: bool) -> str:
+    def _convert_argument(self, text: str, type_: Type, is_written: bool) -> str:
         """An argument as Python gives it, as the type that a kernel takes."""
         if isinstance(type_, Array):
             dense = (type_.dense and "True") or "False"
@@ -225,7 +226,7 @@ class Unit:
     def _signature(self, function: Function) -> str:
         written = self.written[function.name]
         parameters = ", ".join(
-            f"{spelled(type_, name in written)} {name}" for name, type_ in function.parameters
+            f"{type_text(type_, name in written)} {name}" for name, type_ in function.parameters
         )
         result = function.returns
         end = "noexcept"
@@ -243,15 +244,15 @@ class Unit:
 
     def _door(self, where: Source, name: str) -> str:
         """The function that Python calls: it checks arrays, and lets other threads run."""
-        full = mangled(where.name, name)
+        full = mangle_name(where.name, name)
         function, written = self.functions[full], self.written[full]
         names = [parameter for parameter, _ in function.parameters]
         lines = [f"def call_{full}({', '.join(f'object {n}' for n in names)}):"]
         lines.append("    cdef list moved = []")
         for parameter, type_ in function.parameters:
-            taken = self._taken(parameter, type_, parameter in written)
+            taken = self._convert_argument(parameter, type_, parameter in written)
             is_written = parameter in written
-            lines.append(f"    cdef {spelled(type_, is_written)} of_{parameter} = {taken}")
+            lines.append(f"    cdef {type_text(type_, is_written)} of_{parameter} = {taken}")
         call = f"{full}({', '.join(f'of_{n}' for n in names)})"
         result = function.returns
         if result != NOTHING:

@@ -189,9 +189,9 @@ class Migration:
         if NUMBERS in motion.metadata:
             self.notes.append(f"clip {clip['name']}: frame numbers of 0.9 are its {NUMBERS}")
         if clip["file"] is not None:
-            motion = self._sourced(clip, motion)
+            motion = self._add_source(clip, motion)
         if not motion.signals_of("times"):
-            motion = self._timed(clip, motion)
+            motion = self._add_times(clip, motion)
         kept = clip["codec"] if clip["codec"] in KEPT else "fast"
         write_clip(self.writer, motion, codec_by_name(self.codec or kept), {})
         if clip["quality"] is not None:
@@ -199,7 +199,7 @@ class Migration:
         if clip["file"] is not None and motion.source is None:
             self._as_attachment(clip)
 
-    def _timed(self, clip: Content, motion: Motion) -> Motion:
+    def _add_times(self, clip: Content, motion: Motion) -> Motion:
         """The clip at the times that it had, where its frame numbers give them."""
         timed = motion.at_times(self.old.times(clip))
         kept = numbers_or_rows(timed.frame_numbers, timed.n_frames)
@@ -210,7 +210,7 @@ class Migration:
         self.untimed.add(clip["name"])
         return motion
 
-    def _sourced(self, clip: Content, motion: Motion) -> Motion:
+    def _add_source(self, clip: Content, motion: Motion) -> Motion:
         """The clip with its source, read again from restored bytes; without where it differs."""
         if not clip["is_lossless"]:
             return motion

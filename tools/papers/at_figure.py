@@ -50,7 +50,7 @@ def at_figure(case: Case, variant: Variant, key: str, wanted: float, hint: float
             break
         value = figure(middle)
         low, high = (middle, high) if _same_side(value, points[low][key], wanted) else (low, middle)
-    return _interpolated(points[low], points[high], key, wanted)
+    return _interpolate(points[low], points[high], key, wanted)
 
 
 def _same_side(a: float, b: float, wanted: float) -> bool:
@@ -91,7 +91,7 @@ def _between(low: float, high: float, points: Mapping[float, Record], key: str, 
     return math.exp(math.log(low) + share * math.log(high / low))
 
 
-def _interpolated(a: Record, b: Record, key: str, wanted: float) -> Record:
+def _interpolate(a: Record, b: Record, key: str, wanted: float) -> Record:
     """The point where ``key`` is ``wanted``; sizes, ratios and errors between those of two."""
     share = 0.0
     if a[key] > 0 and b[key] > 0 and a[key] != b[key]:

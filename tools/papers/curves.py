@@ -61,13 +61,13 @@ def _digest(case: Case) -> str:
     return load(case).digest
 
 
-def referenced(clips: Sequence[Sequence[Any]]) -> list[Case]:
+def reference_cases(clips: Sequence[Sequence[Any]]) -> list[Case]:
     return [Case(path, unit) for path, unit, _ in clips]
 
 
 def bases(clips: Clips, recipe: Sequence[tuple[str, Any]]) -> Record:
     """Bases that are learned from the clips: their data as text, and what is said of them."""
-    trained = train((load(case).motion for case in referenced(clips)), Recipe(**dict(recipe)))
+    trained = train((load(case).motion for case in reference_cases(clips)), Recipe(**dict(recipe)))
     document = trained.document()
     return {"data": base64.b64encode(trained.data).decode(), "document": document}
 

@@ -26,7 +26,7 @@ def _at(task: Task) -> Any:
     return at_figure(task.case, task.variant, *task.arguments)
 
 
-def _deflated(task: Task) -> Any:
+def _measure_deflated(task: Task) -> Any:
     return {"bytes": deflated_bytes(task.case, task.variant, *task.arguments)}
 
 
@@ -71,7 +71,7 @@ def _kwak_speeds(task: Task) -> Any:
 KINDS: Mapping[str, Kind] = {
     **tasks.KINDS,
     "at": Kind(_at),  # metric, wanted, where to begin
-    "deflated": Kind(_deflated),  # threshold
+    "deflated": Kind(_measure_deflated),  # threshold
     "resolutions": Kind(_resolutions),  # joint, pairs of parameter and value
     "curve": Kind(_curve),  # bases as text, if any
     "bases": Kind(_bases),  # clips, pairs of a recipe

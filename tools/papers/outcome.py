@@ -13,10 +13,10 @@ from mcz.bench.tasks import Task
 from mcz.errors import OptionError
 from tools.papers.panels import Panels, draw
 
-__all__ = ["Outcome", "absent", "add", "cases_of", "named", "without"]
+__all__ = ["Outcome", "absent", "add", "cases_by_name", "cases_of", "without"]
 
 
-def named(paths: Sequence[str], unit: str | None) -> dict[str, Case]:
+def cases_by_name(paths: Sequence[str], unit: str | None) -> dict[str, Case]:
     """The clips that ``paths`` stand for, of those of one name the first."""
     return {case.name: case for case in reversed(find_cases(paths, unit))}
 

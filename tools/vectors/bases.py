@@ -30,8 +30,8 @@ from tools.vectors.build import by_hand as written
 from tools.vectors.build import extensions, motions
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.edits import Made, both, indexed, put, raw_stream
-from tools.vectors.build.files import Crafter, file_of, finished, rehash
-from tools.vectors.build.source_files import ODD, PLAIN, called, take
+from tools.vectors.build.files import Crafter, file_of, finish_file, rehash
+from tools.vectors.build.source_files import ODD, PLAIN, set_path, take
 from tools.vectors.codec_bases import coded, noted
 
 SOURCES = Path(__file__).parent / "sources"
@@ -65,13 +65,13 @@ VECTORS = Path(__file__).resolve().parents[2] / "conformance/vectors"
 def base(make: Callable[..., Any]) -> Callable[..., Any]:
     """Register ``make`` for rows to name; it returns a Base, a Motion or the bytes of a file."""
 
-    def called(*given: Any, **named: Any) -> Base:
+    def call(*given: Any, **named: Any) -> Base:
         made = make(*given, **named)
         if isinstance(made, Motion):
             return Base((made,))
         return Base((), made) if isinstance(made, bytes) else made
 
-    BASES[make.__name__] = called
+    BASES[make.__name__] = call
     return make
 
 
@@ -134,7 +134,7 @@ def read(file: str, path: str = "") -> Base:
     """The clip of a file below ``sources``, which it restores as ``path``."""
     data = (SOURCES / file).read_bytes()
     stem, _, suffix = (path or file).rpartition("/")[2].rpartition(".")
-    motion = called(FORMATS[suffix].read(data, stem), path or file)
+    motion = set_path(FORMATS[suffix].read(data, stem), path or file)
     return Base((motion,), None, ((path or file, data),))
 
 
@@ -285,7 +285,7 @@ def copies(stored: bool = False, few: int | None = None) -> bytes:
         crafter.clip(motion)
     content = content_of(copies_of(crafter)[:few], crafter.offset)
     crafter.plain_chunk(ChunkType.COPY, payload_of(content, stored=stored), ChunkFlag.ANCILLARY)
-    return finished(crafter, index=False)
+    return finish_file(crafter, index=False)
 
 
 @base
@@ -298,7 +298,7 @@ def everything() -> Base:
 @base
 def extended() -> bytes:
     """Everything, and an extension in each structure."""
-    return extensions.extended(*everything().motions)
+    return extensions.write_extended(*everything().motions)
 
 
 @base
@@ -325,16 +325,16 @@ def segments_of_zeros(n_rows: int, n_segments: int, padding: int = 0, n_channels
     crafter.clip(zeros)
     if padding:
         crafter.ancillary(b"xtra", bytes(padding))
-    return finished(crafter)
+    return finish_file(crafter)
 
 
-def _limited(found: Base, options: dict[str, Any]) -> bytes:
+def _limited_file(found: Base, options: dict[str, Any]) -> bytes:
     """The file of clips beyond the base profile, which its HEAD has all the same."""
     crafter = Crafter()
     crafter.profile = LARGE
     for motion in found.motions:
         crafter.clip(motion, **options)
-    return finished(crafter)
+    return finish_file(crafter)
 
 
 @base
@@ -342,7 +342,7 @@ def parted(name: str, *pieces: str) -> bytes:
     """An attachment in these parts, and no INDX."""
     crafter = Crafter()
     crafter.parts(name, *(piece.encode() for piece in pieces))
-    return finished(crafter, index=False)
+    return finish_file(crafter, index=False)
 
 
 @base
@@ -360,10 +360,10 @@ def _body(crafter: Crafter, found: Base, index: bool) -> bytes:
         crafter.parts(name, content)
         if alias:
             crafter.alias(alias, payloads.OF_ATTACHMENT, name.encode())
-    return finished(crafter, *found.motions, index=index)
+    return finish_file(crafter, *found.motions, index=index)
 
 
-def _appended(found: Base, index: bool = True, continued: bool = False) -> bytes:
+def _append_clips(found: Base, index: bool = True, continued: bool = False) -> bytes:
     crafter = Crafter()
     crafter.continued = continued
     for body in found.bodies:
@@ -371,11 +371,11 @@ def _appended(found: Base, index: bool = True, continued: bool = False) -> bytes
     return crafter.data
 
 
-def _evaluated(node: ast.expr) -> Any:
+def _evaluate(node: ast.expr) -> Any:
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-        return _evaluated(node.left) + _evaluated(node.right)
+        return _evaluate(node.left) + _evaluate(node.right)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitOr):
-        return _evaluated(node.left) | _evaluated(node.right)
+        return _evaluate(node.left) | _evaluate(node.right)
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         given = [ast.literal_eval(argument) for argument in node.args]
         named = {k.arg: ast.literal_eval(k.value) for k in node.keywords if k.arg}
@@ -388,28 +388,28 @@ def base_of(text: str) -> Base:
     """The base that a row names."""
     if text.startswith("valid/"):
         return Base((), MADE.get(text) or (VECTORS / f"{text}.mcz").read_bytes())
-    found: Base = _evaluated(ast.parse(text, mode="eval").body)
+    found: Base = _evaluate(ast.parse(text, mode="eval").body)
     return found
 
 
 def base_bytes(text: str, options: Mapping[str, Any]) -> bytes:
     """The file of a base; ``options`` are those of ``file_of``."""
     listed = {k: tuple(v) if isinstance(v, list) else v for k, v in options.items()}
-    return _written(text, tuple(sorted(listed.items())))
+    return _write_base(text, tuple(sorted(listed.items())))
 
 
 @cache
-def _written(text: str, options: tuple[tuple[str, Any], ...]) -> bytes:
+def _write_base(text: str, options: tuple[tuple[str, Any], ...]) -> bytes:
     found = base_of(text)
     if found.data is not None:
         return found.data
     named = dict(options)
     if found.bodies:
-        return _appended(found, **named)
+        return _append_clips(found, **named)
     if found.attached:
         return _with_attachments(found, **named)
     if "codec" in named:
         (named["codec"],) = (c for c in CODECS.values() if c.name == named["codec"])
     if named.pop("beyond", False):
-        return _limited(found, named)
+        return _limited_file(found, named)
     return file_of(*found.motions, **named)

@@ -14,7 +14,7 @@ from mcz.codecs.contract import Encoded, Model, Segment
 from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 from tools.vectors.build import motions, pose_clips
-from tools.vectors.build.files import Crafter, file_of, finished
+from tools.vectors.build.files import Crafter, file_of, finish_file
 
 SKELETONS: dict[str, Callable[[], Skeleton]] = {
     "acclaim": pose_clips.acclaim,
@@ -53,7 +53,7 @@ def noted(codec: str, packets: bool = False) -> bytes:
     levels = {"N": 2} if codec == "mrdwt" else {}
     motion = replace(motion, signals=(noted,))
     crafter.clip(motion, grouping="channel", codec=codec_by_name(codec), **levels)
-    return finished(crafter)
+    return finish_file(crafter)
 
 
 def coded(

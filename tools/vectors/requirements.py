@@ -40,7 +40,7 @@ ARGUED: dict[str, str] = {
 ID = re.compile(r"[A-Z][A-Z0-9]*(?:-[A-Z0-9]+)*-[0-9]{2,}")
 
 
-def caught() -> dict[str, list[str]]:
+def read_catches() -> dict[str, list[str]]:
     """The vectors that a decoder without a rule fails, by the rule."""
     lines = CAUGHT.read_text("utf-8").partition("\n\n")[2].splitlines()
     found = {id_: names.split() for id_, names in (line.split(": ") for line in lines)}
@@ -59,7 +59,7 @@ def requirements(names: Iterable[str]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {name: [] for name in names}
     told = {name: row.requirements for name, row in table_rows().items() if name in found}
     table = {id_: list(globs) for id_, globs in VECTORS.items()}
-    for id_, shown in caught().items():
+    for id_, shown in read_catches().items():
         table.setdefault(id_, []).extend(name for name in shown if name not in told)
     for id_ in sorted({*table, *ARGUED}.union(*told.values())):
         shown = any(id_ in ids for ids in told.values())

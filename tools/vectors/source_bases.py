@@ -15,11 +15,11 @@ from mcz.sources import FORMATS
 from mcz.sources.tables.layout import SectionFields, TableDetail, TableTemplate
 from mcz.sources.text import amc, asf
 from mcz.sources.text.layout import Detail
-from tools.records import built
+from tools.records import build_record
 from tools.vectors.build.array_files import floats, npy, plain_npz, take_arrays
 from tools.vectors.build.c3d_files import c3d_file, c3d_outputs, take_c3d
-from tools.vectors.build.files import Crafter, finished
-from tools.vectors.build.source_files import AMC, ASF, EXAMPLE, called, with_source
+from tools.vectors.build.files import Crafter, finish_file
+from tools.vectors.build.source_files import AMC, ASF, EXAMPLE, set_path, with_source
 from tools.vectors.build.table_files import MARKERS, TIMES, VICON
 
 
@@ -27,7 +27,7 @@ def table(path: str) -> Motion:
     """A table that stands in ``table_files``."""
     texts = {"plain.trc": MARKERS, "times.trc": TIMES, "sections.csv": VICON}
     stem, _, suffix = path.partition(".")
-    return called(FORMATS[suffix].read(texts[path], stem), path)
+    return set_path(FORMATS[suffix].read(texts[path], stem), path)
 
 
 def c3d(**fields: Any) -> Motion:
@@ -60,17 +60,17 @@ def mannequin() -> bytes:
     crafter = Crafter()
     made = write_skeleton(crafter, asf.read(ASF, "mannequin"))
     crafter.alias("small.asf", payloads.OF_SKELETON, made)
-    return finished(crafter)
+    return finish_file(crafter)
 
 
 def acclaim_take() -> Motion:
     """The AMC file of the mannequin."""
-    return called(amc.read(AMC, "take", asf.read(ASF, "mannequin")), "take.amc")
+    return set_path(amc.read(AMC, "take", asf.read(ASF, "mannequin")), "take.amc")
 
 
 def acclaim_example() -> Motion:
     """The worked example of SPEC.md."""
-    return called(amc.read(EXAMPLE, "example"), "example.amc")
+    return set_path(amc.read(EXAMPLE, "example"), "example.amc")
 
 
 def many_sections(more: int) -> Motion:
@@ -82,8 +82,10 @@ def many_sections(more: int) -> Motion:
     first = fields.sections[0]
     blank = [replace(first, header=b"", patterns=[], gaps=[], signals=[3 + k]) for k in range(more)]
     usual = {"count": b"", "rows": 0, "gaps": [], "patterns": [], "ends": 0, "ending": b""}
-    every = [built(SectionFields, section, "section") for section in [*fields.sections, *blank]]
-    details = [built(Detail, detail, "detail") for detail in [*own.details, *[usual] * more]]
+    every = [
+        build_record(SectionFields, section, "section") for section in [*fields.sections, *blank]
+    ]
+    details = [build_record(Detail, detail, "detail") for detail in [*own.details, *[usual] * more]]
     template = varint(len(every)) + b"".join(every)
     detail = varint(len(details)) + b"".join(details)
     signals = [replace(plain.signals[2], name=str(k)) for k in range(more)]

@@ -23,7 +23,7 @@ from tools.papers.hou2016.tasks import (
     RDO,
     Found,
     here,
-    published,
+    published_variant,
 )
 from tools.papers.hou2016.training import SPARSITIES
 from tools.papers.verdicts import verdict
@@ -46,7 +46,7 @@ def claims(found: Found) -> Table:
     table.rows.extend(_starts(found))
     table.rows.extend(_sparse(found))
     table.rows.extend(_best_sparsity(found))
-    for name, like in (("adaptive", _plain), ("prefix", published)):
+    for name, like in (("adaptive", _plain), ("prefix", published_variant)):
         table.rows.extend((row[0], name, *row[1:]) for row in _of_coder(found, like))
     table.rows.extend(_fast(found))
     return table
@@ -82,17 +82,17 @@ def _of_coder(found: Found, like: Callable[[Variant], Variant]) -> Iterator[tupl
             if middle:
                 claim = "of the clips between, clip-LSDT and MDTT are alike"
                 close = [abs(_mean(r) - 1) <= 0.1 for r in middle.values()]
-                yield claim, verdict(close), _listed(found, middle)
+                yield claim, verdict(close), _ratio_text(found, middle)
 
 
 def _beats(
     claim: str, found: Found, ratios: Mapping[str, list[float]], *, better: bool
 ) -> tuple[str, str, str]:
     held = [(_mean(r) > 1) == better for r in ratios.values()]
-    return claim, verdict(held), _listed(found, ratios) or "no such clip here"
+    return claim, verdict(held), _ratio_text(found, ratios) or "no such clip here"
 
 
-def _listed(found: Found, ratios: Mapping[str, list[float]]) -> str:
+def _ratio_text(found: Found, ratios: Mapping[str, list[float]]) -> str:
     parts = (
         f"{clip} ({_n_frames(found, clip):,}) {_mean(r):.2f} ({min(r):.2f} to {max(r):.2f})"
         for clip, r in sorted(ratios.items(), key=lambda pair: _n_frames(found, pair[0]))

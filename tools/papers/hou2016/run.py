@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from mcz.bench.tasks import Runner
 from tools.papers.hou2016.panels import panels
 from tools.papers.hou2016.tables import tables
-from tools.papers.hou2016.tasks import NAMES, measure, missing, others
-from tools.papers.outcome import Outcome, add, cases_of, named, without
+from tools.papers.hou2016.tasks import NAMES, measure, missing_codecs, others
+from tools.papers.outcome import Outcome, add, cases_by_name, cases_of, without
 
 
 def hou2016(outcome: Outcome, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
     """Add the paper's tables; raises OptionError where none of its clips is among ``paths``."""
-    here = named(paths, unit)
+    here = cases_by_name(paths, unit)
     cases = cases_of(outcome, "hou2016", NAMES, here)
-    without(outcome, "hou2016", missing())
+    without(outcome, "hou2016", missing_codecs())
     found = measure(runner, cases, {name: here[name] for name in others(sorted(here))})
     add(outcome, tables(found), found.results, panels(found))

@@ -10,7 +10,7 @@ from mcz.bench.cases import load
 from mcz.bench.measure import Record
 from mcz.codecs.basis_models import known_models, parse_bases
 from mcz.codecs.training import frames_of, training_set
-from tools.papers.curves import Clips, referenced
+from tools.papers.curves import Clips, reference_cases
 from tools.papers.hou2016.training import (
     convergence,
     convergence_table,
@@ -24,7 +24,7 @@ P_ROWS = "P = "  # how the names of bases begin that were trained with another s
 
 def measured_convergence(clips: Clips, iterations: int, every: int) -> Record:
     """Fig. 3: its table, and each objective a frame and point, for a plot."""
-    found = training_set(load(case).motion for case in referenced(clips))
+    found = training_set(load(case).motion for case in reference_cases(clips))
     frames = frames_of(found, every)
     curves = convergence(frames, iterations=iterations)
     size = max(1, len(frames) * len(found.names))
@@ -37,10 +37,12 @@ def measured_convergence(clips: Clips, iterations: int, every: int) -> Record:
 
 def measured_distortions(clips: Clips, named: Sequence[Sequence[str]]) -> Record:
     """Fig. 5, and its like for each P; ``named`` are pairs of a name and bases as text."""
-    positions = {case.name: positions_of(case) for case in referenced(clips)}
+    positions = {case.name: positions_of(case) for case in reference_cases(clips)}
     learned = {name: _transform(data) for name, data in named}
     n_points = next(iter(positions.values())).shape[1]
-    others = {n: t for n, t in learned.items() if not n.startswith(P_ROWS)} | _shipped(n_points)
+    others = {n: t for n, t in learned.items() if not n.startswith(P_ROWS)} | _shipped_bases(
+        n_points
+    )
     by_sparsity = {n: t for n, t in learned.items() if n.startswith(P_ROWS)}
     title = "Hou 2016, Fig. 4: P, for the transform alone"
     return {
@@ -49,7 +51,7 @@ def measured_distortions(clips: Clips, named: Sequence[Sequence[str]]) -> Record
     }
 
 
-def _shipped(n_points: int) -> dict[str, Any]:
+def _shipped_bases(n_points: int) -> dict[str, Any]:
     """The well-known bases for so many points."""
     found: dict[str, Any] = {}
     for model in known_models().values():

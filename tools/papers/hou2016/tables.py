@@ -40,7 +40,7 @@ def tables(found: Found) -> Iterator[Table]:
     if kept := found.get(found.spatial()):
         yield Table.of(kept["fig_5"])
         yield Table.of(kept["by_sparsity"])
-    yield from (_sparsities(found), _held_out(found), _domains(found), _speeds(found))
+    yield from (_sparsities(found), _held_out_table(found), _domains(found), _speeds(found))
     yield _ways_back(found)
 
 
@@ -81,7 +81,7 @@ def _sparsities(found: Found) -> Table:
     return table
 
 
-def _held_out(found: Found) -> Table:
+def _held_out_table(found: Found) -> Table:
     errors = (0.2, 0.5, 1.0)
     caption = (
         "Payload and overhead in bytes at D of, with the bases of this package, whose training saw "

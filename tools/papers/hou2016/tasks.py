@@ -35,7 +35,7 @@ REFERENCE = Variant("mrdwt")
 OWN = {"lsdt-frame": FRAME, "lsdt-clip": CLIP}  # codecs whose bases are compared
 
 
-def published(variant: Variant) -> Variant:
+def published_variant(variant: Variant) -> Variant:
     """The same with prefix codes and the rest of the paper's settings."""
     return Variant(variant.codec, (("preset", PRESET), *variant.params))
 
@@ -44,15 +44,15 @@ def in_channels(variant: Variant) -> Variant:
     return replace(variant, params=(*variant.params, ("domain", "channels")))
 
 
-def _known() -> dict[str, Any]:
+def _known_codecs() -> dict[str, Any]:
     return {codec.name: codec for codec in CODECS.values()}
 
 
 def here() -> list[str]:
-    return [name for name in FAMILY if name in _known()]
+    return [name for name in FAMILY if name in _known_codecs()]
 
 
-def missing() -> list[str]:
+def missing_codecs() -> list[str]:
     return [name for name in FAMILY if name not in here()]
 
 
@@ -61,7 +61,7 @@ def variants(*, preset: bool) -> list[Variant]:
     found = [FRAME, COSINES, *CLIPS, MDTT, RDO]
     found = [v for v in found if v.codec in here()]
     if preset:
-        return [published(v) for v in found if has_preset(_known()[v.codec], PRESET)]
+        return [published_variant(v) for v in found if has_preset(_known_codecs()[v.codec], PRESET)]
     return [*found, REFERENCE]
 
 
@@ -158,7 +158,7 @@ class Found:
         clip = next(name for name, case in self.cases.items() if case == self.one)
         given = []
         wanted = [REFERENCE, CLIP, FRAME, MDTT, RDO]
-        for variant in (*wanted, *map(published, (CLIP, FRAME))):
+        for variant in (*wanted, *map(published_variant, (CLIP, FRAME))):
             setting = at(self.curve(clip, variant), "cm", SPEED_CM, "setting")
             if setting is not None:
                 given.append((variant.codec, variant.params, float(f"{setting:.3g}")))

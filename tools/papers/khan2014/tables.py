@@ -25,7 +25,7 @@ def here() -> list[str]:
     return [n for n in ORDER if n in known and has_preset(known[n], "khan2014")]
 
 
-def missing() -> list[str]:
+def missing_codecs() -> list[str]:
     return [name for name in ORDER if name not in here()]
 
 

@@ -29,7 +29,7 @@ def here() -> list[str]:
     return [n for n, p in PRESETS.items() if n in known and has_preset(known[n], p)]
 
 
-def missing() -> list[str]:
+def missing_presets() -> list[str]:
     return [name for name in PRESETS if name not in here()]
 
 
@@ -41,10 +41,10 @@ def tasks(cases: Mapping[str, Case]) -> Iterator[Task]:
             continue
         if "mrdwt" in here():
             yield from (_threshold(case, T_g) for T_g in _thresholds(clip))
-            yield from (_deflated(case, T_g) for T_g in _thresholds(clip))
+            yield from (_deflated_task(case, T_g) for T_g in _thresholds(clip))
         for variant in _variants():
             yield _at_ratio(clip, case, variant)
-            yield _speed(case, variant)
+            yield _speed_task(case, variant)
 
 
 def _thresholds(clip: str) -> tuple[float, ...]:
@@ -66,11 +66,11 @@ def _threshold(case: Case, T_g: float) -> Task:
     return Task("point", case, preset_of("mrdwt", "khan2016"), (("T_g", T_g),))
 
 
-def _deflated(case: Case, T_g: float) -> Task:
+def _deflated_task(case: Case, T_g: float) -> Task:
     return Task("deflated", case, preset_of("mrdwt", "khan2016"), (T_g,))
 
 
-def _speed(case: Case, variant: Variant) -> Task:
+def _speed_task(case: Case, variant: Variant) -> Task:
     return Task("speeds", case, variant)
 
 
@@ -120,7 +120,7 @@ def _table_4(cases: Mapping[str, Case], results: Results) -> Table:
         for variant in _variants():
             _, cr, eps, encode, decode = _paper(clip, variant.codec)
             found = results[_at_ratio(clip, case, variant)]
-            speed = results[_speed(case, variant)]
+            speed = results[_speed_task(case, variant)]
             rates = f"{encode:,} / {decode:,}" if encode else None
             table.rows.append(
                 (
@@ -153,7 +153,7 @@ def _figure_7(clip: str, case: Case, results: Results) -> Table:
         ratio = found.get("cr_source")
         times = ratio / cr if ratio and cr else None
         errors = ("rms_coordinate_error", "mean_position_error", "mean_position_error_cm")
-        blob = results[_deflated(case, T_g)].get("bytes")
+        blob = results[_deflated_task(case, T_g)].get("bytes")
         deflate = Path(case.path).stat().st_size / blob if blob else None
         table.rows.append(
             (

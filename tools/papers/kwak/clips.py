@@ -161,13 +161,13 @@ def motion_in_positions(clip: Clip) -> Motion:
     """Markers of a clip as input of the codec. Raises MotionError, OptionError too."""
     motion = source_of(clip)
     if clip.form == MARKED:
-        return _seen(motion)
+        return _trim_unseen(motion)
     if clip.form == MADE:
-        return _made(motion)
+        return _virtual_markers(motion)
     return in_positions(motion, virtual_markers=clip.form == VIRTUAL)
 
 
-def _seen(motion: Motion) -> Motion:
+def _trim_unseen(motion: Motion) -> Motion:
     """Without the frames at both ends in which no marker was seen."""
     mask = motion.signals[0].mask
     if mask is None or not mask.any():
@@ -176,7 +176,7 @@ def _seen(motion: Motion) -> Motion:
     return replace(motion, signals=(motion.signals[0].cut(int(seen[0]), int(seen[-1]) + 1),))
 
 
-def _made(motion: Motion) -> Motion:
+def _virtual_markers(motion: Motion) -> Motion:
     """41 virtual markers in mm; raises OptionError where the skeleton is not CMU's."""
     whole = in_positions(motion, virtual_markers=True)
     names = [joint.name for joint in whole.skeleton.joints]

@@ -17,7 +17,15 @@ from mcz.files.live.writer import LiveWriter
 from mcz.model.motion import Motion
 from tools.papers.kwak.clips import Clip, motion_in_positions
 from tools.papers.kwak.losses import pushed_by
-from tools.papers.kwak.measure import NAME, STEP_CM, Coded, code, dialed, live_basis, rate_point
+from tools.papers.kwak.measure import (
+    NAME,
+    STEP_CM,
+    Coded,
+    code,
+    live_basis,
+    rate_point,
+    search_rates,
+)
 
 Ints = NDArray[np.int64]
 
@@ -67,7 +75,7 @@ def _step(motion: Motion, options: Mapping[str, Any], target: float) -> float:
     def measure(step: float) -> Record:
         return rate_point(motion, {**options, "step": step})
 
-    (found,) = dialed(measure, start, [target])
+    (found,) = search_rates(measure, start, [target])
     return float(found["setting"])
 
 

@@ -23,7 +23,7 @@ from mcz.errors import LostFrameError
 from mcz.files.writing.signal_source import MemorySource
 from mcz.model.motion import Motion
 from tools.papers.kwak.clips import Clip, motion_in_positions
-from tools.papers.kwak.measure import NAME, STEP_CM, dialed, errors
+from tools.papers.kwak.measure import NAME, STEP_CM, errors, search_rates
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -91,7 +91,7 @@ def _payload(codec: Codec, stream: bytes) -> int:
     return sum(len(unit.data) for unit in parse_units(NAME, stream, 1))
 
 
-def received(codec: Codec, pushed: Pushed, lost: Mask) -> Received:
+def receive(codec: Codec, pushed: Pushed, lost: Mask) -> Received:
     """Motion that a reader shows, holding the last frame, and the mask of decoded frames."""
     assert codec.follow is not None
     decoder = codec.follow(pushed.header, pushed.layout)
@@ -144,7 +144,7 @@ def losses(clip: Clip, target: float) -> Record:
     for scheme in SCHEMES:
         run = _Run.of(motion, scheme, target)
         for share in SHARES:
-            found = [run.measured(share, seed) for seed in (SEEDS if share else SEEDS[:1])]
+            found = [run.measure(share, seed) for seed in (SEEDS if share else SEEDS[:1])]
             means = {key: float(np.mean([f[key] for f in found])) for key in found[0]}
             rows.append({"label": scheme.label, "share": share, "kbps": run.kbps, **means})
         lines.append([scheme.label, run.course()])
@@ -172,7 +172,7 @@ class _Run:
     def of(cls, motion: Motion, scheme: Scheme, target: float) -> _Run:
         codec = codec_by_name(scheme.codec)
         pushed = _at_rate(codec, motion, scheme.params, target)
-        whole, _ = received(codec, pushed, np.zeros(motion.n_frames, np.bool_))
+        whole, _ = receive(codec, pushed, np.zeros(motion.n_frames, np.bool_))
         kinds = [_kind(codec, *packet) for packet in pushed.packets]
         return cls(motion, scheme, pushed, whole, kinds)
 
@@ -180,24 +180,24 @@ class _Run:
     def kbps(self) -> float:
         return _kbps(self.motion, self.pushed)
 
-    def shown(self, lost: Mask) -> Received:
+    def receive(self, lost: Mask) -> Received:
         if self.scheme.regardless:
             chain = self.scheme.params.get("gof") == NEVER
             return regardless(self.whole, self.kinds, lost, chain=chain)
-        return received(codec_by_name(self.scheme.codec), self.pushed, lost)
+        return receive(codec_by_name(self.scheme.codec), self.pushed, lost)
 
     def course(self) -> list[list[float]]:
         """Frames and the mean error in cm there."""
         n_frames = self.motion.n_frames
-        values, _ = self.shown(lost_frames(n_frames, SHOWN_SHARE, SHOWN_SEED))
+        values, _ = self.receive(lost_frames(n_frames, SHOWN_SHARE, SHOWN_SEED))
         apart = (values - self.motion.values).reshape(n_frames, -1, 3)
         cm = np.sqrt((apart**2).sum(axis=2)).mean(axis=1) * (self.motion.skeleton.unit_cm or 1.0)
         starts = range(0, n_frames, SHOWN_FRAMES)
         return [[at, float(cm[at : at + SHOWN_FRAMES].mean())] for at in starts]
 
-    def measured(self, share: float, seed: int) -> Record:
+    def measure(self, share: float, seed: int) -> Record:
         lost = lost_frames(self.motion.n_frames, share, seed)
-        values, decoded = self.shown(lost)
+        values, decoded = self.receive(lost)
         sqnr, cm = errors(self.motion, values)
         return {"cm": cm, "sqnr": sqnr, "concealed": 1 - float(decoded.mean())}
 
@@ -225,6 +225,6 @@ def _at_rate(codec: Codec, motion: Motion, params: Mapping[str, Any], target: fl
         pushed = pushed_by(codec, motion, {**params, key: setting**sign})
         return {"kbps": _kbps(motion, pushed), "pushed": pushed}
 
-    (found,) = dialed(measure, start**sign, [target])
+    (found,) = search_rates(measure, start**sign, [target])
     kept: Pushed = found["pushed"]
     return kept

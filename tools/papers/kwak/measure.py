@@ -85,7 +85,7 @@ def errors(motion: Motion, values: Floats) -> tuple[float, float]:
     return sqnr, float(distances.mean()) * (motion.skeleton.unit_cm or 1.0)
 
 
-def filtered(motion: Motion, values: Floats) -> Floats:
+def post_filter_values(motion: Motion, values: Floats) -> Floats:
     """Values after the reader's post filter."""
     signal = motion.signals[0]
     decoded = replace(motion, signals=(replace(signal, values=values),))
@@ -99,7 +99,7 @@ def rate_point(motion: Motion, options: Mapping[str, Any]) -> Record:
     per_second = float(motion.frame_rate or 1) / motion.n_frames * 8 / 1000
     payload = sum(len(unit.data) for unit in found.units)
     sqnr, cm = errors(motion, found.values)
-    sqnr_filtered, cm_filtered = errors(motion, filtered(motion, found.values))
+    sqnr_filtered, cm_filtered = errors(motion, post_filter_values(motion, found.values))
     return {
         "setting": options.get("bitrate", options.get("step")),
         "kbps": payload * per_second,
@@ -143,7 +143,7 @@ def rates(clip: Clip, params: Params, targets: Sequence[float]) -> list[Record]:
         points = [rate_point(motion, given | {"bitrate": target}) for target in targets]
     else:
         start = STEP_CM / (motion.skeleton.unit_cm or 1.0)
-        points = dialed(lambda s: rate_point(motion, given | {"step": s}), start, targets)
+        points = search_rates(lambda s: rate_point(motion, given | {"step": s}), start, targets)
     return [p | {"target": target} for p, target in zip(points, targets, strict=True)]
 
 
@@ -152,7 +152,7 @@ def is_controlled(params: Mapping[str, Any]) -> bool:
     return mode not in ("mod", "default")
 
 
-def dialed(
+def search_rates(
     measure: Callable[[float], Record], start: float, targets: Sequence[float]
 ) -> list[Record]:
     """For every rate in kbps what is measured at the setting that comes nearest; more is less."""
@@ -252,6 +252,6 @@ def _per_second(motion: Motion, seconds: Mapping[str, float]) -> Record:
 
 def _filter_speed(motion: Motion) -> Record:
     values = np.asarray(motion.values, np.float64)
-    seconds = cpu_seconds(lambda: filtered(motion, values))
+    seconds = cpu_seconds(lambda: post_filter_values(motion, values))
     row = {"label": "post filter", "settings": {}, "live": False, "encode_fps": None}
     return row | {"decode_fps": motion.n_frames / seconds}

@@ -8,7 +8,7 @@ from mcz.bench.tasks import Runner
 from tools.papers.kwak.clips import NAMES, find_clips
 from tools.papers.kwak.panels import panels
 from tools.papers.kwak.tables import tables
-from tools.papers.kwak.tasks import measure, missing
+from tools.papers.kwak.tasks import measure, missing_codecs
 from tools.papers.outcome import Outcome, absent, add, without
 
 
@@ -16,5 +16,5 @@ def kwak(outcome: Outcome, paths: Sequence[str], unit: str | None, runner: Runne
     """Add the paper's tables; raises OptionError where no clip is among ``paths``."""
     found = measure(runner, find_clips(paths, unit))
     absent(outcome, "kwak", NAMES, (clip.stem for clip in found.clips))
-    without(outcome, "kwak", missing())
+    without(outcome, "kwak", missing_codecs())
     add(outcome, tables(found), found.results, panels(found))

@@ -33,7 +33,7 @@ from tools.papers.kwak.tasks import (
     STUDY_KBPS,
     WITH_MARKERS,
     Found,
-    drawn,
+    curve_tasks,
     speeds_task,
     study_task,
 )
@@ -172,7 +172,7 @@ def _sizes(found: Found) -> Table:
 
 def file_curves(found: Found, clip: Clip) -> Iterator[tuple[str, list[Any]]]:
     """Names and points of every codec that is drawn."""
-    for label, task in drawn(clip):
+    for label, task in curve_tasks(clip):
         if points := found.get(task):
             yield label, points
 
@@ -215,7 +215,7 @@ def _coders(found: Found) -> Table:
         "learned from the clip itself is not counted."
     )
     table = Table("Entropy coders and transforms", caption, columns)
-    for clip in found.studied:
+    for clip in found.study_clips:
         for row in found.get(study_task(clip, "coders", *CODER_KBPS)) or []:
             cells = [row[key] for key in ("rice", "golomb", "mixed")]
             ratio = row["mixed"] / row["golomb"]
@@ -233,7 +233,7 @@ def _periods(found: Found) -> Table:
         f"SQNR, rate held: at {STUDY_KBPS:g} kbps with rate control. Our coder and transform."
     )
     table = Table("What intra coded LTRs cost", caption, columns)
-    for clip in found.studied:
+    for clip in found.study_clips:
         rows = found.get(study_task(clip, "periods", STUDY_KBPS)) or []
         least = next((row["kbps"] for row in rows if not row["period"]), None)
         for row in rows:
@@ -253,7 +253,7 @@ def _resets(found: Found) -> Table:
         "so that this is the cost of both. ltr_step 1, intra_period 0."
     )
     table = Table("What groups of frames cost", caption, columns)
-    for clip in found.studied:
+    for clip in found.study_clips:
         rows = found.get(study_task(clip, "resets", STUDY_KBPS)) or []
         for row in rows:
             cells = []
@@ -277,7 +277,7 @@ def _packets(found: Found) -> Table:
     )
     table = Table("What a live stream costs", caption, columns)
     keys = ("stored", "framed", "terminated", "streams", "packets", "with_entries")
-    for clip in found.studied:
+    for clip in found.study_clips:
         for row in found.get(study_task(clip, "packets", STUDY_KBPS)) or []:
             table.rows.append((clip.name, row["label"], *(row[key] for key in keys)))
     return table

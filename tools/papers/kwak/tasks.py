@@ -66,7 +66,7 @@ SPEEDS = ((RCA, (("bitrate", 5.0),)), (OURS, (("bitrate", 5.0),)), (MOD, (("step
 OTHER_SPEEDS = (("lsdt-frame", (), (("step", 0.2),)), ("mrdwt", (), (("T_g", 4.0),)))
 
 
-def missing() -> list[str]:
+def missing_codecs() -> list[str]:
     known = {codec.name for codec in CODECS.values()}
     return [name for name in (NAME, *(v.codec for v in OTHERS)) if name not in known]
 
@@ -83,7 +83,7 @@ class Found:
         return [clip for clip in self.clips if not clip.is_markers]
 
     @property
-    def studied(self) -> list[Clip]:
+    def study_clips(self) -> list[Clip]:
         """Clips of CMU for studies that the paper has no table of."""
         return [clip for clip in self.clips if CMU.match(clip.stem)] or list(self.clips)[:1]
 
@@ -123,9 +123,9 @@ class Found:
         for clip in self.skeletons:
             for method in WITH_MARKERS:
                 yield from (marker_task(clip, method, form) for form in (POINTS, VIRTUAL))
-            yield from (task for _, task in drawn(clip))
+            yield from (task for _, task in curve_tasks(clip))
             yield study_task(clip, "losses", STUDY_KBPS)
-        for clip in self.studied:
+        for clip in self.study_clips:
             yield study_task(clip, "coders", *CODER_KBPS)
             yield from (study_task(clip, what, STUDY_KBPS) for what in STUDIES)
         if self.fastest:
@@ -145,7 +145,7 @@ def marker_task(clip: Clip, method: Method, form: str) -> Task:
     return rates_task(Clip(clip.case, form), method, MARKER_RATES)
 
 
-def drawn(clip: Clip) -> list[tuple[str, Task]]:
+def curve_tasks(clip: Clip) -> list[tuple[str, Task]]:
     """Errors against sizes of files: what is searched along a dial, and what is held to rates."""
     dialed = [(method.label, method.variant(clip)) for method in DIALED]
     dialed += [(variant.label, variant) for variant in OTHERS]

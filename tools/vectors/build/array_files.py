@@ -15,7 +15,7 @@ from mcz.model.motion import Motion
 from mcz.model.schema import varint
 from mcz.sources import FORMATS
 from mcz.sources.arrays.layout import Kind, Piece
-from tools.vectors.build.source_files import called
+from tools.vectors.build.source_files import set_path
 
 SPEC = "Template of arrays; The bytes of arrays"
 FULL, WIDE, ROOM = 0xFFFFFFFF, 0xFFFFFFFFFFFFFFFF, 128
@@ -111,7 +111,7 @@ def plain_npz(arrays: dict[str, NDArray[Any]], **said: Any) -> bytes:
 def take_arrays(data: bytes, path: str) -> Motion:
     """The motion in an array file, which gives it back."""
     name, _, suffix = path.partition(".")
-    motion = called(FORMATS[suffix].read(data, name), path)
+    motion = set_path(FORMATS[suffix].read(data, name), path)
     assert FORMATS[suffix].write(motion) == data, path
     return motion
 

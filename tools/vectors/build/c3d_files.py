@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mcz.model.motion import Motion
 from mcz.sources.c3d import c3d
 from tests.formats.c3d_files import DEC, INTEL, SGI, Made, real
-from tools.vectors.build.source_files import called
+from tools.vectors.build.source_files import set_path
 
 ORDERS = {"intel": INTEL, "dec": DEC, "sgi": SGI}
 
@@ -55,6 +55,6 @@ def c3d_outputs(n_points: int = 5, **more: Any) -> Made:
 
 def take_c3d(source: bytes, name: str) -> Motion:
     """The motion in a C3D file, its source called after it; it must come back."""
-    motion = called(c3d.read(source, name), f"{name}.c3d")
+    motion = set_path(c3d.read(source, name), f"{name}.c3d")
     assert c3d.write(motion) == source, name
     return motion

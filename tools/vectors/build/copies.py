@@ -8,7 +8,7 @@ from mcz.container import payloads
 from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
 from mcz.container.copies import Copy
 from mcz.model.schema import deflate, varint
-from tools.records import built
+from tools.records import build_record
 from tools.vectors.build.files import Crafter
 
 
@@ -37,4 +37,4 @@ def payload_of(content: bytes, *, size: int | None = None, stored: bool = False)
     data = content if stored else deflate(content)
     stated = len(content) if size is None else size
     fields = {"flags": int(not stored), "size": stated, "data": data}
-    return built(payloads.Copy, fields, "COPY")
+    return build_record(payloads.Copy, fields, "COPY")

@@ -11,10 +11,10 @@ from mcz.container.chunks import ChunkType
 from mcz.container.metadata import Record
 from mcz.model.motion import Motion
 from mcz.model.schema import EXTENDED
-from tools.records import built, extend
+from tools.records import build_record, extend
 from tools.vectors.build import copies, metadata
 from tools.vectors.build.edits import Made, both, plus
-from tools.vectors.build.files import Crafter, finished
+from tools.vectors.build.files import Crafter, finish_file
 
 LATER = b"more, from a later version"
 
@@ -24,7 +24,7 @@ def more(kind: type, *paths: str) -> Callable[[bytes], bytes]:
     return both(*(partial(extend, kind, path=path, more=LATER) for path in paths))
 
 
-def extended(*motions: Motion) -> bytes:
+def write_extended(*motions: Motion) -> bytes:
     """Clips, the first with a source, the second with channels of its own, and all else."""
     crafter = Crafter(
         HEAD=plus(LATER),
@@ -34,24 +34,26 @@ def extended(*motions: Motion) -> bytes:
         ATTA=more(payloads.Atta, ""),
         ALIA=plus(LATER),
         CEND=plus(LATER),
-        segments=_flagged,
+        segments=_flag_extended,
     )
     crafter.extension = LATER
-    crafter.shared(b"MODL", built(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
+    crafter.shared(b"MODL", build_record(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
     crafter.parts("b.txt", b"attached " * 9)
     crafter.alias("c.txt", payloads.OF_ATTACHMENT, b"b.txt")
     for motion, paths in zip(motions, (("signals.0", "source.0"), ("signals.0",)), strict=True):
         own = ["signals.0.channels.2"] if motion.signals[0].channels else []
         crafter.edits["CLIP"] = both(more(payloads.Clip, *own, *paths), plus(LATER))
         crafter.clip(motion)
-    crafter.ancillary(b"QUAL", built(payloads.Qual, {"entries": [], "extension": LATER}, "QUAL"))
+    crafter.ancillary(
+        b"QUAL", build_record(payloads.Qual, {"entries": [], "extension": LATER}, "QUAL")
+    )
     records = metadata.meta_of([Record(motions[0].name, {"place": "here"})])
     crafter.ancillary(ChunkType.META, more(payloads.Meta, "")(records))
     content = copies.content_of(copies.copies_of(crafter), crafter.offset)
     copied = more(payloads.Copy, "")(copies.payload_of(content))
     crafter.ancillary(ChunkType.COPY, copied, safe_to_copy=False)
-    return finished(crafter)
+    return finish_file(crafter)
 
 
-def _flagged(made: Made) -> Made:
+def _flag_extended(made: Made) -> Made:
     return [(replace(header, flags=header.flags | EXTENDED), streams) for header, streams in made]

@@ -115,7 +115,7 @@ def build_streams(
         if isinstance(head, _Lane)
     ]
     columns = np.array([lane.numbers for lane in lanes], np.int64)
-    table = _predicted(lanes, places, columns)
+    table = _predict_columns(lanes, places, columns)
     for lane, column in zip(lanes, columns, strict=True):
         column[:] = lane.coded.rests or column
     streams, start = [], 0
@@ -172,7 +172,7 @@ def _lane(coded: Coded, grid: Grid, numbers: list[int]) -> _Lane:
     return _Lane(coded, numbers, head, lattice)
 
 
-def _predicted(
+def _predict_columns(
     lanes: Sequence[_Lane], places: Sequence[tuple[int, int]], columns: Ints
 ) -> CodedLanes:
     """The lanes as they are written, whose ``columns`` become tails; heads have all fields then."""
@@ -197,7 +197,7 @@ def _predicted(
     for _ in range(ROUNDS):
         before, residuals = (
             residuals,
-            _wrapped(own - (_wrapped(128 + weights * residuals[lane_of]) >> 8)),
+            _wrap(own - (_wrap(128 + weights * residuals[lane_of]) >> 8)),
         )
         residuals[:, 0] = 0
         if (before == residuals).all():
@@ -210,17 +210,17 @@ def _taps_of(coded: Coded) -> tuple[int, ...]:
     return predictors[coded.predictor]
 
 
-def _wrapped(values: Ints) -> Ints:
+def _wrap(values: Ints) -> Ints:
     return (values + 2**31) % 2**32 - 2**31
 
 
 def _left(leads: Ints, taps: Sequence[int]) -> Ints:
     """The residuals of a predictor of leads; 0 in the first row."""
-    steps = _wrapped(np.diff(leads, prepend=leads[0]))
+    steps = _wrap(np.diff(leads, prepend=leads[0]))
     total = np.full(len(leads), 16, np.int64)
     for place, tap in enumerate(taps, 1):
         total[place:] += tap * steps[:-place]
-    return _wrapped(steps - (_wrapped(total) >> 5)) * (np.arange(len(leads)) > 0)
+    return _wrap(steps - (_wrap(total) >> 5)) * (np.arange(len(leads)) > 0)
 
 
 def _parts(lanes: CodedLanes, columns: Ints, start: int, stop: int) -> list[bytes]:

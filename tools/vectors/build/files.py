@@ -48,7 +48,7 @@ from mcz.files.writing.clip_writer import ClipCopy, Decoded, write_plan
 from mcz.files.writing.planning import Prepared, SignalPlan, plan_clip
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.schema import deflate, parse, varint
-from tools.records import built, id_of, update
+from tools.records import build_record, id_of, update
 from tools.vectors.build.edits import Edit, Made, put
 
 OK, REFUSED, UNSUPPORTED = 0, 1, 3
@@ -158,28 +158,28 @@ class Crafter(Writer):
 
     def _write_head(self, extension: bytes) -> None:
         super()._write_head(extension)
-        self.directory.head = self.edited("HEAD", self.directory.head)
+        self.directory.head = self.apply_edit("HEAD", self.directory.head)
 
     @property
     def data(self) -> bytes:
         return self._sink_bytes.getvalue()
 
-    def edited(self, name: str, value: Any) -> Any:
+    def apply_edit(self, name: str, value: Any) -> Any:
         edit = self.edits.get(name)
         return edit(value) if edit else value
 
     def chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
-        return self.plain_chunk(kind, self.edited(kind.decode(), payload), flags)
+        return self.plain_chunk(kind, self.apply_edit(kind.decode(), payload), flags)
 
     def plain_chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
         """A chunk whose payload is edited already."""
         chunk = Chunk(kind, flags, self.offset, len(payload))
         name = kind.decode("latin-1") + "_frame"
-        self._write(self.edited(name, build_chunk(kind, payload, flags)))
+        self._write(self.apply_edit(name, build_chunk(kind, payload, flags)))
         return chunk
 
     def shared(self, kind: bytes, payload: bytes) -> bytes:
-        payload = self.edited(kind.decode(), payload)
+        payload = self.apply_edit(kind.decode(), payload)
         id_ = id_of(kind, payload)
         if (kind, id_) not in self.directory.shared:
             self.directory.shared[kind, id_] = self.plain_chunk(kind, payload)
@@ -203,7 +203,9 @@ class Crafter(Writer):
             shorter = len(packed) < len(piece)
             fields = {"part": part, "part_size": len(piece), "flags": int(shorter)}
             fields["data"] = packed if shorter else piece
-            row.parts.append(self.chunk(b"ATTA", built(payloads.Atta, common | fields, name)))
+            row.parts.append(
+                self.chunk(b"ATTA", build_record(payloads.Atta, common | fields, name))
+            )
         self.directory.attachments[name] = row
 
     def segment(
@@ -212,8 +214,8 @@ class Crafter(Writer):
         self._made.append((header, streams))
 
     def end_clip(self, n_frames: int, source_sha256: bytes, value_sha256: Sequence[bytes]) -> None:
-        made, self._made = self.edited("segments", self._made), []
-        opening = self._opening() if self.repeat else b""
+        made, self._made = self.apply_edit("segments", self._made), []
+        opening = self._repeated_chunks() if self.repeat else b""
         if self.packets:
             self._begin_data(opening)
         for header, streams in made:
@@ -223,14 +225,14 @@ class Crafter(Writer):
             if self._is_frame(header, streams):
                 self._frame(header, streams[-1])
                 continue
-            payload = self.edited("DATA", build_segment(header, streams, self.extension))
+            payload = self.apply_edit("DATA", build_segment(header, streams, self.extension))
             self._segment(header, payload)
         row = self._clip
         super().end_clip(n_frames, source_sha256, value_sha256)
         assert row is not None
-        self.directory.clips[row.name] = self.edited("row", row)
+        self.directory.clips[row.name] = self.apply_edit("row", row)
 
-    def _opening(self) -> bytes:
+    def _repeated_chunks(self) -> bytes:
         """Content of a REPT in a file of one clip."""
         data, at, found = self.data, len(SIGNATURE), b""
         while at < len(data):
@@ -272,7 +274,7 @@ class Crafter(Writer):
         at = self.offset + len(packet) - CHECK_SIZE - len(stream)
         told = told if header.flags & MASKS else None
         clip.segments.append(SegmentRow(at, len(stream), header, made.kind, told))
-        self._write(self.edited("packet", packet))
+        self._write(self.apply_edit("packet", packet))
         self._next_packet += 1
 
     def _segment(self, header: SegmentHeader, payload: bytes) -> None:
@@ -286,7 +288,7 @@ class Crafter(Writer):
             data = build_packet(packet)
             at = self.offset + len(data) - CHECK_SIZE - len(payload)
             row = SegmentRow(at, len(payload), header, SEGMENT)
-            self._write(self.edited("packet", data))
+            self._write(self.apply_edit("packet", data))
             self._next_packet += 1
             if header.signal == 0:
                 self._implying = row, payload
@@ -294,28 +296,30 @@ class Crafter(Writer):
 
     def close_data(self) -> None:
         assert self._next_packet is not None
-        self._write(self.edited("end_packet", build_packet(Packet(END, self._next_packet, b""))))
+        self._write(
+            self.apply_edit("end_packet", build_packet(Packet(END, self._next_packet, b"")))
+        )
         self._next_packet = None
 
     def finish(self, *, index: bool = True) -> None:
         start, length = 0, 0
         if index:
-            chunk = self.edited("INDX_frame", self._index_chunk())
+            chunk = self.apply_edit("INDX_frame", self._index_chunk())
             start, length = self.offset, len(chunk)
             if self.continued:
                 self.directory.indexes += (place_of(index_name(chunk, start), 0, self.directory),)
             self._write(chunk)
-        self._write(self.edited("FOOT", build_foot(start, length)))
+        self._write(self.apply_edit("FOOT", build_foot(start, length)))
 
     def _index_chunk(self) -> bytes:
         since = self.directory.indexes[-1] if self.directory.indexes else None
         fields = index_record(self.directory, since)
-        self.edited("table", fields)
-        content = built(index_records.Index, fields, "INDX")
+        self.apply_edit("table", fields)
+        content = build_record(index_records.Index, fields, "INDX")
         packed = {"size": len(content), "data": deflate(content)}
         if since is not None:
             packed |= {"flags": index_records.CONTINUES, "previous": since.chunk}
-        payload = self.edited("INDX", built(index_records.Indx, packed, "INDX"))
+        payload = self.apply_edit("INDX", build_record(index_records.Indx, packed, "INDX"))
         return build_chunk(b"INDX", payload, ChunkFlag.ANCILLARY)
 
 
@@ -336,10 +340,10 @@ def file_of(
     crafter = Crafter(**live, anew=anew, repeat=repeat, **edits)
     for motion in motions:
         crafter.clip(motion, grouping=grouping, codec=codec, segment_frames=segment_frames)
-    return finished(crafter, index=index)
+    return finish_file(crafter, index=index)
 
 
-def finished(crafter: Crafter, *motions: Motion, index: bool = True) -> bytes:
+def finish_file(crafter: Crafter, *motions: Motion, index: bool = True) -> bytes:
     """The file of ``crafter`` with these clips added."""
     for motion in motions:
         crafter.clip(motion)
@@ -414,14 +418,14 @@ def partial(motion: Motion, frames: tuple[int, int], joints: Sequence[int] | Non
     return (*arguments, "--joints", listed), arrays(Motion(bones, (part,), name=motion.name))
 
 
-def attached(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
+def attachment_file(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
     """A file of one attachment, deflated to ``stream``; ``whole``: what it says that it is."""
     content = b"" if whole is None else whole
 
     def edit(payload: bytes) -> bytes:
         fields = parse(payloads.Atta, payload, "ATTA")
         update(fields, {"flags": 1, "size": size, "part_size": size, "data": stream})
-        return built(payloads.Atta, fields, "ATTA")
+        return build_record(payloads.Atta, fields, "ATTA")
 
     def row(fields: Any) -> Any:
         fields.attachments.numbers("size")[0] = size
@@ -429,7 +433,7 @@ def attached(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
 
     crafter = Crafter(ATTA=edit, table=row)
     crafter.parts("a.bin", content)
-    return finished(crafter)
+    return finish_file(crafter)
 
 
 def live_file(motion: Motion, **edits: Any) -> bytes:

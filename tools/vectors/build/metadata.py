@@ -8,7 +8,7 @@ from mcz.container import payloads
 from mcz.container.dictionary_deflate import words
 from mcz.container.metadata import Record, record_bytes
 from mcz.model.schema import deflate
-from tools.records import built
+from tools.records import build_record
 
 
 def content_of(records: Sequence[Record]) -> bytes:
@@ -32,4 +32,4 @@ def payload_of(
         "size": len(content) if size is None else size,
         "data": data,
     }
-    return built(payloads.Meta, fields, "META")
+    return build_record(payloads.Meta, fields, "META")

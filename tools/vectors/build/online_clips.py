@@ -77,6 +77,6 @@ def codec_of(plan: Plan, coding: type[Coding] = Coding) -> Any:
     return replace(codec_by_name(ONLINE), **changes, dial=None)
 
 
-def numbered(values: Sequence[int]) -> Callable[[int, int], int]:
+def steps_in_turn(values: Sequence[int]) -> Callable[[int, int], int]:
     """Steps of these codes in turn."""
     return lambda number, kind: values[number]

@@ -181,14 +181,14 @@ class Coding:
             self.number(change, n - 1)
 
     def coefficients(self, kind: int, row: Sequence[int]) -> None:
-        code = self._golomb if self.plan.coder == GOLOMB else self._mixed
+        code = self._golomb if self.plan.coder == GOLOMB else self._code_mixed
         code(kind, list(row))
 
     def length_of(self, row: Sequence[int]) -> int:
         """Number of coded coefficients of a matrix row: up to the last that is not 0."""
         return max((i + 1 for i, c in enumerate(row) if c), default=0)
 
-    def _mixed(self, kind: int, row: list[int]) -> None:
+    def _code_mixed(self, kind: int, row: list[int]) -> None:
         for m, start in enumerate(self.starts[:-1]):
             length = self.length_of(row[start : self.starts[m + 1]])
             scales = 16 * self.lengths[m], 16 * self.lengths[max(m - 1, 0)]

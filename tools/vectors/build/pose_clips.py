@@ -24,7 +24,7 @@ from mcz.codecs.posewave.segment import Weights, encode_segment
 from mcz.codecs.posewave.segment_chain import SegmentChain
 from mcz.model.motion import Joint, Skeleton
 from mcz.model.numbers import Grid
-from tools.records import built
+from tools.records import build_record
 from tools.vectors.build.motions import channels
 
 Floats = NDArray[np.float64]
@@ -102,7 +102,7 @@ class Plan:
 def header_of(plan: Plan, **changes: Any) -> bytes:
     fields = PLAIN_FIELDS | {"exact": plan.groups[1]} | plan.fields | changes
     fields["borrowing"] = min(fields["borrowing"], fields["levels"])
-    return built(PosewaveHeader, {"contacts": []} | fields, "posewave header")
+    return build_record(PosewaveHeader, {"contacts": []} | fields, "posewave header")
 
 
 def layout_of(plan: Plan) -> Layout:
@@ -112,13 +112,13 @@ def layout_of(plan: Plan) -> Layout:
     )
 
 
-def parsed(plan: Plan) -> Header:
+def parse_plan(plan: Plan) -> Header:
     return parse_header(header_of(plan), layout_of(plan))
 
 
 def segments_of(plan: Plan) -> list[Segment]:
     chain, tracker = (
-        SegmentChain(parsed(plan), plan.skeleton),
+        SegmentChain(parse_plan(plan), plan.skeleton),
         ContactTracker(plan.tolerance, plan.pieces),
     )
     edges = [0, *plan.ends, plan.n_frames] if plan.n_frames else []
@@ -169,7 +169,7 @@ def codec_of(plan: Plan) -> Codec:
 
     def encode(source: Any, params: Any) -> Encoded:
         made = with_exact(plan, source) if plan.exact else iter(segments_of(plan))
-        version = parsed(plan).version
+        version = parse_plan(plan).version
         return Encoded(header_of(plan), made, plan.n_resolutions, version=version)
 
     return replace(

@@ -40,7 +40,7 @@ from tools.vectors.build.random_parts import (
     integers,
     partition,
     skeleton,
-    split,
+    split_count,
 )
 from tools.vectors.build.spatial_clips import FRAME, PCA_RDO
 
@@ -85,7 +85,7 @@ def _waves(chance: Chance, name: str) -> Clip:
         chance.choice((0, 1, 6, 15, SCALED, SCALED)),
         unit,
         chance.choice((1, 1, 2, 700, 2**39)),
-        ends(split(chance, n_frames, 2**levels)),
+        ends(split_count(chance, n_frames, 2**levels)),
         n_resolutions=chance.randrange(1, levels + 2),
     )
     made = [_wave(chance, plan) for _ in range(chance.randrange(1, 4))]
@@ -121,7 +121,7 @@ def _curves(chance: Chance, name: str) -> Clip:
         delta,
         chance.choice((0, 2, 15, SCALED)),
         2.0 ** chance.randrange(-20, 21),
-        ends=ends(split(chance, n_frames, delta)),
+        ends=ends(split_count(chance, n_frames, delta)),
         n_resolutions=chance.randrange(1, 3),
     )
     sizes = [chance.randrange(1, 5) for _ in range(chance.randrange(1, 4))]
@@ -137,7 +137,7 @@ def _path(chance: Chance, plan: curve_clips.Plan, size: int) -> curve_clips.Path
         if chance.random() < 0.7:
             pieces[mark] = [
                 curve_clips.Piece(n, _point(chance, size), _point(chance, size))
-                for n in split(chance, plan.between(mark))
+                for n in split_count(chance, plan.between(mark))
             ]
     scales = chance.randrange(64), chance.randrange(64), chance.randrange(64)
     spoken = tuple(k for k in range(2) if chance.random() < 0.3)
@@ -153,7 +153,7 @@ def _point(chance: Chance, size: int) -> tuple[int, ...] | None:
 def _parts(chance: Chance, name: str) -> Clip:
     n = chance.randrange(1, 6)
     parts, empty = [], []
-    for number, n_frames in enumerate(split(chance, chance.choice((1, 3, 12, 20)))):
+    for number, n_frames in enumerate(split_count(chance, chance.choice((1, 3, 12, 20)))):
         count = chance.randrange(min(n, n_frames + 1) + 1)
         scale, forms = chance.randrange(63), [chance.randrange(4) for _ in range(count)]
         columns = [integers(chance, n_frames) for _ in range(count)]
@@ -211,7 +211,7 @@ def _about(chance: Chance) -> dict[str, Any]:
 
 def _space(chance: Chance, name: str) -> Clip:
     about = _about(chance)
-    segments = tuple(split(chance, chance.choice((1, 2, 13, 30))))
+    segments = tuple(split_count(chance, chance.choice((1, 2, 13, 30))))
     window = chance.choice((1, 2, 4, 8, 20))
     frequencies = chance.randrange(1, window + 1)
     fresh: tuple[bool, ...] = ()
@@ -244,11 +244,11 @@ def _space(chance: Chance, name: str) -> Clip:
 def _online(chance: Chance, name: str) -> Clip:
     about = _about(chance)
     order = 0 if about["apart"] or about["n_channels"] % 3 else chance.randrange(2)
-    parts = split(chance, chance.choice((1, 2, 13, 30)))
+    parts = split_count(chance, chance.choice((1, 2, 13, 30)))
     units = []
     for number, n_frames in enumerate(parts):
         own = []
-        for k, n in enumerate(split(chance, n_frames)):
+        for k, n in enumerate(split_count(chance, n_frames)):
             own.append("I" if number == k == 0 else chance.choice("ILSS"))
             own[-1] += str(n)
         units.append(" ".join(own))
@@ -257,7 +257,7 @@ def _online(chance: Chance, name: str) -> Clip:
         tuple(units),
         coder=chance.randrange(2),
         order=order,
-        steps=online_clips.numbered(codes),
+        steps=online_clips.steps_in_turn(codes),
         said=tuple(f for f in range(sum(parts)) if chance.random() < 0.2),
         **about,
     )
@@ -287,7 +287,7 @@ def _poses(chance: Chance, name: str) -> Clip:
         "weights": [chance.randrange(110, 150) for _ in bones.joints] * chance.randrange(2),
     }
     plan = pose_clips.Plan(
-        bones, source, fields, ends(split(chance, n_frames)), chance.randrange(levels + 1)
+        bones, source, fields, ends(split_count(chance, n_frames)), chance.randrange(levels + 1)
     )
     values = pose_clips.values_of(plan)
     made = _lossy(chance, pose_clips.codec_of(plan), values, "all", sizes)

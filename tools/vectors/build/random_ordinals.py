@@ -29,7 +29,7 @@ from tools.vectors.build.random_parts import (
     integers,
     partition,
     skeleton,
-    split,
+    split_count,
 )
 
 
@@ -141,7 +141,7 @@ def any_signal(
         grid_changes=made.changes,
         **about,
     )
-    return signal if whole else _noted(chance, signal), made.copies
+    return signal if whole else _add_exceptions(chance, signal), made.copies
 
 
 def mask_of(chance: Chance, shape: tuple[int, int]) -> NDArray[np.bool_] | None:
@@ -159,7 +159,7 @@ TOKENS = (b"1e3", b"-NaN", b"+5", b"Infinity", b"-1.#INF00", b"007", b".1", b"1e
 MEANT = (1e3, np.nan, 5.0, np.inf, -np.inf, 7.0, 0.1, 0.0, 12.0)
 
 
-def _noted(chance: Chance, signal: Signal) -> Signal:
+def _add_exceptions(chance: Chance, signal: Signal) -> Signal:
     """``signal`` with some exceptions."""
     odd = {channel for _, channel, _ in signal.grid_changes}
     shown = [c for c, grid in enumerate(signal.grids) if grid.is_text and c not in odd]
@@ -179,7 +179,7 @@ def _noted(chance: Chance, signal: Signal) -> Signal:
 def clip_of_ordinals(chance: Chance, name: str) -> Clip:
     n_frames = chance.choice((0, 1, 2, 5, 11, 26))
     n = chance.choice((0, 1, 3, 6, 9))
-    parts = [split(chance, n_frames) for _ in range(chance.choice((1, 1, 2, 3)))]
+    parts = [split_count(chance, n_frames) for _ in range(chance.choice((1, 1, 2, 3)))]
     found = [any_signal(chance, parts[0], n)]
     for number, own in enumerate(parts[1:]):
         size = chance.randrange(1, 4)
@@ -272,7 +272,7 @@ def _heads(
         else:
             form = form_of_grid(grids[c])
             own = form != form_of_grid(layout.grids[c]) or chance.random() < 0.1
-            heads.append(_coded(chance, form if own else None))
+            heads.append(_draw_coded(chance, form if own else None))
     return heads
 
 
@@ -300,7 +300,7 @@ def _fast_streams(
             heads.append(fast_clips.Constant())
         else:
             spelled = form != form_of_grid(layout.grids[c]) or (more and chance.random() < 0.1)
-            made = _coded(chance, form if spelled else None)
+            made = _draw_coded(chance, form if spelled else None)
             is_steps = own.random() < 0.1
             heads.append(fast_clips.Steps() if is_steps else _lane(own, made, column, form))
     return fast_clips.streams_of(layout, block, _with_parents(own, layout, place, heads))
@@ -355,7 +355,7 @@ class Drawn:
     taps: tuple[int, ...]
 
 
-def _coded(chance: Chance, form: int | None) -> Drawn:
+def _draw_coded(chance: Chance, form: int | None) -> Drawn:
     wild = chance.random() < 0.2
     taps = [chance.randrange(-511, 512) if wild else chance.randrange(-9, 40) for _ in range(8)]
     scale = chance.choice((0, 3, 8, 40, 77, 172))

@@ -52,7 +52,7 @@ def integers(chance: Chance, n: int, most: int = MOST) -> list[int]:
     return found
 
 
-def split(chance: Chance, n: int, unit: int = 1) -> list[int]:
+def split_count(chance: Chance, n: int, unit: int = 1) -> list[int]:
     """``n`` in parts, all but the last multiples of ``unit``, now and then all of one unit."""
     parts: list[int] = []
     sizes = (1,) if chance.random() < 0.3 else (1, 1, 2, 3, 5, 9)

@@ -9,7 +9,7 @@ from mcz.files.editing.archive import append
 from mcz.files.editing.rewriting import protect
 
 
-def protected(data: bytes, redundancy: float, behind: bytes = b"") -> bytes:
+def protect_file(data: bytes, redundancy: float, behind: bytes = b"") -> bytes:
     """The file of ``data`` with a RECV; ``behind``, another file, appended, gets its own."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "protected.mcz"

@@ -130,10 +130,10 @@ TEXT_SPEC = f"{HEADING}; The text of AMC and BVH"
 
 def take(data: bytes, name: str) -> Motion:
     """The motion in a BVH file, its source called after it."""
-    return called(bvh.read(data, name), f"{name}.bvh")
+    return set_path(bvh.read(data, name), f"{name}.bvh")
 
 
-def called(motion: Motion, path: str) -> Motion:
+def set_path(motion: Motion, path: str) -> Motion:
     assert motion.source is not None
     return replace(motion, source=replace(motion.source, path=path))
 
@@ -149,7 +149,7 @@ def hierarchy(n_joints: int) -> str:
     return "HIERARCHY\n" + lines.replace("JOINT", "ROOT", 1) + site + ends
 
 
-def restored(motion: Motion) -> bytes:
+def restore_source(motion: Motion) -> bytes:
     """Bytes that the source of ``motion`` restores from it."""
     assert motion.source is not None
     return FORMATS[motion.source.format].write(motion)

@@ -102,8 +102,8 @@ def header(plan: Plan, **parts: bytes) -> bytes:
     inline = isinstance(plan.wavelet, Wavelet)
     fields = {
         "wavelet": b"\0" if isinstance(plan.wavelet, Wavelet) else bytes((plan.wavelet,)),
-        "lo": counted(plan.filters.lo) if inline else b"",
-        "hi": counted(plan.filters.hi) if inline else b"",
+        "lo": build_taps(plan.filters.lo) if inline else b"",
+        "hi": build_taps(plan.filters.hi) if inline else b"",
         "levels": bytes((plan.levels,)),
         "coded_frames": varint(plan.coded_frames),
         "decimals": bytes((plan.decimals,)),
@@ -113,7 +113,7 @@ def header(plan: Plan, **parts: bytes) -> bytes:
     return b"".join((fields | parts).values())
 
 
-def counted(taps: Sequence[float]) -> bytes:
+def build_taps(taps: Sequence[float]) -> bytes:
     return varint(len(taps)) + struct.pack(f"<{len(taps)}d", *taps)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mcz.container import payloads
 from mcz.container.dictionary_deflate import PACKED, words
 from mcz.model.schema import deflate, inflate, parse, varint
-from tools.records import built
+from tools.records import build_record
 
 BEYOND = 32768  # a distance that the words are too few for
 
@@ -15,7 +15,7 @@ def after_words(payload: bytes) -> bytes:
     fields = parse(payloads.Srce, payload, "SRCE")
     text = inflate(fields.data, fields.size, "SRCE")
     packed = {"flags": payloads.AFTER_WORDS, "data": deflate(text, words=words())}
-    return built(payloads.Srce, vars(fields) | packed, "SRCE")
+    return build_record(payloads.Srce, vars(fields) | packed, "SRCE")
 
 
 def beyond(payload: bytes) -> bytes:
@@ -33,7 +33,7 @@ def copy_of_three() -> bytes:
     return bytes(int(bits[n : n + 8][::-1], 2) for n in range(0, len(bits), 8))
 
 
-def packed(payload: bytes, size: int | None = None) -> bytes:
+def pack_skeleton(payload: bytes, size: int | None = None) -> bytes:
     """A SKEL with its fields packed; ``size``: another one is stated."""
     at = 1 + payload[0]
     rest = payload[at + 1 :]
@@ -44,4 +44,4 @@ def packed(payload: bytes, size: int | None = None) -> bytes:
 
 def too_long(payload: bytes) -> bytes:
     """A packed SKEL whose fields, an extension among them, are longer than a template may be."""
-    return packed(payload + bytes(2**26 + 1 - (len(payload) - payload[0] - 2)))
+    return pack_skeleton(payload + bytes(2**26 + 1 - (len(payload) - payload[0] - 2)))

@@ -24,7 +24,7 @@ from mcz.model.motion import Motion, Signal, Skeleton
 from mcz.model.schema import parse
 from mcz.model.types import Params
 from tools.vectors.build.edits import both, put
-from tools.vectors.build.files import Crafter, finished
+from tools.vectors.build.files import Crafter, finish_file
 from tools.vectors.engine.notation import read_bytes
 
 CLIP_KEYS = {"skeleton", "codec", "header", "models", "segments", "values"}
@@ -60,9 +60,9 @@ def coded_file(
     crafter = Crafter(profile=LARGE if archive else BASE, **options)
     for motion, fields in clips:
         if fields.get("appended"):
-            finished(crafter, index=index)
+            finish_file(crafter, index=index)
         _write(crafter, motion, fields, constants)
-    return finished(crafter, index=index)
+    return finish_file(crafter, index=index)
 
 
 def _write(

@@ -15,7 +15,7 @@ from mcz.container.chunks import Chunk, ChunkFlag
 from mcz.container.index_records import Index
 from mcz.container.packets import implied_by
 from mcz.model.schema import build, read_varint, varint
-from tools.vectors.engine.fields import SCHEMAS, STREAMS, VIEWS, place_of, swapped
+from tools.vectors.engine.fields import SCHEMAS, STREAMS, VIEWS, place_of, swap_items
 from tools.vectors.engine.layout import (
     Layout,
     Part,
@@ -110,7 +110,7 @@ class Editor:
         for edit in late:
             match = EDIT.fullmatch(edit)
             if match and match["name"] == "file":
-                whole = self._changed(None, whole, Target.of(match), match)
+                whole = self._change_field(None, whole, Target.of(match), match)
         return whole
 
     def _index(self, part: Part, number: int, late: Sequence[str], places: dict[int, Part]) -> None:
@@ -119,7 +119,7 @@ class Editor:
             before = places[previous.offset]
             was.start, previous = stop_of(before), previous_of(before)
         places[(part.place or 0) - FRONT] = part
-        listing = self.layout.indexed(was)
+        listing = self.layout.index_content(was)
         for chunk, owner in self.indexed:
             row = Chunk(chunk.type, 1, chunk.offset - FRONT, len(chunk.payload))
             if row.offset >= listing.start and row.offset < part.offset:
@@ -138,7 +138,7 @@ class Editor:
             if verb == "swap":
                 one, other = (Target.of(FIELD.fullmatch(place)) for place in places)
                 if (one.name, one.number) == (name, number):
-                    part.payload = swapped(schema, part.payload, one.path, other.path)
+                    part.payload = swap_items(schema, part.payload, one.path, other.path)
                 continue
             match = EDIT.fullmatch(edit)
             if match is None:
@@ -148,7 +148,7 @@ class Editor:
                 if target.own is not None:
                     self._outer(part, target, match)
                 else:
-                    part.payload = self._changed(schema, part.payload, target, match)
+                    part.payload = self._change_field(schema, part.payload, target, match)
 
     def _apply(self, edit: str) -> None:
         verb, _, rest = edit.partition(" ")
@@ -205,9 +205,9 @@ class Editor:
         one, other = (Target.of(FIELD.fullmatch(word)) for word in rest.split())
         part, view = self.layout.find(one.type, one.number), VIEWS.get(one.name)
         if view is None:
-            part.payload = swapped(SCHEMAS[one.name], part.payload, one.path, other.path)
+            part.payload = swap_items(SCHEMAS[one.name], part.payload, one.path, other.path)
         else:
-            inner = swapped(view.schema, view.read(part.payload), one.path, other.path)
+            inner = swap_items(view.schema, view.read(part.payload), one.path, other.path)
             part.payload = view.write(part.payload, inner)
 
     def _edit(self, match: re.Match[str]) -> None:
@@ -219,7 +219,7 @@ class Editor:
             self._stream(part, target, match)
         elif target.name in VIEWS:
             view = VIEWS[target.name]
-            inner = self._changed(view.schema, view.read(part.payload), target, match)
+            inner = self._change_field(view.schema, view.read(part.payload), target, match)
             part.payload = view.write(part.payload, inner)
         elif target.path in HEADER and part.type in (b"DATA", b"packet"):
             segment = part.taken_apart()
@@ -229,13 +229,13 @@ class Editor:
             self._streams(part, match)
         else:
             schema = SCHEMAS.get(target.name)
-            part.payload = self._changed(schema, part.payload, target, match)
+            part.payload = self._change_field(schema, part.payload, target, match)
 
     def _stream(self, part: Part, target: Target, match: re.Match[str]) -> None:
         segment, index = part.taken_apart(), target.stream or 0
         segment.streams += [b""] * (index + 1 - len(segment.streams))
         schema = STREAMS.get(target.name)
-        segment.streams[index] = self._changed(schema, segment.streams[index], target, match)
+        segment.streams[index] = self._change_field(schema, segment.streams[index], target, match)
 
     def _streams(self, part: Part, match: re.Match[str]) -> None:
         """``DATA.streams = 0 0 "new" 1``: streams of now by number, or bytes in parentheses."""
@@ -249,7 +249,7 @@ class Editor:
         """The header of a chunk or packet, or its bytes as they are written."""
         value = match["value"]
         if target.own == "":
-            part.outer.append(lambda data: self._changed(None, data, target, match))
+            part.outer.append(lambda data: self._change_field(None, data, target, match))
         elif target.own == "number" and part.packet is not None:
             implied = implied_by(integer(value), part.packet.implied[8:])
             part.packet = replace(part.packet, implied=implied)
@@ -276,7 +276,9 @@ class Editor:
         start, stop = place_of(schema, data, target.path, target.slice)
         return data[start:stop]
 
-    def _changed(self, schema: object, data: bytes, target: Target, match: re.Match[str]) -> bytes:
+    def _change_field(
+        self, schema: object, data: bytes, target: Target, match: re.Match[str]
+    ) -> bytes:
         start, stop = place_of(schema, data, target.path, target.slice)
         value, old = match["value"], data[start:stop]
         if match["operator"] == "+=":
@@ -289,6 +291,8 @@ class Editor:
         return data[:start] + new + data[stop:]
 
 
-def edited(base: bytes, edits: Sequence[str], constants: Mapping[str, str] | None = None) -> bytes:
+def edit_file(
+    base: bytes, edits: Sequence[str], constants: Mapping[str, str] | None = None
+) -> bytes:
     """The file ``base`` with these edits."""
     return Editor(base, edits, constants or {}).data() if edits else base

@@ -32,7 +32,7 @@ from mcz.sources.c3d.layout import C3dDetail, C3dOutputsTemplate, C3dTemplate
 from mcz.sources.tables.layout import TableDetail, TableTemplate
 from mcz.sources.text import notes
 from mcz.sources.text.layout import Detail, Template
-from tools.records import built, span
+from tools.records import build_record, span
 
 SCHEMAS: dict[str, Any] = {
     "HEAD": payloads.Head,
@@ -74,10 +74,12 @@ def _with_content(payload: bytes, content: bytes) -> bytes:
         payloads.DEFLATED: lambda: deflate(content),
         payloads.AFTER_WORDS: lambda: deflate(content, words=words()),
     }[fields.flags & payloads.ENCODING]()
-    return built(payloads.Srce, vars(fields) | {"size": len(content), "data": packed}, "SRCE")
+    return build_record(
+        payloads.Srce, vars(fields) | {"size": len(content), "data": packed}, "SRCE"
+    )
 
 
-def _copied(payload: bytes) -> bytes:
+def _copy_content(payload: bytes) -> bytes:
     """The content of a COPY or META: flags, size, data."""
     size, at = read_varint(payload, 1)
     return decode_data(payload[at:], payload[0], size, "COPY")
@@ -95,7 +97,7 @@ class CopiedChunks(Record):
 
 
 def _copy_list(payload: bytes) -> bytes:
-    content = _copied(payload)
+    content = _copy_content(payload)
     return varint(len(parse_all(payloads.CopiedChunk, content, "COPY"))) + content
 
 
@@ -128,9 +130,9 @@ VIEWS: dict[str, View] = {
     "TABLETEMPLATE": View(b"SRCE", TableTemplate, _content, _with_content),
     "TABLEDETAIL": View(b"CLIP", TableDetail, *_inside(payloads.Clip, "source.0.detail")),
     "C3DDETAIL": View(b"CLIP", C3dDetail, *_inside(payloads.Clip, "source.0.detail")),
-    "COPIES": View(b"COPY", None, _copied, _with_copied),
+    "COPIES": View(b"COPY", None, _copy_content, _with_copied),
     "COPIED": View(b"COPY", CopiedChunks, _copy_list, _with_copy_list),
-    "RECORDS": View(b"META", None, _copied, _with_copied),
+    "RECORDS": View(b"META", None, _copy_content, _with_copied),
     "HEADER": View(b"CLIP", None, *_inside(payloads.Clip, "signals.0.header")),
     **{
         f"{codec}_HEADER": View(b"CLIP", record, *_inside(payloads.Clip, "signals.0.header"))
@@ -177,7 +179,7 @@ def place_of(schema: Any, data: bytes, path: str, slice_: str | None) -> tuple[i
     return start + first, start + last
 
 
-def swapped(schema: Any, data: bytes, path: str, other: str) -> bytes:
+def swap_items(schema: Any, data: bytes, path: str, other: str) -> bytes:
     """``data`` with two items of a list in each other's place."""
     table, _, one = path.rpartition(".")
     if schema is Index:

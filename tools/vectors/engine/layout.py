@@ -124,7 +124,7 @@ class Part:
         if self.packet is not None:
             data = self._packet()
         else:
-            data = self.payload if self.type == b"FOOT" else framed(self)
+            data = self.payload if self.type == b"FOOT" else frame_chunk(self)
         for edit in self.outer:
             data = edit(data)
         return data
@@ -146,7 +146,7 @@ class Part:
         return head + self.payload + self.frame.get("check", check)
 
 
-def framed(part: Part) -> bytes:
+def frame_chunk(part: Part) -> bytes:
     """The bytes of a chunk, its checks made of what precedes them unless they are given."""
     length = OPEN if part.open else len(part.payload)
     fields = {
@@ -247,7 +247,7 @@ class Layout:
             part.offset = at + part.head_size
             at += len(part.build())
 
-    def indexed(self, listing: Listing) -> Listing:
+    def index_content(self, listing: Listing) -> Listing:
         """The content that an INDX needs where it had ``listing`` of the base file."""
         moved = {part.place: part for part in self.parts if part.place is not None}
         was, new = listing.new, Directory()
@@ -258,23 +258,23 @@ class Layout:
         shared = [
             (chunk, (kind, self.renamed.get(id_, id_)))
             for (kind, id_), old in was.shared.items()
-            if (chunk := _moved(old, moved)) is not None
+            if (chunk := _move_chunk(old, moved)) is not None
         ]
         new.shared = {key: chunk for chunk, key in sorted(shared, key=lambda row: row[0].offset)}
         for name, row in was.attachments.items():
-            parts = [chunk for old in row.parts if (chunk := _moved(old, moved)) is not None]
+            parts = [chunk for old in row.parts if (chunk := _move_chunk(old, moved)) is not None]
             new.attachments[name] = replace(row, parts=sorted(parts, key=lambda one: one.offset))
         for clip in was.clips.values():
             self._move_clip(clip, moved)
         for clip in sorted(was.clips.values(), key=lambda row: row.clip.offset):
             if clip.clip.offset:
                 new.clips[str(len(new.clips))] = clip  # two may have a name
-        behind = [chunk for old in listing.behind if (chunk := _moved(old, moved)) is not None]
+        behind = [chunk for old in listing.behind if (chunk := _move_chunk(old, moved)) is not None]
         return Listing(new, listing.start, behind)
 
     def _move_clip(self, clip: ClipRow, moved: Moved) -> None:
         clip.skeleton = self.renamed.get(clip.skeleton, clip.skeleton)
-        start, end = _moved(clip.clip, moved), clip.clip.stop
+        start, end = _move_chunk(clip.clip, moved), clip.clip.stop
         if start is None:
             clip.clip = replace(clip.clip, offset=0)
             return
@@ -285,10 +285,10 @@ class Layout:
             self._follow(clip, part)
         clip.clip, clip.segments = start, list(self._segment_rows(start, was))
         end = clip.segments[-1].stop if clip.segments else start.stop
-        found = None if cend is None else _moved(cend, moved)
+        found = None if cend is None else _move_chunk(cend, moved)
         assert cend is not None
         clip.cend = found or replace(cend, offset=end + cend.offset - last)
-        ancillary = (_moved(chunk, moved) for chunk in clip.ancillary)
+        ancillary = (_move_chunk(chunk, moved) for chunk in clip.ancillary)
         clip.ancillary = sorted(
             (chunk for chunk in ancillary if chunk and chunk.offset >= clip.cend.stop),
             key=lambda chunk: chunk.offset,
@@ -325,7 +325,7 @@ class Layout:
 Moved = Mapping[int | None, Part]
 
 
-def _moved(chunk: Chunk, moved: Moved) -> Chunk | None:
+def _move_chunk(chunk: Chunk, moved: Moved) -> Chunk | None:
     """The place of a chunk of the base file now; None where it is not there any more."""
     part = moved.get(chunk.payload_offset)
     if part is None:

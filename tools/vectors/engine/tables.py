@@ -15,7 +15,7 @@ from mcz.container.limits import FORMAT_NAME
 from tools.vectors.bases import Base, base_bytes, base_of
 from tools.vectors.build.files import OK, REFUSED, Vector, arrays, partial
 from tools.vectors.engine.coded import CLIP_KEYS, coded_file
-from tools.vectors.engine.edits import edited
+from tools.vectors.engine.edits import edit_file
 
 FOLDER = Path(__file__).parent.parent / "tables"
 HEAD = {"folder", "spec", "base", "file", "rules", "also", "modes", "exit", "edit"} | CLIP_KEYS
@@ -70,18 +70,18 @@ class Row:
     def data(self) -> bytes:
         edits = self.fields.get("edit", [])
         edits = [edits] if isinstance(edits, str) else edits
-        return edited(self._base(), edits, self.constants)
+        return edit_file(self._base(), edits, self.constants)
 
     def _base(self) -> bytes:
         fields, options = self.fields, self.fields.get("file", {})
-        if not self.coded:
+        if not self.has_segments:
             return base_bytes(fields["base"], options)
         clips = [{**fields, **own} for own in fields.get("clips", [{}])]
         motions = [base_of(clip["base"]).motions[0] for clip in clips]
         return coded_file(list(zip(motions, clips, strict=True)), self.constants, **options)
 
     @property
-    def coded(self) -> bool:
+    def has_segments(self) -> bool:
         """True where the row writes segments out: it holds what mcz decodes.
 
         The row's hashes and the other decoder vouch for that.
@@ -96,9 +96,9 @@ class Row:
         exit_ = tuple(exit_) if isinstance(exit_, list) else (exit_,)
         data, modes = self.data, tuple(fields.get("modes", "arrays").split())
         held, listed = Base(), ()
-        if OK in exit_ and (self.coded or fields.get("holds") == DECODED):
-            listed = _answered(data)
-            restored = _answered(data, "--source") if "sources" in modes else ()
+        if OK in exit_ and (self.has_segments or fields.get("holds") == DECODED):
+            listed = _decode_arrays(data)
+            restored = _decode_arrays(data, "--source") if "sources" in modes else ()
             held = Base(sources=tuple((row["path"], content) for row, content in restored))
         elif OK in exit_:
             held = base_of(fields.get("holds", fields["base"]))
@@ -120,7 +120,7 @@ class Row:
         )
 
 
-def _answered(data: bytes, *arguments: str) -> Arrays:
+def _decode_arrays(data: bytes, *arguments: str) -> Arrays:
     """The arrays of a file or of a part of it, or its sources, as mcz decodes them."""
     _, output = answer(data, arguments)
     line, _, content = output.partition(b"\n")
@@ -135,7 +135,7 @@ def _answered(data: bytes, *arguments: str) -> Arrays:
 def _part(data: bytes, held: Base, text: str) -> Any:
     """A partial read: ``dance 1:3`` or ``dance 1:3 0,2``, clip, frames, joints, or arguments."""
     if text.startswith("--"):
-        return tuple(text.split()), _answered(data, *text.split())
+        return tuple(text.split()), _decode_arrays(data, *text.split())
     clip, frames, *joints = text.rsplit(" ", text.count(" "))
     (motion,) = (motion for motion in held.motions if motion.name == clip)
     start, _, stop = frames.partition(":")
@@ -158,7 +158,7 @@ def rows_of(path: Path) -> Iterator[Row]:
             unknown = sorted(set(row) - ROW)
             if unknown or ("fault" in row) != folder.startswith("invalid/"):
                 raise ValueError(f"{path.name}: {name}: {unknown or 'fault'}")
-            fields = _filled({**head, **row}, folder.rpartition("/")[2])
+            fields = _fill_fields({**head, **row}, folder.rpartition("/")[2])
             fields["base"] = bases.get(fields["base"], fields["base"])
             fields["also"] = f"{head.get('also', '')} {row.get('also', '')}"
             used.add(row.get("fault"))
@@ -168,7 +168,7 @@ def rows_of(path: Path) -> Iterator[Row]:
             raise ValueError(f"{path.name}: no row has the faults {sorted(set(faults) - used)}")
 
 
-def _filled(fields: dict[str, Any], codec: str) -> dict[str, Any]:
+def _fill_fields(fields: dict[str, Any], codec: str) -> dict[str, Any]:
     """The fields with the folder's own name, a codec's, where they say ``$codec``."""
 
     def fill(value: Any) -> Any:

@@ -20,7 +20,7 @@ from mcz.container.packets import END, Packet, build_packet
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.schema import inflate, parse
-from tools.records import built, extend
+from tools.records import build_record, extend
 from tools.vectors.build import wavelet_clips
 from tools.vectors.build.edits import Made, at, both, headed, plus, put, swap
 from tools.vectors.build.files import (
@@ -30,7 +30,7 @@ from tools.vectors.build.files import (
     Vector,
     Whole,
     file_of,
-    finished,
+    finish_file,
     live_file,
 )
 from tools.vectors.build.motions import HUNDREDTHS, dance
@@ -41,11 +41,11 @@ from tools.vectors.build.source_files import (
     TEXT_SPEC,
     lossy,
     path_of,
-    restored,
+    restore_source,
     take,
 )
 from tools.vectors.build.spatial_clips import CLIP, Plan, basis_of, file_with
-from tools.vectors.build.words import after_words, packed
+from tools.vectors.build.words import after_words, pack_skeleton
 
 LATER = b"more, from a later version"
 
@@ -54,9 +54,9 @@ def vectors() -> Iterable[Vector]:
     shelf = Whole("uncommon/container", exit=(OK, UNSUPPORTED))
     _unknown(shelf)
     _extensions(shelf)
-    _appended(shelf)
+    _hold_appended(shelf)
     _appended_without_index(shelf)
-    _shared(shelf)
+    _hold_shared(shelf)
     _repeated_template(shelf)
     _open_data(shelf)
     _packets(shelf)
@@ -75,13 +75,13 @@ def vectors() -> Iterable[Vector]:
 def _appended_without_index(shelf: Whole) -> None:
     motions = dance(), dance(3, name="encore")
     crafter = Crafter()
-    finished(crafter, motions[0], index=False)
-    data = finished(crafter, motions[1], index=False)
+    finish_file(crafter, motions[0], index=False)
+    data = finish_file(crafter, motions[1], index=False)
     purpose = "An append to a file without INDX that has none either."
     shelf.hold("appended-no-index", "Grammar", purpose, data, *motions)
     crafter = Crafter()
-    finished(crafter, motions[0])
-    data = finished(crafter, index=False)
+    finish_file(crafter, motions[0])
+    data = finish_file(crafter, index=False)
     purpose = "An append of nothing, without INDX: the last FOOT points to none."
     shelf.hold("appended-nothing", "Grammar; FOOT", purpose, data, motions[0])
 
@@ -89,7 +89,7 @@ def _appended_without_index(shelf: Whole) -> None:
 def _repeated_template(shelf: Whole) -> None:
     plain = take(PLAIN, "plain")
     again = replace(plain, name="again", source=None)
-    edits = {b"SRCE": after_words, b"SKEL": packed}
+    edits = {b"SRCE": after_words, b"SKEL": pack_skeleton}
     cases = {
         "repeated-template": ({}, "The same SRCE and SKEL twice: INDX lists the first."),
         "one-id": (edits, "SRCE and SKEL twice, the second time with other compression: one id."),
@@ -103,7 +103,7 @@ def _repeated_template(shelf: Whole) -> None:
             assert place.length is not None
             payload = crafter.data[place.payload_offset :][: place.length]
             crafter.plain_chunk(kind, others[kind](payload) if others else payload)
-        data = finished(crafter, again)
+        data = finish_file(crafter, again)
         sources = (("plain.bvh", PLAIN),)
         shelf.hold(
             name, "Grammar; INDX; Conventions", purpose, data, plain, again,
@@ -117,7 +117,7 @@ def _packets(shelf: Whole) -> None:
     purpose = "An end packet whose bit 7 is clear, which says nothing."
     shelf.hold("end-not-fresh", "Open DATA and packets", purpose, data, dance())
     crafter = Crafter(packets=True, REPT=lambda payload: b"no chunk at all", repeat=(0,))
-    data = finished(crafter, dance())
+    data = finish_file(crafter, dance())
     purpose = "A REPT whose payload is nothing like chunks: who has the beginning skips it."
     shelf.hold("REPT-of-nothing", "REPT", purpose, data, dance())
     empty = Motion(Skeleton((Joint("rock"),)), (Signal(np.empty((3, 0))),), name="rock")
@@ -147,14 +147,14 @@ def _most(shelf: Whole) -> None:
 def _records(shelf: Whole) -> None:
     entries = [("codec", "none"), ("mean_error_cm", "none of your business"), ("codec", "raw")]
     fields = {"entries": [{"key": k, "value": v} for k, v in entries], "extension": b""}
-    record = built(payloads.Qual, fields, "QUAL")
+    record = build_record(payloads.Qual, fields, "QUAL")
     crafter = Crafter()
     crafter.ancillary(b"QUAL", record)
     crafter.clip(dance())
     for _ in range(2):
         crafter.ancillary(b"QUAL", record)
     purpose = "Quality records before any clip and twice behind one, a key twice, no number."
-    shelf.hold("quality-nonsense", "QUAL", purpose, finished(crafter), dance())
+    shelf.hold("quality-nonsense", "QUAL", purpose, finish_file(crafter), dance())
 
 
 def _unknown_sources(shelf: Whole) -> None:
@@ -199,7 +199,7 @@ def _lossy_without_text(shelf: Whole) -> None:
     motion, codec = lossy(plan, columns, "lossy")
     rows = motion.signals[0].values[:, :5].tolist()
     words = [" ".join(repr(v).removesuffix(".0") for v in row).encode() for row in rows]
-    text = restored(motion)
+    text = restore_source(motion)
     assert all(row + b" " in text for row in words)
     shelf.hold(
         "grids-without-text-lossy",
@@ -219,7 +219,7 @@ def _unknown(shelf: Whole) -> None:
     crafter.clip(motions[0])
     crafter.ancillary(b"xtra", b"after a clip, to be kept")
     crafter.ancillary(b"zvol", b"", safe_to_copy=False)
-    data = finished(crafter, motions[1])
+    data = finish_file(crafter, motions[1])
     purpose = "Ancillary chunks of unknown type, safe to copy and not, one of them empty."
     shelf.hold("unknown-ancillary", "Chunks; Grammar", purpose, data, *motions)
 
@@ -228,7 +228,7 @@ def _unknown(shelf: Whole) -> None:
         return made
 
     crafter = Crafter(segments=within)
-    data = finished(crafter, dance())
+    data = finish_file(crafter, dance())
     purpose = "An unknown ancillary chunk inside a clip: the gap before its segment is longer."
     shelf.hold("unknown-ancillary-in-clip", "Grammar; INDX", purpose, data, dance())
     data = file_of(dance(), SKEL=put(payloads.Skel, "joints.0.channels.3.kind", b"\xc8"))
@@ -243,7 +243,9 @@ def _extensions(shelf: Whole) -> None:
 
     crafter = Crafter()
     crafter.clip(dance())
-    crafter.ancillary(b"QUAL", built(payloads.Qual, {"entries": [], "extension": LATER}, "QUAL"))
+    crafter.ancillary(
+        b"QUAL", build_record(payloads.Qual, {"entries": [], "extension": LATER}, "QUAL")
+    )
     signal = partial(extend, payloads.Clip, path="signals.0", more=LATER)
     cases = (
         ("HEAD", "HEAD", file_of(dance(), HEAD=plus(LATER))),
@@ -252,30 +254,30 @@ def _extensions(shelf: Whole) -> None:
         ("signal", "CLIP", file_of(dance(), CLIP=signal)),
         ("CEND", "CEND", file_of(dance(), CEND=plus(LATER))),
         ("INDX", "INDX", file_of(dance(), table=index)),
-        ("QUAL", "QUAL", finished(crafter)),
+        ("QUAL", "QUAL", finish_file(crafter)),
     )
     for name, heading, data in cases:
         purpose = f"Bytes behind the known fields are ignored: {name}."
         shelf.hold(f"extension-{name}", f"Conventions; {heading}", purpose, data, dance())
 
 
-def _appended(shelf: Whole) -> None:
+def _hold_appended(shelf: Whole) -> None:
     motions = dance(), dance(3, name="encore"), dance(2, name="finale")
     data = file_of(dance(), index=False)
     shelf.hold("no-index", "Grammar; FOOT", "A file without INDX.", data, dance())
     crafter = Crafter()
     for motion in motions:
-        data = finished(crafter, motion)
+        data = finish_file(crafter, motion)
     purpose = "Two appends: three bodies, each with its own INDX and FOOT."
     shelf.hold("appended-twice", "Grammar; INDX", purpose, data, *motions)
     crafter = Crafter()
-    finished(crafter, motions[0], index=False)
-    data = finished(crafter, motions[1])
+    finish_file(crafter, motions[0], index=False)
+    data = finish_file(crafter, motions[1])
     purpose = "An append whose INDX covers a body that had none."
     shelf.hold("appended-to-no-index", "Grammar; INDX", purpose, data, *motions[:2])
 
 
-def _shared(shelf: Whole) -> None:
+def _hold_shared(shelf: Whole) -> None:
     motions = dance(), dance(3, name="encore")
     crafter = Crafter()
     crafter.clip(motions[0])
@@ -283,12 +285,12 @@ def _shared(shelf: Whole) -> None:
     assert place.length is not None
     payload = crafter.data[place.payload_offset :][: place.length]
     crafter.plain_chunk(b"SKEL", payload)
-    data = finished(crafter, motions[1])
+    data = finish_file(crafter, motions[1])
     purpose = "The same SKEL twice: the first counts."
     shelf.hold("repeated-skeleton", "Grammar; SKEL", purpose, data, *motions)
     crafter = Crafter()
-    crafter.shared(b"MODL", built(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
-    data = finished(crafter, dance())
+    crafter.shared(b"MODL", build_record(payloads.Modl, {"kind": 77, "data": b"learned"}, "MODL"))
+    data = finish_file(crafter, dance())
     shelf.hold("unused-model", "MODL", "A model that no clip refers to.", data, dance())
     plain = take(PLAIN, "plain")
     shelf.hold(
@@ -310,7 +312,7 @@ def _stored_blocks(payload: bytes) -> bytes:
     fields.data = b"".join(
         struct.pack("<BHH", last, len(block), len(block) ^ 0xFFFF) + block for last, block in blocks
     )
-    return built(payloads.Srce, fields, "SRCE")
+    return build_record(payloads.Srce, fields, "SRCE")
 
 
 def _open_data(shelf: Whole) -> None:
@@ -400,11 +402,16 @@ def _needs_more(shelf: Whole) -> None:
     crafters[2].plain_chunk(b"ROOM", b"what the room looked like")
     crafters[2].clip(dance())
     cases = (
-        ("unknown-codec", "Codecs", "A codec id beyond the registry.", finished(crafters[0])),
-        ("old-codec", "Codecs", "Codec 5, which was dwt in 0.9.", finished(crafters[3])),
-        ("private-codec", "Codecs", "A codec for private use.", finished(crafters[4])),
-        ("newer-codec", "Codecs", "A later version of a known codec.", finished(crafters[1])),
-        ("unknown-critical", "Chunks", "A critical chunk of unknown type.", finished(crafters[2])),
+        ("unknown-codec", "Codecs", "A codec id beyond the registry.", finish_file(crafters[0])),
+        ("old-codec", "Codecs", "Codec 5, which was dwt in 0.9.", finish_file(crafters[3])),
+        ("private-codec", "Codecs", "A codec for private use.", finish_file(crafters[4])),
+        ("newer-codec", "Codecs", "A later version of a known codec.", finish_file(crafters[1])),
+        (
+            "unknown-critical",
+            "Chunks",
+            "A critical chunk of unknown type.",
+            finish_file(crafters[2]),
+        ),
         ("newer-major", "HEAD", "A later major version.", file_of(dance(), HEAD=at(2, b"\2\0"))),
         ("unknown-profile", "HEAD", "A later profile.", file_of(dance(), HEAD=at(4, b"\7"))),
     )
@@ -432,7 +439,9 @@ def _other_index(shelf: Whole) -> None:
     crafter.plain_chunk(b"ROOM", b"what the room looked like")
     crafter.clip(dance())
     purpose = "A critical chunk of unknown type, and an INDX that this version cannot read."
-    shelf.add("unknown-critical-index", "Chunks; INDX", purpose, finished(crafter), exit=shelf.exit)
+    shelf.add(
+        "unknown-critical-index", "Chunks; INDX", purpose, finish_file(crafter), exit=shelf.exit
+    )
     data = file_of(dance(), HEAD=at(2, b"\2\0"), INDX=edit)
     purpose = "A later major version, and an INDX that this one cannot read."
     shelf.add("newer-major-index", "HEAD; INDX", purpose, data, exit=shelf.exit)

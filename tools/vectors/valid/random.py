@@ -25,11 +25,19 @@ from mcz.container.value_hash import value_hash
 from mcz.files.writing.clip_writer import write_skeleton
 from mcz.model.motion import Motion
 from mcz.model.schema import build, deflate, parse, varint
-from tools.records import built, extend
+from tools.records import build_record, extend
 from tools.vectors.build.edits import both, plus, put
 from tools.vectors.build.files import Crafter, Vector, arrays, partial
 from tools.vectors.build.random_clips import clip
-from tools.vectors.build.random_parts import LETTERS, OLDER, Chance, Clip, skeleton, split, text
+from tools.vectors.build.random_parts import (
+    LETTERS,
+    OLDER,
+    Chance,
+    Clip,
+    skeleton,
+    split_count,
+    text,
+)
 from tools.vectors.build.source_files import ODD, PLAIN, take
 
 OLD_COUNT = 80  # files that are older than posewave, and stay as they are
@@ -134,7 +142,7 @@ class _Maker:
             (self.clip, 0.3),
             (self.source, 0.15),
             (self.ancillary, 0.3),
-            (self.unused, 0.3),
+            (self.write_unused, 0.3),
             (self.attachment, 0.25),
         ):
             found += [item] * (chance.random() < probability)
@@ -153,7 +161,7 @@ class _Maker:
         kind = self.chance.choice(TYPES)
         self.crafter.ancillary(kind, self.bytes(), safe_to_copy=self.chance.random() < 0.5)
 
-    def unused(self) -> None:
+    def write_unused(self) -> None:
         """A skeleton, a model or a template that no clip refers to, or one more time."""
         self.traits.append("what nobody refers to")
         which, crafter = self.chance.randrange(4), self.crafter
@@ -161,11 +169,11 @@ class _Maker:
             write_skeleton(crafter, skeleton(self.chance, [2, 1]))
         elif which == 1:
             fields = {"kind": self.chance.choice((2, 77, 2**53 - 1)), "data": self.bytes()}
-            crafter.shared(b"MODL", built(payloads.Modl, fields, "MODL"))
+            crafter.shared(b"MODL", build_record(payloads.Modl, fields, "MODL"))
         elif which == 2:
             data = self.bytes()
             fields = {"format": 3, "flags": 1, "size": len(data), "data": deflate(data)}
-            crafter.shared(b"SRCE", built(payloads.Srce, fields, "SRCE"))
+            crafter.shared(b"SRCE", build_record(payloads.Srce, fields, "SRCE"))
         else:
             for (kind, _), place in list(crafter.directory.shared.items())[:1]:
                 assert place.length is not None
@@ -176,7 +184,7 @@ class _Maker:
         """A file in parts, and perhaps further names of it."""
         self.traits.append("an attachment")
         path = f"a/{self.name(motion_names=False)}.bin"
-        pieces = [self.bytes() * self.chance.choice((1, 9)) for _ in split(self.chance, 5)]
+        pieces = [self.bytes() * self.chance.choice((1, 9)) for _ in split_count(self.chance, 5)]
         self.crafter.parts(path, *pieces)
         self.attached[path] = b"".join(pieces)
         if self.says("an alias", 0.5):
@@ -206,7 +214,7 @@ class _Maker:
         self.first = ""
         made = clip(self.chance, self.name(), codec)
         self.traits.append(f"codec {made.codec.name}")
-        motion = self.described(made.motion)
+        motion = self.describe(made.motion)
         shown, edits = self.window(made, motion)
         self.crafter.edits |= edits
         if shown is motion and len(motion.signals) > 1:
@@ -217,9 +225,9 @@ class _Maker:
         if self.says("a quality record", 0.15):
             entries = [{"key": text(self.chance), "value": text(self.chance)} for _ in range(3)]
             fields = {"entries": entries, "extension": self.bytes()}
-            self.crafter.ancillary(b"QUAL", built(payloads.Qual, fields, "QUAL"))
+            self.crafter.ancillary(b"QUAL", build_record(payloads.Qual, fields, "QUAL"))
 
-    def described(self, motion: Motion) -> Motion:
+    def describe(self, motion: Motion) -> Motion:
         """Add random metadata to a clip."""
         chance = self.chance
         rate = chance.choice((None, Fraction(120), Fraction(30000, 1001), Fraction(1, 2**50)))
@@ -251,7 +259,7 @@ class _Maker:
         size = n - skip - spare
         clip_edits: list[Any] = [
             put(payloads.Clip, "n_frames", varint(0 if opened else size)),
-            *self.extended(payloads.Clip, "CLIP"),
+            *self.draw_extension(payloads.Clip, "CLIP"),
         ]
         for number in range(len(motion.signals)):
             place = f"signals.{number}"
@@ -264,7 +272,7 @@ class _Maker:
                 clip_edits.append(lambda p, at=place, more=more: extend(payloads.Clip, p, at, more))
         gaps = b"\0"
         if opened:
-            clip_edits.append(_opened)
+            clip_edits.append(_open_clip)
             runs = [] if motion.frame_numbers is None else missing_runs(motion.frame_numbers)
             gaps = varint(len(runs)) + b"".join(varint(r.frames) + varint(r.length) for r in runs)
         if self.says("listed groups", 0.25):
@@ -276,7 +284,7 @@ class _Maker:
             put(payloads.Cend, "n_frames", varint(size)),
             put(payloads.Cend, "missing", gaps),
             put(payloads.Cend, "value_sha256", varint(len(hashes)) + b"".join(hashes)),
-            *self.extended(payloads.Cend, "CEND"),
+            *self.draw_extension(payloads.Cend, "CEND"),
         ]
 
         def row(found: Any) -> Any:
@@ -285,7 +293,7 @@ class _Maker:
 
         return shown, {"CLIP": both(*clip_edits), "CEND": both(*cend_edits), "row": row}
 
-    def extended(self, schema: Any, name: str) -> list[Any]:
+    def draw_extension(self, schema: Any, name: str) -> list[Any]:
         return [plus(self.bytes())] if self.says(f"an extension of {name}", 0.15) else []
 
 
@@ -298,7 +306,7 @@ def _sizes(made: Clip) -> list[int]:
     return [1] * n if made.grouping == "channel" else [n] * bool(n)
 
 
-def _opened(payload: bytes) -> bytes:
+def _open_clip(payload: bytes) -> bytes:
     """CLIP with flag bit 0; the runs of missing frames go to CEND."""
     fields = parse(payloads.Clip, payload, "CLIP")
     if fields.time_base is not None:
@@ -319,14 +327,14 @@ class _Odd(Crafter):
         made, self._made = self._made, []
         chance = self.maker.chance
         live = chance.random() < 0.5
-        for header, streams in _interleaved(chance, made):
+        for header, streams in _interleave(chance, made):
             if self._next_packet is None and live and self.maker.says("open DATA", 0.5):
                 self._begin()
             elif self._next_packet is not None and chance.random() < 0.3:
                 self._end()
             if self._next_packet is None:
                 self._between()
-            self._put(header, streams)
+            self._put_segment(header, streams)
         if self._next_packet is not None:
             self._end()
         self._between()
@@ -346,9 +354,8 @@ class _Odd(Crafter):
             self.plain_chunk(maker.chance.choice(TYPES), maker.bytes(), ChunkFlag.ANCILLARY)
         if maker.says("REPT", 0.1):
             right = maker.chance.random() < 0.5 and self._closed
-            self.plain_chunk(
-                ChunkType.REPT, self._opening() if right else maker.bytes(), ChunkFlag.ANCILLARY
-            )
+            payload = self._repeated_chunks() if right else maker.bytes()
+            self.plain_chunk(ChunkType.REPT, payload, ChunkFlag.ANCILLARY)
 
     def _begin(self) -> None:
         self.open_data()
@@ -361,7 +368,7 @@ class _Odd(Crafter):
         self._write(build_packet(Packet(END, self._next_packet, b"", fresh)))
         self._next_packet = None
 
-    def _put(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+    def _put_segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
         from mcz.container.segments import build_segment
 
         plain = (header.signal, header.n_frames, header.lead, header.tail) == (0, 1, 0, 0)
@@ -378,7 +385,7 @@ class _Odd(Crafter):
 Segments = list[tuple[SegmentHeader, Sequence[bytes]]]
 
 
-def _interleaved(chance: Chance, made: Segments) -> Iterator[tuple[SegmentHeader, Sequence[bytes]]]:
+def _interleave(chance: Chance, made: Segments) -> Iterator[tuple[SegmentHeader, Sequence[bytes]]]:
     """The segments, those of each signal in order, the signals in any."""
     waiting: dict[int, Segments] = {}
     for part in made:
