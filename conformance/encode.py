@@ -95,8 +95,8 @@ def try_encoder(
         for request in all_requests(vector)
         if request.listing == "sources" and request.expected and not can.lacks(request)
     ]
-    found = [task for tasks in spread(_tasks, wanted, decoder, jobs) for task in tasks]
-    unique = {(task.content, task.skeleton, task.format): task for task in found}
+    tasks_of_all = [task for tasks in spread(_tasks, wanted, decoder, jobs) for task in tasks]
+    unique = {(task.content, task.skeleton, task.format): task for task in tasks_of_all}
     with tempfile.TemporaryDirectory() as folder:
         paths = _store_skeletons(Path(folder), unique.values())
 

@@ -43,7 +43,7 @@ def document(report: Report) -> dict[str, Any]:
     """Document that ``--json`` prints."""
     passed, failed, not_asked = map(report.count, STATUSES)
     label, message, _ = badge(report)
-    found: dict[str, Any] = {
+    content: dict[str, Any] = {
         "format_version": report.version,
         "decoder": report.command,
         "badge": f"{label}: {message}",
@@ -60,8 +60,8 @@ def document(report: Report) -> dict[str, Any]:
         ],
     }
     if report.results is not None:
-        found["encoder"] = [_encoder_row(result) for result in report.results]
-    return found
+        content["encoder"] = [_encoder_row(result) for result in report.results]
+    return content
 
 
 def _row(outcome: Outcome) -> dict[str, Any]:

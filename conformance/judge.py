@@ -125,15 +125,15 @@ def _first_difference(got: list[Any], wanted: list[Any], listing: str) -> str:
 def parse_output(output: bytes, listing: str) -> list[dict[str, Any]]:
     """The rows of a decoder's ``output``, each with the hash of its bytes; Wrong if bad."""
     rows, body = listing_of(output, listing)
-    found, at = [], 0
+    listed, at = [], 0
     for row in rows:
         size = row["bytes"]
         data = body[at : at + size]
-        found.append(row | {"sha256": hashlib.sha256(data).hexdigest()})
+        listed.append(row | {"sha256": hashlib.sha256(data).hexdigest()})
         at += size
     if at != len(body):
         raise Wrong("bad listing", f"{len(body)} bytes follow the line, which lists {at}")
-    return found
+    return listed
 
 
 def listing_of(output: bytes, listing: str) -> tuple[list[dict[str, Any]], bytes]:

@@ -112,13 +112,13 @@ class Capabilities:
         sources = _words(document, "sources")
         if sources is not None and not sources <= set(FORMATS):
             raise ValueError(f"sources are {', '.join(sorted(sources))}; known: {FORMATS}")
-        told = cls(
+        declared = cls(
             options=_words(document, "options") or frozenset(),
             codecs=_words(document, "codecs"),
             sources=sources,
             version=version,
         )
-        return told.within(document["class"]) if "class" in document else told
+        return declared.within(document["class"]) if "class" in document else declared
 
     def within(self, name: str) -> Capabilities:
         """These without what a class lacks; ValueError where there is no such class."""
@@ -132,23 +132,23 @@ class Capabilities:
     def lacks(self, request: Request) -> list[str]:
         """List in words the capabilities that ``request`` needs and this decoder lacks."""
         vector = request.vector
-        found = [
+        missing = [
             word
             for word in request.arguments
             if word.startswith("--") and word != "--source" and word not in self.options
         ]
         if self.codecs is not None:
-            found += [
+            missing += [
                 f"codec {name}" for name in vector.get("codecs", []) if name not in self.codecs
             ]
         if self.sources == frozenset() and request.listing == "sources":
-            found.append("sources")
+            missing.append("sources")
         elif self.sources is not None and request.listing == "sources":
-            found += [f"source {name}" for name in restored(vector) if name not in self.sources]
+            missing += [f"source {name}" for name in restored(vector) if name not in self.sources]
         since = vector.get("since", "0.0")
         if self.version is not None and _version(since) > _version(self.version):
-            found.append(f"format {since}")
-        return found
+            missing.append(f"format {since}")
+        return missing
 
     def is_full(self, vectors: Sequence[Vector]) -> bool:
         """True if only optional arguments keep the decoder from answering all of ``vectors``."""

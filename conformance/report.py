@@ -30,8 +30,8 @@ def _failures(outcomes: Iterable[Outcome]) -> str:
             lines.append(f"     {outcome.vector['purpose']}")
             ids = outcome.vector.get("requirements")
             lines += [f"     requirements: {', '.join(ids)}"] if ids else []
-            said = outcome.stderr.splitlines()[-1:]
-            lines += [f"     stderr: {line[:200]}" for line in said]
+            last_line = outcome.stderr.splitlines()[-1:]
+            lines += [f"     stderr: {line[:200]}" for line in last_line]
     return "\n".join(lines)
 
 
@@ -52,9 +52,9 @@ def _line(key: str, row: Counter[str]) -> str:
 
 def _requirements(outcomes: Sequence[Outcome]) -> list[str]:
     """A line for each section of SPEC.md, and one for each requirement that a vector denies."""
-    found = requirements(outcomes)
+    counts = requirements(outcomes)
     sections: dict[str, Counter[str]] = {}
-    for name, lists in found.items():
+    for name, lists in counts.items():
         status = next(s for s in ("failed", "passed", "not asked") if lists[s])
         sections.setdefault(name.rpartition("-")[0], Counter())[status] += 1
     if not sections:
@@ -62,7 +62,7 @@ def _requirements(outcomes: Sequence[Outcome]) -> list[str]:
     lines = [f"{'requirements':<24}{'held':>8}{'broken':>8}{'not asked':>11}"]
     for section, row in sections.items():
         lines.append(_line(section, row))
-    for name, lists in found.items():
+    for name, lists in counts.items():
         if lists["failed"]:
             named = ", ".join(file.removesuffix(".mcz") for file in lists["failed"][:4])
             more = len(lists["failed"]) - 4

@@ -34,7 +34,7 @@ class Server:
         started = time.monotonic()
         content = data if isinstance(data, bytes) else data.read_bytes()
         child = self._start_child()
-        said = size_of(self._errors)
+        n_logged = size_of(self._errors)
         child.watch()
         try:
             code, output = _exchange(child.process, arguments, content, max_output)
@@ -45,7 +45,7 @@ class Server:
         except _Lost as lost:
             code, fault, detail = self._lost_answer(child, lost)
             output = b""
-        errors = tail(self._errors, said)
+        errors = tail(self._errors, n_logged)
         return Answer(code, output, errors, time.monotonic() - started, fault, detail)
 
     def _start_child(self) -> Child:

@@ -72,35 +72,35 @@ def badge(report: Report) -> tuple[str, str, str]:
 
 def tables(outcomes: Iterable[Outcome]) -> dict[str, dict[str, Counter[str]]]:
     """Vectors by status, for each group and each codec."""
-    found: dict[str, dict[str, Counter[str]]] = {"group": {}, "codec": {}}
+    counts: dict[str, dict[str, Counter[str]]] = {"group": {}, "codec": {}}
     for outcome in outcomes:
         names = outcome.vector.get("codecs")
         keys = [("group", outcome.vector["group"])]
         codecs = ["not stated"] if names is None else names or ["none"]
         keys += [("codec", name) for name in codecs]
         for table, key in keys:
-            found[table].setdefault(key, Counter())[outcome.status] += 1
-    return found
+            counts[table].setdefault(key, Counter())[outcome.status] += 1
+    return counts
 
 
 def requirements(outcomes: Iterable[Outcome]) -> dict[str, dict[str, list[str]]]:
     """The vectors of each requirement, by status."""
-    found: dict[str, dict[str, list[str]]] = {}
+    statuses: dict[str, dict[str, list[str]]] = {}
     for outcome in outcomes:
         for name in outcome.vector.get("requirements", []):
-            lists = found.setdefault(name, {status: [] for status in STATUSES})
+            lists = statuses.setdefault(name, {status: [] for status in STATUSES})
             lists[outcome.status].append(outcome.file)
-    return dict(sorted(found.items()))
+    return dict(sorted(statuses.items()))
 
 
 def encoder_table(results: Iterable[Result]) -> dict[str, Counter[str]]:
     """Source files by status and format, and the bytes of those restored."""
-    found: dict[str, Counter[str]] = {}
+    counts: dict[str, Counter[str]] = {}
     for result in results:
-        row = found.setdefault(result.task.format, Counter())
+        row = counts.setdefault(result.task.format, Counter())
         row[result.status] += 1
         if result.status == "restored":
             row["same twice"] += result.deterministic
             row["source bytes"] += len(result.task.content)
             row[".mcz bytes"] += result.size
-    return dict(sorted(found.items()))
+    return dict(sorted(counts.items()))

@@ -33,8 +33,8 @@ class Only(MetaPathFinder):
         top = name.partition(".")[0]
         if top not in sys.stdlib_module_names and top not in self.allowed:
             return None
-        found: ModuleSpec | None = self.finder.find_spec(name, path, target)
-        return found
+        spec: ModuleSpec | None = self.finder.find_spec(name, path, target)
+        return spec
 
 
 def choose_vectors(most: int) -> list[str]:
@@ -92,13 +92,15 @@ def use(path: Path) -> None:
 
 def main(most: str = "0", path: str = "") -> int:
     sys.meta_path[:] = [Only(finder, OWN) for finder in sys.meta_path]
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as messages:
         warnings.simplefilter("always")
         n_vectors = decode_vectors(int(most))
         if path:
             use(Path(path))
-    slow = [str(w.message) for w in said if "plain Python" in str(w.message)]
-    others = [f"{w.filename}:{w.lineno}: {w.message}" for w in said if str(w.message) not in slow]
+    slow = [str(w.message) for w in messages if "plain Python" in str(w.message)]
+    others = [
+        f"{w.filename}:{w.lineno}: {w.message}" for w in messages if str(w.message) not in slow
+    ]
     assert not others, others
     loaded = {name.partition(".")[0] for name in sys.modules} - sys.stdlib_module_names
     print(json.dumps({"vectors": n_vectors, "loaded": sorted(loaded & OWN), "slow": slow}))

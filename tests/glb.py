@@ -29,8 +29,8 @@ class Glb:
         start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         width = WIDTHS[accessor["type"]]
         count = accessor["count"] * width
-        found = np.frombuffer(self.buffer, KINDS[accessor["componentType"]], count, start)
-        return found.reshape(-1, width)
+        values = np.frombuffer(self.buffer, KINDS[accessor["componentType"]], count, start)
+        return values.reshape(-1, width)
 
     def places(self, times: np.ndarray) -> dict[str, np.ndarray]:
         """World positions of every node by name, (n_times, 3)."""
@@ -41,14 +41,14 @@ class Glb:
         nodes = self.document["nodes"]
         parents = {child: k for k, node in enumerate(nodes) for child in node.get("children", ())}
         tracks = self.tracks(times)
-        found: dict[int, np.ndarray] = {}
+        matrices: dict[int, np.ndarray] = {}
 
         def world(number: int) -> np.ndarray:
-            if number not in found:
+            if number not in matrices:
                 own = self.local(nodes[number], tracks.get(number, {}), len(times))
                 parent = parents.get(number)
-                found[number] = own if parent is None else world(parent) @ own
-            return found[number]
+                matrices[number] = own if parent is None else world(parent) @ own
+            return matrices[number]
 
         return {node["name"]: world(number) for number, node in enumerate(nodes)}
 
@@ -73,7 +73,7 @@ class Glb:
 
     def tracks(self, times: np.ndarray) -> dict[int, dict[str, np.ndarray]]:
         """Animated translation, rotation and scale of every node."""
-        found: dict[int, dict[str, np.ndarray]] = {}
+        tracks: dict[int, dict[str, np.ndarray]] = {}
         for animation in self.document.get("animations", ()):
             for channel in animation["channels"]:
                 sampler = animation["samplers"][channel["sampler"]]
@@ -89,8 +89,8 @@ class Glb:
                     made = slerp(values[at], values[to], share)
                 else:
                     made = values[at] + share * (values[to] - values[at])
-                found.setdefault(channel["target"]["node"], {})[channel["target"]["path"]] = made
-        return found
+                tracks.setdefault(channel["target"]["node"], {})[channel["target"]["path"]] = made
+        return tracks
 
 
 def slerp(one: np.ndarray, other: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -93,12 +93,18 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def chunks_of(data: bytes) -> list[tuple[str, int, int]]:
     """Type, offset and size of every chunk and FOOT, in file order."""
-    found = scan(open_source(data))
+    container = scan(open_source(data))
     rows = [
-        (c.type.decode(), c.offset, found.ends[c.offset] - c.offset if c.length is None else c.size)
-        for c in found.chunks
+        (
+            c.type.decode(),
+            c.offset,
+            container.ends[c.offset] - c.offset if c.length is None else c.size,
+        )
+        for c in container.chunks
     ]
-    return sorted([*rows, *(("FOOT", at, FOOT.size) for at in found.feet)], key=lambda row: row[1])
+    return sorted(
+        [*rows, *(("FOOT", at, FOOT.size) for at in container.feet)], key=lambda row: row[1]
+    )
 
 
 def body_of(kind: str, offset: int, size: int) -> int:
@@ -108,18 +114,18 @@ def body_of(kind: str, offset: int, size: int) -> int:
 
 def values_of(data: bytes, *, salvage: bool = False) -> Values:
     """Every value, NaN where it is invalid, as it is stored; nothing of an unknown codec."""
-    found: Values = {}
+    values_by_clip: Values = {}
     with mcz.open(data, salvage=salvage) as file:
         for clip in file:
-            found[clip.name] = {}
+            values_by_clip[clip.name] = {}
             for signal in clip.signals:
                 try:
                     values, mask = clip.read_masked(signal=signal.index)
                 except mcz.UnsupportedError:
                     continue
                 valid = True if mask is None else mask.astype(bool)
-                found[clip.name][signal.name] = np.where(valid, values, np.nan)
-    return found
+                values_by_clip[clip.name][signal.name] = np.where(valid, values, np.nan)
+    return values_by_clip
 
 
 def origin(name: str, whole: Values) -> tuple[str, int]:

@@ -68,27 +68,27 @@ def with_packets(data: bytes, change: Callable[[Packet], Packet]) -> bytes:
     out, at, source = b"", 0, open_source(data)
     for chunk in scan(source).chunks:
         if chunk.length is None:
-            found = list(packets(source, chunk))
-            changed = imply_frames([change(event.packet) for event in found[:-1]])
+            packets_of_chunk = list(packets(source, chunk))
+            changed = imply_frames([change(event.packet) for event in packets_of_chunk[:-1]])
             out += data[at : chunk.payload_offset] + b"".join(map(build_packet, changed))
-            at = found[-1].offset
+            at = packets_of_chunk[-1].offset
     return out + data[at : FOOT.unpack(data[-FOOT.size :])[2]] + build_foot(0, 0)
 
 
 def imply_frames(packets: Iterable[Packet]) -> list[Packet]:
     """The packets of an open DATA, those of kind 2 with what they imply."""
-    due, mask, found = 0, b"", []
+    due, mask, implied = 0, b"", []
     for packet in packets:
         if packet.kind == FRAME:
-            found.append(replace(packet, implied=implied_by(due, mask)))
+            implied.append(replace(packet, implied=implied_by(due, mask)))
             due += 1
             continue
         with suppress(mcz.FormatError):
             header, _ = parse_segment(packet.body)
             if header.signal == 0:
                 due, mask = header.stop, mask_of(packet.body)
-        found.append(packet)
-    return found
+        implied.append(packet)
+    return implied
 
 
 def use(data: bytes, *, salvage: bool = False) -> None:

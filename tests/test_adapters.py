@@ -151,12 +151,12 @@ def test_ezc3d_of_a_file_keeps_its_source(samples: Path, tmp_path: Path) -> None
     again = mcz.from_ezc3d(ezc3d.c3d(str(samples / "walk.c3d")), name="walk")
     assert same(again, motion) and again.source is not None and again.name == "walk"
     mcz.write(again, tmp_path / "walk.mcz")
-    held = mcz.to_ezc3d(mcz.read(tmp_path / "walk.mcz"))
-    labels = held["parameters"]["POINT"]["LABELS"]["value"]
+    decoded = mcz.to_ezc3d(mcz.read(tmp_path / "walk.mcz"))
+    labels = decoded["parameters"]["POINT"]["LABELS"]["value"]
     assert tuple(labels) == motion.skeleton.joint_names
-    held["data"]["points"][0, 0, 0] += 1e-9  # what no C3D can hold
-    changed = mcz.from_ezc3d(held)
-    assert changed.values[0, 0] == held["data"]["points"][0, 0, 0] != motion.values[0, 0]
+    decoded["data"]["points"][0, 0, 0] += 1e-9  # what no C3D can hold
+    changed = mcz.from_ezc3d(decoded)
+    assert changed.values[0, 0] == decoded["data"]["points"][0, 0, 0] != motion.values[0, 0]
     assert changed.source is None and "binary32" in changed.metadata["source-note"]
     mcz.write(changed, tmp_path / "changed.mcz")
     assert same(mcz.read(tmp_path / "changed.mcz"), changed)

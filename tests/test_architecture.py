@@ -238,11 +238,11 @@ def test_what_is_optional_is_imported_on_use() -> None:
 
 def banned_constructs(path: Path) -> set[str]:
     """Types of construct that accept malformed bytes, by the names under which they come."""
-    found = {node.attr for node in ast.walk(tree_of(path)) if isinstance(node, ast.Attribute)}
+    used = {node.attr for node in ast.walk(tree_of(path)) if isinstance(node, ast.Attribute)}
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ImportFrom) and node.module == "construct":
-            found |= {alias.name for alias in node.names}
-    return BANNED_CONSTRUCTS & found
+            used |= {alias.name for alias in node.names}
+    return BANNED_CONSTRUCTS & used
 
 
 def test_no_banned_construct() -> None:
@@ -262,12 +262,12 @@ def is_explicit(dtype: ast.expr) -> bool:
 
 def orders_left_open(path: Path) -> list[str]:
     """Calls that make or take bytes in the order of whatever machine runs them."""
-    found = []
+    places = []
     for node, func in calls(path):
         if func.attr in ("frombuffer", "fromfile"):
             dtypes = node.args[1:2] + [k.value for k in node.keywords if k.arg == "dtype"]
             if not dtypes or not is_explicit(dtypes[0]):
-                found.append(f"line {node.lineno}: {ast.unparse(node)}")
+                places.append(f"line {node.lineno}: {ast.unparse(node)}")
         if func.attr == "tobytes" and isinstance(func.value, ast.Call):
             inner = func.value
             if isinstance(inner.func, ast.Attribute) and inner.func.attr == "astype":
@@ -275,8 +275,8 @@ def orders_left_open(path: Path) -> list[str]:
             else:
                 made = ast.unparse(inner.func)
                 is_open = made in ("np.uint16", "np.uint32", "np.uint64", "np.int64")
-            found += [f"line {node.lineno}: {ast.unparse(node)}"] * is_open
-    return found
+            places += [f"line {node.lineno}: {ast.unparse(node)}"] * is_open
+    return places
 
 
 def test_bytes_have_an_explicit_byte_order() -> None:
@@ -326,7 +326,7 @@ def test_functions_have_few_parameters() -> None:
         if path.stem.endswith("kernels"):
             return []
         home = path.relative_to(PACKAGE.parent).with_suffix("").as_posix()
-        found = []
+        names = []
         for node in ast.walk(tree_of(path)):
             if not isinstance(node, ast.FunctionDef) or (home, node.name) in public:
                 continue
@@ -334,8 +334,8 @@ def test_functions_have_few_parameters() -> None:
                 continue
             given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
             if len(given) - (bool(given) and given[0].arg in ("self", "cls")) > MOST_PARAMETERS:
-                found.append(node.name)
-        return found
+                names.append(node.name)
+        return names
 
     assert not faults(crowded)
 
@@ -379,5 +379,5 @@ MOST_ANY = 300  # words, imports included; this may only fall
 
 
 def test_types_say_what_is_passed() -> None:
-    found = sum(len(re.findall(r"\bAny\b", path.read_text("utf-8"))) for path in MODULES)
-    assert found <= MOST_ANY
+    n_any = sum(len(re.findall(r"\bAny\b", path.read_text("utf-8"))) for path in MODULES)
+    assert n_any <= MOST_ANY

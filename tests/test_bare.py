@@ -26,10 +26,10 @@ def test_nothing_else_is_needed(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert found["vectors"] == len(bare.choose_vectors(2)) > 100
-    assert found["loaded"] == ["conformance", "construct", "mcz", "numpy", "tests"]
-    assert found["slow"] == []
+    report = json.loads(done.stdout)
+    assert report["vectors"] == len(bare.choose_vectors(2)) > 100
+    assert report["loaded"] == ["conformance", "construct", "mcz", "numpy", "tests"]
+    assert report["slow"] == []
 
 
 def test_every_codec_is_among_the_vectors() -> None:

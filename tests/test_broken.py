@@ -26,8 +26,8 @@ def nursery() -> Iterator[find.Nursery]:
 def test_a_broken_rule_is_caught(rule: str, nursery: find.Nursery) -> None:
     """By what was found before; where the code has changed since, by what is found now."""
     known = FOUND.get(rule, [])
-    held = [find.bites(rule, nursery.ask(rule, c.variant, [c.vector])) for c in known]
-    caught = bool(held) and all(held)
+    answer = [find.bites(rule, nursery.ask(rule, c.variant, [c.vector])) for c in known]
+    caught = bool(answer) and all(answer)
     assert caught or find.search(nursery, rule, known), (
         f"no vector notices that {rule} is broken at {marks.places().get(rule)}: is its mark where "
         f"it is enforced? Try python -m tests.broken --find {rule}"

@@ -39,20 +39,20 @@ def faults(value: Any, schema: dict[str, Any], where: str) -> list[str]:
     if isinstance(value, str):
         good = re.search(schema.get("pattern", ""), value)
         return [] if good else [f"{where}: {value!r} does not match {schema['pattern']}"]
-    found: list[str] = []
+    messages: list[str] = []
     if isinstance(value, list):
-        found += [f"{where}: too few"] * (len(value) < schema.get("minItems", 0))
+        messages += [f"{where}: too few"] * (len(value) < schema.get("minItems", 0))
         for index, item in enumerate(value):
-            found += faults(item, schema["items"], f"{where}[{index}]")
+            messages += faults(item, schema["items"], f"{where}[{index}]")
     if isinstance(value, dict):
         missing = set(schema.get("required", [])) - set(value)
-        found += [f"{where}: without {sorted(missing)}"] * bool(missing)
+        messages += [f"{where}: without {sorted(missing)}"] * bool(missing)
         for key, item in value.items():
             if key in schema["properties"]:
-                found += faults(item, schema["properties"][key], f"{where}.{key}")
+                messages += faults(item, schema["properties"][key], f"{where}.{key}")
             else:
-                found.append(f"{where}: unknown key {key!r}")
-    return found
+                messages.append(f"{where}: unknown key {key!r}")
+    return messages
 
 
 def test_manifest_follows_its_schema() -> None:
@@ -90,10 +90,12 @@ def test_headings_are_in_the_specification() -> None:
 
 
 def test_purposes_differ() -> None:
-    said: dict[str, str] = {}
+    purposes: dict[str, str] = {}
     for vector in VECTORS:
         place = vector["file"].rpartition("/")[0]
-        assert said.setdefault(f"{place}: {vector['purpose']}", vector["file"]) == vector["file"]
+        assert (
+            purposes.setdefault(f"{place}: {vector['purpose']}", vector["file"]) == vector["file"]
+        )
 
 
 SAME_ZLIB = pytest.mark.skipif(
@@ -124,8 +126,8 @@ def test_our_decoder(chunk: int) -> None:
     outcomes = ask(chosen, capabilities(command, limits), start, jobs=1)
     assert [outcome.file for outcome in outcomes] == [vector["file"] for vector in chosen]
     failed = [outcome for outcome in outcomes if outcome.status != "passed" or outcome.lacks]
-    told = [f"{o.file}: {o.status} {o.faults} {o.lacks} {o.stderr[-200:]}" for o in failed]
-    assert not told, "\n".join(told)
+    failures = [f"{o.file}: {o.status} {o.faults} {o.lacks} {o.stderr[-200:]}" for o in failed]
+    assert not failures, "\n".join(failures)
 
 
 def runner(*arguments: str) -> tuple[int, str]:
@@ -156,8 +158,8 @@ def test_runner_catches_a_broken_decoder(rule: str, kind: str) -> None:
 def test_runner_takes_every_so_many() -> None:
     code, shown = runner("--decoder", OURS, "--only", "valid/container", "--every", "9", "--json")
     files = [v["file"] for v in json.loads(shown)["vectors"]]
-    found = [v["file"] for v in VECTORS if "valid/container" in v["file"]]
-    assert code == 0 and files == found[::9]
+    names = [v["file"] for v in VECTORS if "valid/container" in v["file"]]
+    assert code == 0 and files == names[::9]
 
 
 def of(file: str, mode: str = "arrays") -> run.Request:
@@ -228,9 +230,9 @@ def test_runner_passes_our_encoder() -> None:
     only = ("--only", "valid/sources/amc.mcz", "--only", "valid/sources/c3d-intel-integers")
     code, shown = runner("--decoder", OURS, "--encoder", encoder, "--serve", *only, "--json")
     assert code == 0, shown
-    found = {row["source"]: row["status"] for row in json.loads(shown)["encoder"]}
+    statuses = {row["source"]: row["status"] for row in json.loads(shown)["encoder"]}
     wanted = ("take.amc", "small.asf", "intel-integers.c3d")
-    assert found == dict.fromkeys(wanted, "restored")
+    assert statuses == dict.fromkeys(wanted, "restored")
 
 
 def test_the_example_of_the_readme(tmp_path: Path) -> None:

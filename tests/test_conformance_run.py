@@ -332,13 +332,13 @@ def test_a_partial_decoder_is_judged_on_what_it_has(tmp_path: Path) -> None:
     ]
     lacks = {row["file"]: row["lacks"] for row in document["vectors"]}
     assert lacks["valid/raw/plain.mcz"] == ["--frames"]
-    said = "core, sources of bvh: 4/4, 2 not asked"
+    summary = "core, sources of bvh: 4/4, 2 not asked"
     assert (document["passed"], document["failed"], document["not_asked"]) == (4, 0, 2)
-    assert document["badge"] == f"MCZ 0.9 conformance: {said}"
+    assert document["badge"] == f"MCZ 0.9 conformance: {summary}"
     assert json.loads(badge.read_text()) == {
         "schemaVersion": 1,
         "label": "MCZ 0.9 conformance",
-        "message": said,
+        "message": summary,
         "color": "blue",
     }
     suites = {s.get("name"): s for s in Xml.parse(junit).getroot()}
@@ -360,11 +360,11 @@ def test_declarations(
     tmp_path: Path,
     declared: dict[str, Any],
     passed: int,
-    said: str,
+    message: str,
 ) -> None:
     code, document = result("--decoder", decoder(tmp_path, declared=declared))
     assert (code, document["passed"]) == (0, passed)
-    assert document["badge"] == f"MCZ 0.9 conformance: {said}"
+    assert document["badge"] == f"MCZ 0.9 conformance: {message}"
     assert bool(document["remarks"]) == ("qbc" in declared.get("codecs", []))
 
 
@@ -438,9 +438,9 @@ def test_only() -> None:
         (["--decoder", "echo []"], "--capabilities writes no declaration: "),
     ],
 )
-def test_usage(capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
+def test_usage(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
     assert run.main(arguments) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_nothing_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -456,9 +456,9 @@ def test_svg_and_junit_hold_what_happened(
     svg, junit = tmp_path / "badge.svg", tmp_path / "junit.xml"
     files = ["--badge", str(svg), "--junit", str(junit), "--only", "raw"]
     assert run.main(["--decoder", decoder(tmp_path, edit), *files]) == 1
-    said = "2/3 full decoder, a selection from 6"
-    assert said in capsys.readouterr().out
-    assert [t.text for t in Xml.parse(svg).getroot()][-1] == said
+    label = "2/3 full decoder, a selection from 6"
+    assert label in capsys.readouterr().out
+    assert [t.text for t in Xml.parse(svg).getroot()][-1] == label
     cases = {case.get("name"): case for case in Xml.parse(junit).getroot().iter("testcase")}
     failure = cases["plain"].find("failure")
     assert failure is not None and failure.get("type") == "wrongly refused"
@@ -508,8 +508,8 @@ def test_an_honest_encoder(tmp_path: Path) -> None:
     for more in ((), ("--serve",)):
         code, document = run_encoder(tmp_path, edit, *more)
         assert code == 0
-        found = {row["source"]: (row["status"], row["fault"]) for row in document["encoder"]}
-        assert found == dict.fromkeys(("walk.bvh", "walk.amc", "walk.asf"), ("restored", None))
+        rows = {row["source"]: (row["status"], row["fault"]) for row in document["encoder"]}
+        assert rows == dict.fromkeys(("walk.bvh", "walk.amc", "walk.asf"), ("restored", None))
         assert all(row["deterministic"] for row in document["encoder"])
         assert document["badge"].endswith("6/6 full decoder, encoder 3/3")
 
@@ -537,8 +537,8 @@ def test_wrong_encoders(tmp_path: Path, kind: str) -> None:
 def test_an_encoder_may_decline(tmp_path: Path) -> None:
     code, document = run_encoder(tmp_path, "if name != 'walk.bvh': sys.exit(3)")
     assert code == 0
-    found = {row["source"]: row["status"] for row in document["encoder"]}
-    assert found == {"walk.bvh": "restored", "walk.amc": "declined", "walk.asf": "declined"}
+    statuses = {row["source"]: row["status"] for row in document["encoder"]}
+    assert statuses == {"walk.bvh": "restored", "walk.amc": "declined", "walk.asf": "declined"}
     assert document["badge"].endswith("encoder 1/1")
 
 

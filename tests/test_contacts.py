@@ -275,6 +275,6 @@ def test_real_flavours_of_bvh(data: Path) -> None:
         ("cmu/bvh-blender/01-01 v01.bvh", "z", 4),
     ):
         if (data / name).exists():
-            found = contacts(mcz.read(data / name, unit="cm"))
-            assert (found.up_axis, len(found.joints)) == (up, n_feet), name
-            assert found.runs, name
+            decoded = contacts(mcz.read(data / name, unit="cm"))
+            assert (decoded.up_axis, len(decoded.joints)) == (up, n_feet), name
+            assert decoded.runs, name

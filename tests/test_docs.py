@@ -116,8 +116,8 @@ def shell(line: str) -> Ran:
                 at = words.index(">")
                 target = words[at + 1]
                 del words[at : at + 2]
-            code, data, said = command(words, data)
-            err += said
+            code, data, errors = command(words, data)
+            err += errors
             if target is not None:
                 Path(target).write_bytes(data)
                 data = b""
@@ -237,36 +237,40 @@ def test_contributing_lists_the_rooms_of_the_package() -> None:
 
 def test_commands_and_their_options_are_in_the_manual() -> None:
     manual = "\n".join(map(text_of, MANUAL))
-    for words, found in _commands(cli, "mcz"):
+    for words, command in _commands(cli, "mcz"):
         assert f"`{words}" in manual, words
-        for parameter in found.params:
+        for parameter in command.params:
             known = (*parameter.opts, *parameter.secondary_opts)
-            told = any(re.search(rf"(?<![\w-]){option}(?![\w-])", manual) for option in known)
+            is_documented = any(
+                re.search(rf"(?<![\w-]){option}(?![\w-])", manual) for option in known
+            )
             silent = isinstance(parameter, click.Argument) or getattr(parameter, "hidden", False)
-            assert told or silent, f"{words} {known}"
+            assert is_documented or silent, f"{words} {known}"
     assert set(COMMANDS) <= set(re.findall(r"^\| `mcz (\w+)", manual, re.M))
 
 
 def _commands(group: click.Command, words: str) -> Iterator[tuple[str, click.Command]]:
     context = click.Context(group)
     for name in group.list_commands(context) if isinstance(group, click.Group) else ():
-        found = group.get_command(context, name)
-        assert found is not None
-        if isinstance(found, click.Group):
-            yield from _commands(found, f"{words} {name}")
+        command = group.get_command(context, name)
+        assert command is not None
+        if isinstance(command, click.Group):
+            yield from _commands(command, f"{words} {name}")
         else:
-            yield f"{words} {name}", found
+            yield f"{words} {name}", command
 
 
 def test_exit_codes_are_in_the_manual() -> None:
-    told = re.findall(r"^\| (\d+) \| ", text_of("docs/reference/scripts.md"), re.M)
-    assert [int(code) for code in told] == list(Exit)
+    codes = re.findall(r"^\| (\d+) \| ", text_of("docs/reference/scripts.md"), re.M)
+    assert [int(code) for code in codes] == list(Exit)
 
 
 def test_codecs_and_their_parameters_are_in_the_manual() -> None:
     codecs, parameters = text_of("docs/guides/codecs.md"), text_of("docs/reference/parameters.md")
-    told = {n for row in re.findall(r"^\| (`.+?) \|", codecs, re.M) for n in row.split("`")[1::2]}
-    assert {codec.name for codec in CODECS.values()} | {t.name for t in TARGETS} <= told
+    documented = {
+        n for row in re.findall(r"^\| (`.+?) \|", codecs, re.M) for n in row.split("`")[1::2]
+    }
+    assert {codec.name for codec in CODECS.values()} | {t.name for t in TARGETS} <= documented
     sections = dict(re.findall(r"^## (.+)\n((?:(?!## ).*\n?)*)", parameters, re.M))
     for codec in CODECS.values():
         (section,) = [text for names, text in sections.items() if codec.name in names.split(", ")]

@@ -623,9 +623,9 @@ def test_decode_at_a_resolution(samples: Path, tmp_path: Path, target: str) -> N
     how = ("-o", b, "--frames", "3:50", "--resolution", "1", "--decimate")
     assert run("decode", a, *how, "--to", target) == 0
     if target == "bvh":
-        found = mcz.read(b)
-        assert float(found.frame_rate or 0) == pytest.approx(60)
-        np.testing.assert_allclose(found.values, wanted, rtol=0, atol=6e-5)
+        decoded = mcz.read(b)
+        assert float(decoded.frame_rate or 0) == pytest.approx(60)
+        np.testing.assert_allclose(decoded.values, wanted, rtol=0, atol=6e-5)
         assert run("decode", a, *how, "--force") == 0
         np.testing.assert_allclose(mcz.read(b).values, wanted, rtol=0, atol=6e-5)
     elif target == "npz":

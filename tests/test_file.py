@@ -190,10 +190,10 @@ def test_reading_a_closed_file() -> None:
 @pytest.mark.parametrize("key", ["weather", "", "Subject", "X-a", "x"])
 def test_metadata_that_nobody_registered_are_refused(key: str, tmp_path: Path) -> None:
     motion = smooth(3, metadata={"subject": "7", key: "fair"})
-    with pytest.raises(mcz.MotionError) as found:
+    with pytest.raises(mcz.MotionError) as raised:
         mcz.write(motion, tmp_path / "a.mcz")
-    said = str(found.value)
-    assert repr(key) in said and "rights, credit" in said and "begin with 'x-'" in said
+    message = str(raised.value)
+    assert repr(key) in message and "rights, credit" in message and "begin with 'x-'" in message
     assert not (tmp_path / "a.mcz").exists()
     with pytest.raises(mcz.MotionError, match="is not registered"):
         mcz.LiveWriter(io.BytesIO(), motion.skeleton, "online", metadata={key: "fair"})

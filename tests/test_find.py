@@ -294,8 +294,8 @@ def test_verify_what_is_damaged_and_what_is_not(archive: Path) -> None:
     (problem,) = mcz.verify(bytes(data), where="subject == 5")
     assert problem.heading == "DATA"  # every checksum of the file is compared
     with mcz.open(bytes(data)) as file:
-        found = list(part_problems(file, file.find("subject == 5")))
-        assert found == [("skeleton", "puppet", []), ("clip", "05_01", []), ("clip", "05_02", [])]
+        names = list(part_problems(file, file.find("subject == 5")))
+        assert names == [("skeleton", "puppet", []), ("clip", "05_01", []), ("clip", "05_02", [])]
         assert [name for _, name, wrong in part_problems(file) if wrong] == ["16_01"]
     with pytest.raises(OptionError, match="none of 4 clips"):
         mcz.verify(archive, where="n_frames > 100")

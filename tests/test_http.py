@@ -137,10 +137,10 @@ def test_each_failure_is_an_access_error(
 ) -> None:
     monkeypatch.setattr(http, "TAIL", 1000)  # else the first request brings the whole file
     server.wrong, server.after = {**FAILURES, **LATER}[said], after
-    with pytest.raises(AccessError, match=said) as found:  # noqa: SIM117
+    with pytest.raises(AccessError, match=said) as raised:  # noqa: SIM117
         with mcz.open(server.address) as file:
             file.only_clip().read()
-    assert str(found.value).startswith(server.address)
+    assert str(raised.value).startswith(server.address)
 
 
 def test_a_failure_is_one_line_of_a_command(
@@ -148,8 +148,8 @@ def test_a_failure_is_one_line_of_a_command(
 ) -> None:
     server.wrong = status(500)
     assert run("info", server.address) == 1
-    said = capsys.readouterr().err
-    assert said.startswith(f"mcz: {server.address}: the server answers 500") and "\n" in said
+    errors = capsys.readouterr().err
+    assert errors.startswith(f"mcz: {server.address}: the server answers 500") and "\n" in errors
 
 
 def test_an_empty_file_is_no_mcz_file(server: Server) -> None:
@@ -288,10 +288,10 @@ def test_what_will_not_pass_is_tried_once(
     server: Server, retry_delays: list[float], wrong: Answering
 ) -> None:
     server.wrong = wrong
-    with pytest.raises(AccessError) as found:
+    with pytest.raises(AccessError) as raised:
         mcz.open(server.address)
     assert retry_delays == []
-    assert "tried" not in str(found.value)
+    assert "tried" not in str(raised.value)
 
 
 def test_a_server_may_ask_to_wait(server: Server, retry_delays: list[float]) -> None:

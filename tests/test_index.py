@@ -66,9 +66,9 @@ def test_a_table_is_its_columns(items: list[Item], last: int) -> None:
     plain += b"".join(varint(len(item.data)) for item in items)
     plain += b"".join(item.data for item in items) + varint(last)
     assert made == plain
-    found = parse(Items, made, "items")
-    assert list(found.items) == items == [found.items[n] for n in range(len(items))]
-    assert found.last == last
+    parsed = parse(Items, made, "items")
+    assert list(parsed.items) == items == [parsed.items[n] for n in range(len(items))]
+    assert parsed.last == last
     for stop in range(len(made)):
         with pytest.raises(mcz.TruncatedError):
             parse(Items, made[:stop], "items")

@@ -183,10 +183,10 @@ def test_missing_places_are_filled_from_the_frames_around() -> None:
     seen[40, 3, 1] = np.nan
     solved = solve_ik(skeleton, seen)
     assert np.isfinite(solved).all()
-    found = positions_of(skeleton, solved)
+    positions = positions_of(skeleton, solved)
     known = np.isfinite(seen).all(axis=2)
-    assert np.sqrt(((found - points) ** 2).sum(axis=2))[known].max() < 0.01
-    assert farthest(found[30:31], points[30:31]) < 1.0
+    assert np.sqrt(((positions - points) ** 2).sum(axis=2))[known].max() < 0.01
+    assert farthest(positions[30:31], points[30:31]) < 1.0
     assert np.abs(solved[30] - whole[30]).max() < 30
 
 
@@ -202,9 +202,9 @@ def test_a_point_that_is_never_seen() -> None:
     walk = WALKS["amc"]
     points = positions_of(walk.skeleton, walk.values[:20])
     points[:, 4] = np.nan
-    found = positions_of(walk.skeleton, solve_ik(walk.skeleton, points))
+    positions = positions_of(walk.skeleton, solve_ik(walk.skeleton, points))
     known = np.isfinite(points).all(axis=2)
-    assert np.sqrt(((found - points) ** 2).sum(axis=2))[known].max() < 0.01
+    assert np.sqrt(((positions - points) ** 2).sum(axis=2))[known].max() < 0.01
 
 
 def test_no_frames_and_no_joints() -> None:

@@ -36,9 +36,9 @@ def test_an_amc_and_its_bvh_are_compared(
     text = capsys.readouterr().out
     assert "31 joints of the same name: mean " in text and "alone" not in text
     assert run("diff", amc, converted_path, "--json") == 0
-    found = json.loads(capsys.readouterr().out)["clips"][0]["joints"]
-    assert len(found["joints"]) == 31 and found["greatest"] < 1e-3
-    assert found["greatest_cm"] is None and found["only_in_a"] == found["only_in_b"] == []
+    output = json.loads(capsys.readouterr().out)["clips"][0]["joints"]
+    assert len(output["joints"]) == 31 and output["greatest"] < 1e-3
+    assert output["greatest_cm"] is None and output["only_in_a"] == output["only_in_b"] == []
 
 
 def test_names_that_one_has_alone_are_told(

@@ -353,10 +353,10 @@ def test_a_lost_end_packet_costs_no_frame() -> None:
 def test_an_undecodable_frame_is_salvaged_around() -> None:
     bad = with_body(live(frames()), 13, lambda _: b"\xff")
     with mcz.open(bad, salvage=True) as file:
-        found = file.clips["live"].read()
-        lost = np.isnan(found).all(axis=1)
+        decoded = file.clips["live"].read()
+        lost = np.isnan(decoded).all(axis=1)
         np.testing.assert_array_equal(np.flatnonzero(lost), np.arange(13, 20))
-        np.testing.assert_array_equal(found[~lost], frames()[~lost])
+        np.testing.assert_array_equal(decoded[~lost], frames()[~lost])
         assert len(file.damage) == 2
 
 

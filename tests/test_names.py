@@ -66,9 +66,9 @@ def test_a_clip_is_found(archive: Path, name: str, clip: str) -> None:
     ],
 )
 def test_a_near_miss_is_suggested(archive: Path, name: str, said: str) -> None:
-    with mcz.open(archive) as file, pytest.raises(OptionError) as found:
+    with mcz.open(archive) as file, pytest.raises(OptionError) as raised:
         file.only_clip(name)
-    assert said in str(found.value)
+    assert said in str(raised.value)
 
 
 def test_all_commands_find_it(
@@ -203,9 +203,9 @@ def test_a_joint_of_nearly_this_name_is_suggested(samples: Path) -> None:
     with pytest.raises(mcz.MotionError, match=r"no joint 'hed' among Hips, .*did you mean 'Head'"):
         skeleton.find("hed")
     many = replace(skeleton, joints=tuple(mcz.Joint(f"j{n}") for n in range(500)))
-    with pytest.raises(mcz.MotionError, match=r"among j0, .*j39 \.\.\. \(500 in all\)") as found:
+    with pytest.raises(mcz.MotionError, match=r"among j0, .*j39 \.\.\. \(500 in all\)") as raised:
         many.find("xyz")
-    assert len(str(found.value)) < 400
+    assert len(str(raised.value)) < 400
 
 
 def public_things(folder: Path) -> Iterator[object]:

@@ -116,11 +116,11 @@ def test_values_of_any_array(
     try:
         signal = mcz.Signal(given_values)
         motion = mcz.Motion(skeleton(), (signal,), frame_rate=100, name="odd")
-        found = write_and_read(motion, codec)
+        decoded = write_and_read(motion, codec)
     except mcz.MczError:
         return
     expected = np.ma.asarray(given_values)
-    values, mask = found.signals[0].values, found.signals[0].mask
+    values, mask = decoded.signals[0].values, decoded.signals[0].mask
     np.testing.assert_array_equal(values, expected.data)
     valid = ~np.ma.getmaskarray(expected)
     np.testing.assert_array_equal(np.ones(values.shape, bool) if mask is None else mask, valid)
@@ -186,12 +186,12 @@ def test_things_in_wrong_places(kind: type, name: str) -> None:
         try:
             part = replace(SAMPLES[kind], **{name: thing})
             motion = PARTS[kind](part)
-            found = write_and_read(motion)
+            decoded = write_and_read(motion)
         except mcz.MczError:
             continue
         except Exception as error:
             raise AssertionError(f"{kind.__name__}.{name} = {thing!r:.200}: {error!r}") from error
-        same(found, motion.counted_by_ones())
+        same(decoded, motion.counted_by_ones())
 
 
 def same(found: mcz.Motion, motion: mcz.Motion) -> None:
@@ -305,11 +305,11 @@ def odd_motions(draw: st.DrawFn) -> mcz.Motion:
 def test_motions_come_back_or_are_refused(data: st.DataObject, codec: str) -> None:
     try:
         motion = data.draw(odd_motions())
-        found = write_and_read(motion, codec)
+        decoded = write_and_read(motion, codec)
     except mcz.MczError:
         return
-    same(found, motion)
-    again = write_and_read(found, codec)
+    same(decoded, motion)
+    again = write_and_read(decoded, codec)
     same(again, motion)
 
 

@@ -39,20 +39,22 @@ def test_a_bit_in_a_payload(
         seen[of] += 1
         if seen[of] > OF_A_TYPE:
             continue
-        found = mcz.repair(flip_bit(data, body_of(of, at, size), 3), tmp_path / "o.mcz", force=True)
+        report = mcz.repair(
+            flip_bit(data, body_of(of, at, size), 3), tmp_path / "o.mcz", force=True
+        )
         repaired = (tmp_path / "o.mcz").read_bytes()
         assert not [p for p in mcz.verify(repaired) if p.heading != "Codecs"], of
         count = count_kept_values(repaired, whole)
-        assert found.damage
+        assert report.damage
         if kind == "protected":
-            assert (found.restored, repaired) == (True, data), of
+            assert (report.restored, repaired) == (True, data), of
             continue
-        assert count == sizes(whole) or (of in COSTS_VALUES and found.lost), of
-        assert not found.lost or of not in COSTS_NOTHING, (of, found.lost)
+        assert count == sizes(whole) or (of in COSTS_VALUES and report.lost), of
+        assert not report.lost or of not in COSTS_NOTHING, (of, report.lost)
         if of == "SRCE":
-            assert any("source" in line for line in found.lost), found.lost
+            assert any("source" in line for line in report.lost), report.lost
         if of == "CLIP":
-            lost = {name for name in whole if not any(n.startswith(name) for n in found.clips)}
+            lost = {name for name in whole if not any(n.startswith(name) for n in report.clips)}
             assert len(lost) == 1
 
 
@@ -67,8 +69,8 @@ def test_a_bit_in_a_header_costs_nothing(
         if seen[of] == 1:
             bit = 8 * (at % 16) + at % 8
             bad = flip_bit(data, at + bit // 8, bit % 8)
-            found = mcz.repair(bad, tmp_path / "o.mcz", force=True)
-            assert found.lost == [], of
+            report = mcz.repair(bad, tmp_path / "o.mcz", force=True)
+            assert report.lost == [], of
             assert count_kept_values((tmp_path / "o.mcz").read_bytes(), whole) == sizes(whole), of
 
 

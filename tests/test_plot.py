@@ -78,14 +78,14 @@ def test_errors_are_those_of_diff(walk: Motion, lossy: Path, tmp_path: Path) -> 
         clip = file.only_clip()
         decoded = clip.motion()
         plotted = mcz.plot(walk, tmp_path / "a.png", other=clip, size=SIZE)
-    found, wanted = errors_between(walk, decoded), mcz.compare(walk, decoded)
+    comparison, wanted = errors_between(walk, decoded), mcz.compare(walk, decoded)
     assert wanted.mean_position_error_cm is not None
     assert wanted.max_position_error_cm is not None
-    assert (found.unit, (found.frame, found.place)) == ("mm", wanted.where)
-    assert found.mean == pytest.approx(10 * wanted.mean_position_error_cm, rel=1e-12)
-    assert np.nanmean(found.means) == pytest.approx(found.mean, rel=1e-9)
-    assert np.nanmax(found.greatest) == pytest.approx(found.most, rel=1e-9)
-    assert np.nanargmax(found.greatest) == found.frame
+    assert (comparison.unit, (comparison.frame, comparison.place)) == ("mm", wanted.where)
+    assert comparison.mean == pytest.approx(10 * wanted.mean_position_error_cm, rel=1e-12)
+    assert np.nanmean(comparison.means) == pytest.approx(comparison.mean, rel=1e-9)
+    assert np.nanmax(comparison.greatest) == pytest.approx(comparison.most, rel=1e-9)
+    assert np.nanargmax(comparison.greatest) == comparison.frame
     (rows,) = plotted.tables
     for row, each in zip(rows[1:], wanted.by_joint, strict=True):
         mean, most = each.mean_position_error, each.max_position_error
@@ -165,9 +165,9 @@ def test_rate_and_distortion_are_those_of_diff(walk: Motion, tmp_path: Path) -> 
     with mcz.open(out.getvalue()) as file:
         clip = info(file)["clips"][0]
         assert sizes[1] == clip["payload_bytes"] + clip["overhead_bytes"]
-        found = mcz.compare(short, file.only_clip().motion())
-    assert found.mean_position_error_cm is not None
-    assert rows[2][3] == number(10 * found.mean_position_error_cm)
+        decoded = mcz.compare(short, file.only_clip().motion())
+    assert decoded.mean_position_error_cm is not None
+    assert rows[2][3] == number(10 * decoded.mean_position_error_cm)
 
 
 def test_channels_and_their_units(walk: Motion, samples: Path, tmp_path: Path) -> None:

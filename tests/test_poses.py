@@ -47,8 +47,8 @@ def test_rotations_are_those_of_the_chain(skeleton: Skeleton) -> None:
 @given(skeletons(), FORM_NAMES, st.sampled_from(["XYZ", "zxy", "ZYZ"]))
 def test_every_form_leads_back(skeleton: Skeleton, form: str, order: str) -> None:
     motion = motion_of(skeleton)
-    found = mcz.rotations(motion, form, order=order)
-    back = to_matrices(found, form, order)
+    turns = mcz.rotations(motion, form, order=order)
+    back = to_matrices(turns, form, order)
     np.testing.assert_allclose(back, mcz.rotations(motion, "matrix"), atol=1e-7)
     assert mcz.rotations(motion, form, order=order, dtype="float32").dtype == np.float32
 
@@ -124,8 +124,8 @@ def test_points_are_named_as_joints_and_end_sites_are() -> None:
     motion = smooth(3)
     whole = mcz.positions(motion)
     assert mcz.point_names(motion) == ("hips", "spine", "spine end", "fixed", "knee")
-    found = mcz.positions(motion, ["spine end", "knee", 2])
-    np.testing.assert_array_equal(found, whole[:, [2, 4, 3]])
+    positions = mcz.positions(motion, ["spine end", "knee", 2])
+    np.testing.assert_array_equal(positions, whole[:, [2, 4, 3]])
     assert mcz.point_names(motion, ["spine end", "knee", 2]) == ("spine end", "knee", "fixed")
     with pytest.raises(mcz.MotionError, match="did you mean 'spine end'"):
         mcz.positions(motion, "spine ende")
@@ -228,9 +228,9 @@ def test_frames_that_coincide_are_the_same_bits() -> None:
 def test_positions_follow_cubics() -> None:
     """A parabola is followed exactly, but for the first and last stretch, and a gap stays one."""
     motion = one_column([float(n * n) for n in range(9)], 10)
-    found = mcz.resample(motion, 40).values[:, 0]
-    times = np.arange(len(found)) / 4
-    np.testing.assert_allclose(found[4:-4], times[4:-4] ** 2, atol=1e-12)
+    resampled = mcz.resample(motion, 40).values[:, 0]
+    times = np.arange(len(resampled)) / 4
+    np.testing.assert_allclose(resampled[4:-4], times[4:-4] ** 2, atol=1e-12)
     gap = one_column([0.0, 1.0, 2.0, np.nan, 4.0, 5.0], 10)
     np.testing.assert_allclose(
         mcz.resample(gap, 20).values[:, 0], [0, 0.5, 1, 1.5, 2, *[np.nan] * 3, 4, 4.5, 5]
@@ -241,8 +241,8 @@ def test_what_cannot_be_resampled(samples: Path) -> None:
     walk = mcz.read(samples / "walk.c3d")
     with pytest.raises(mcz.OptionError, match="residuals"):
         mcz.resample(walk, 30)
-    found = mcz.resample(walk, 30, drop_signals=True)
-    assert [signal.name for signal in found.signals] == ["motion"] and found.n_frames == 60
+    resampled = mcz.resample(walk, 30, drop_signals=True)
+    assert [signal.name for signal in resampled.signals] == ["motion"] and resampled.n_frames == 60
     with pytest.raises(mcz.OptionError, match="frame rate is unknown"):
         mcz.resample(mcz.read(samples / "walk.amc"), 30)
     with pytest.raises(mcz.MotionError, match="frame rate"):
@@ -277,9 +277,9 @@ def test_unknown_values_lose_what_depends_on_them(skeleton: Skeleton, data: st.D
     cell = data.draw(st.integers(0, 6)), data.draw(st.integers(0, skeleton.n_channels - 1))
     values[cell] = np.nan
     motion = Motion(skeleton, (Signal(values),))
-    found = mcz.positions(motion)
+    positions = mcz.positions(motion)
     np.testing.assert_array_equal(
-        np.isnan(found), np.isnan(positions_of(skeleton, values)), strict=True
+        np.isnan(positions), np.isnan(positions_of(skeleton, values)), strict=True
     )
 
 
@@ -287,8 +287,8 @@ def test_a_joint_that_turns_unknown_stays_where_it_is() -> None:
     motion = smooth(3)  # which only turns and moves: compiled
     values = motion.values.copy()
     values[1, 7] = values[2, 9] = np.nan  # of the spine, of the knee
-    found = mcz.positions(motion.with_values(values))
-    lost = np.isnan(found).all(axis=2)
+    positions = mcz.positions(motion.with_values(values))
+    lost = np.isnan(positions).all(axis=2)
     assert [mcz.point_names(motion)[n] for n in np.flatnonzero(lost[1])] == ["spine end", "fixed"]
     assert not lost[[0, 2]].any()
 
@@ -299,6 +299,6 @@ def test_what_is_invalid_is_nan_in_every_form() -> None:
     mask[2, 7] = False  # of the spine
     motion = replace(motion, signals=(replace(motion.signals[0], mask=mask),))
     for form in FORMS:
-        found = mcz.rotations(motion, form)
-        assert np.isnan(found[2, 1]).all() and np.isfinite(np.delete(found, 1, axis=1)).all()
+        turns = mcz.rotations(motion, form)
+        assert np.isnan(turns[2, 1]).all() and np.isfinite(np.delete(turns, 1, axis=1)).all()
     assert np.isnan(from_matrices(np.full((1, 1, 3, 3), np.nan), "euler")).all()

@@ -127,9 +127,9 @@ class Watched(io.BytesIO):
 
     def read(self, size: int | None = -1, /) -> bytes:
         start = self.tell()
-        found = super().read(size)
-        self.seen[start : start + len(found)] = True
-        return found
+        decoded = super().read(size)
+        self.seen[start : start + len(decoded)] = True
+        return decoded
 
 
 def detail_ranges(file: mcz.File, info: SignalInfo) -> list[slice]:
@@ -192,11 +192,11 @@ def test_command_numbers(walk: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("target", ["bvh", "c3d"])
 def test_command_converts(walk: Path, tmp_path: Path, target: str) -> None:
     assert run("decode", walk, "--preview", "--to", target, "-o", tmp_path / f"a.{target}") == 0
-    found = mcz.read(tmp_path / f"a.{target}")
+    decoded = mcz.read(tmp_path / f"a.{target}")
     with mcz.open(walk) as file:
         wanted = preview_motion(file.only_clip())
-    assert found.n_frames == wanted.n_frames
-    assert found.frame_rate == pytest.approx(float(wanted.frame_rate or 0), rel=1e-3)
+    assert decoded.n_frames == wanted.n_frames
+    assert decoded.frame_rate == pytest.approx(float(wanted.frame_rate or 0), rel=1e-3)
 
 
 @pytest.mark.parametrize(

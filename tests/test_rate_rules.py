@@ -84,10 +84,12 @@ def test_any_gap(rate: Fraction, runs: list[tuple[int, int]], first: int, places
         number += length - 1 + gap
     rows = "".join(f"{float(n / rate):.{places}f}\t{n}\n" for n in numbers)
     data = f"a\nendheader\ntime\tknee\n{rows}".encode()
-    found = FORMATS["sto"].read(data).frame_rate
-    assert found is not None and abs(found / rate - 1) < 2e-3  # 119.88 prints as 120 in few rows
+    decoded = FORMATS["sto"].read(data).frame_rate
+    assert (
+        decoded is not None and abs(decoded / rate - 1) < 2e-3
+    )  # 119.88 prints as 120 in few rows
     away = np.array([float(Fraction(n - first) / rate) for n in numbers])
-    assert np.abs(away - np.rint(away * float(found)) / float(found)).max() < 3 * 10.0**-places
+    assert np.abs(away - np.rint(away * float(decoded)) / float(decoded)).max() < 3 * 10.0**-places
 
 
 def folder_of(tmp_path: Path) -> Path:
@@ -318,11 +320,11 @@ def test_events_keep_their_frames_at_a_corrected_rate(tmp_path: Path) -> None:
     }
     made.parameters["ANALOG"] = {"RATE": made.real(400.0)}
     path.write_bytes(made.build())
-    told = mcz.recording(mcz.read(path))
-    assert told is not None and told.events
+    decoded = mcz.recording(mcz.read(path))
+    assert decoded is not None and decoded.events
     rate = mcz.read(path).frame_rate
     assert rate is not None
-    frames = [event.time * float(rate) for event in told.events]
+    frames = [event.time * float(rate) for event in decoded.events]
     mcz.encode(path, tmp_path / "a.mcz", rate=rate * 2)
     mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(5, 14))
     with mcz.open(tmp_path / "a.mcz") as file, mcz.open(tmp_path / "b.mcz") as part:
@@ -333,6 +335,6 @@ def test_events_keep_their_frames_at_a_corrected_rate(tmp_path: Path) -> None:
         found += [mcz.recording(motion) for motion in motions]
     for recording in found:
         assert recording is not None
-        assert recording.analog_rate == (told.analog_rate and told.analog_rate * 2)
+        assert recording.analog_rate == (decoded.analog_rate and decoded.analog_rate * 2)
         times = [event.time * float(rate * 2) for event in recording.events]
         np.testing.assert_allclose(times, frames, rtol=1e-6)

@@ -156,9 +156,9 @@ def test_blender_puts_the_joints_of_a_bvh_there(samples: Path, tmp_path: Path, n
     script = ROOT / "tools/blender/check_import.py"
     command = ["blender", "--background", "--python", script, "--", clip, expected]
     out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    found = json.loads([line for line in out.splitlines() if line.startswith("{")][-1])
-    assert found["bones"] == motion.skeleton.n_joints and found["frames"] == 60
-    assert 0 <= found["distance"] < 1e-5 * np.ptp(places, axis=(0, 1)).max()
+    document = json.loads([line for line in out.splitlines() if line.startswith("{")][-1])
+    assert document["bones"] == motion.skeleton.n_joints and document["frames"] == 60
+    assert 0 <= document["distance"] < 1e-5 * np.ptp(places, axis=(0, 1)).max()
 
 
 # What is left out -----------------------------------------------------------------------

@@ -409,8 +409,8 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
 def file_contents(data: bytes) -> set[tuple[str, bytes]]:
     """Contents of a file, by name."""
     with mcz.open(data) as file:
-        found = {(clip.name, clip.read().tobytes()) for clip in file}
-        return found | {(name, one.read()) for name, one in file.attachments.items()}
+        decoded = {(clip.name, clip.read().tobytes()) for clip in file}
+        return decoded | {(name, one.read()) for name, one in file.attachments.items()}
 
 
 def test_one_byte_more_is_left_out(small: tuple[bytes, bytes], tmp_path: Path) -> None:
@@ -470,11 +470,11 @@ def test_what_can_be_restored_is_though_more_was_lost(
     bad[second.start + 20 : second.start + 8000] = bytes(7980)
     report, data = restore_file(bytes(bad), tmp_path)
     assert not report.restored
-    with mcz.open(archive) as file, mcz.open(data) as found:
+    with mcz.open(archive) as file, mcz.open(data) as reader:
         whole = {name for name in file.clips if name != "more"}
-        assert whole <= set(found.clips)
+        assert whole <= set(reader.clips)
         for name in whole:
-            np.testing.assert_array_equal(found.clips[name].read(), file.clips[name].read())
+            np.testing.assert_array_equal(reader.clips[name].read(), file.clips[name].read())
 
 
 def test_a_full_disk_of_temporary_files(

@@ -320,9 +320,9 @@ def test_points_of_other_names_are_noted() -> None:
     joints = tuple(replace(joint, name=f"{joint.name}!") for joint in motion.skeleton.joints)
     other = replace(motion, skeleton=replace(motion.skeleton, joints=joints))
     assert not any("other names" in note for note in mcz.compare(motion, motion).notes)
-    found = mcz.compare(motion, other)
-    assert found.mean_position_error == 0
-    assert any("other names" in note for note in found.notes)
+    comparison = mcz.compare(motion, other)
+    assert comparison.mean_position_error == 0
+    assert any("other names" in note for note in comparison.notes)
 
 
 def test_extract_and_diff_take_a_limit_of_decoded_bytes(tmp_path: Path) -> None:

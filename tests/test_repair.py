@@ -47,8 +47,8 @@ def check(repaired: bytes, whole: Values) -> int:
 
 
 def repair_file(damaged: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
-    found = mcz.repair(damaged, folder / "out.mcz", force=True)
-    return found, (folder / "out.mcz").read_bytes()
+    report = mcz.repair(damaged, folder / "out.mcz", force=True)
+    return report, (folder / "out.mcz").read_bytes()
 
 
 def test_runs_of_frames_keep_names_numbers_and_sources(
@@ -60,10 +60,10 @@ def test_runs_of_frames_keep_names_numbers_and_sources(
         path = file.clips["walk"].source.path
     damaged = bytearray(archive)
     damaged[row.offset + row.size // 2] ^= 1
-    found, data = repair_file(bytes(damaged), tmp_path)
-    assert found.runs == {"walk": [(0, 60), (120, 240)]}
-    assert len(found.lost) == 1
-    assert "60 of 240 frames" in found.lost[0]
+    report, data = repair_file(bytes(damaged), tmp_path)
+    assert report.runs == {"walk": [(0, 60), (120, 240)]}
+    assert len(report.lost) == 1
+    assert "60 of 240 frames" in report.lost[0]
     with mcz.open(data) as file:
         clip = file.clips["walk.120-240"]
         assert clip.frame_numbers.tolist() == list(range(121, 241))
@@ -77,14 +77,14 @@ def test_runs_of_frames_keep_names_numbers_and_sources(
 @pytest.mark.parametrize("cut", [0.7, 0.99])
 def test_a_file_that_was_cut_short(archive: bytes, tmp_path: Path, cut: float) -> None:
     whole = values_of(archive)
-    found, data = repair_file(archive[: int(cut * len(archive))], tmp_path)
+    report, data = repair_file(archive[: int(cut * len(archive))], tmp_path)
     assert check(data, whole) > 100
-    assert found.lost
+    assert report.lost
 
 
 def test_junk_at_the_end_costs_nothing(archive: bytes, tmp_path: Path) -> None:
-    found, data = repair_file(archive + b"junk" * 5, tmp_path)
-    assert found.lost == []
+    report, data = repair_file(archive + b"junk" * 5, tmp_path)
+    assert report.lost == []
     with mcz.open(data) as file, mcz.open(archive) as before:
         assert list(file.clips) == list(before.clips)
         assert list(file.attachments) == list(before.attachments) == ["notes.txt"]
@@ -151,10 +151,10 @@ def test_a_lost_template_costs_no_value(tmp_path: Path) -> None:
     data = force(tmp_path)
     whole = values_of(data)
     (chunk,) = (row for row in chunks_of(data) if row[0] == "SRCE")
-    found, repaired_data = repair_file(flip_bit(data, body_of(*chunk), 4), tmp_path)
+    report, repaired_data = repair_file(flip_bit(data, body_of(*chunk), 4), tmp_path)
     assert check(repaired_data, whole) == 60
-    assert found.runs == {"force": [(0, 60)]}
-    assert any("its source file" in line for line in found.lost)
+    assert report.runs == {"force": [(0, 60)]}
+    assert any("its source file" in line for line in report.lost)
     with mcz.open(repaired_data) as file:
         clip = file.clips["force"]
         assert clip.source is None
@@ -187,14 +187,14 @@ def test_a_signal_that_is_lost_takes_no_other_along(samples: Path, tmp_path: Pat
     bad = bytearray(data)
     for at in places:
         bad[at] ^= 1
-    found, repaired_data = repair_file(bytes(bad), tmp_path)
+    report, repaired_data = repair_file(bytes(bad), tmp_path)
     lost = 60 * (motion.layout.n_channels + residuals.layout.n_channels)
     assert (
         count_kept_values(repaired_data, whole)
         == sum(v.size for v in whole["walk"].values()) - lost
     )
-    assert found.runs == {"walk": [(0, 60), (60, 120), (120, 180), (180, 240)]}
-    assert found.lost == [
+    assert report.runs == {"walk": [(0, 60), (60, 120), (120, 180), (180, 240)]}
+    assert report.lost == [
         "clip 'walk', signal 'motion': 60 of 240 frames",
         "clip 'walk', signal 'residuals': 60 of 240 frames",
     ]
@@ -213,13 +213,13 @@ def test_a_signal_that_is_lost_takes_no_other_along(samples: Path, tmp_path: Pat
 def test_what_cannot_be_decoded_here_needs_its_end(tmp_path: Path) -> None:
     """Clips of an unknown codec are kept with their CEND; without it their hashes are lost."""
     data = with_unknown_codec(tmp_path)
-    found, repaired_data = repair_file(data + b"junk", tmp_path)
-    assert (found.clips, found.lost) == (["walk"], [])
+    report, repaired_data = repair_file(data + b"junk", tmp_path)
+    assert (report.clips, report.lost) == (["walk"], [])
     (end,) = (row for row in chunks_of(data) if row[0] == "CEND")
-    found, repaired_data = repair_file(flip_bit(data, body_of(*end), 1), tmp_path)
-    assert found.clips == []
-    assert found.skeletons
-    assert any("codec 1048576" in line and "CEND" in line for line in found.lost)
+    report, repaired_data = repair_file(flip_bit(data, body_of(*end), 1), tmp_path)
+    assert report.clips == []
+    assert report.skeletons
+    assert any("codec 1048576" in line and "CEND" in line for line in report.lost)
     assert mcz.verify(repaired_data) == []
 
 
@@ -255,9 +255,9 @@ def test_no_clip_gets_frames_of_the_next_one(
         stop = file.clips["b"].signals[0].rows[2].offset - HEADER.size + 5
     hole = b"" if removed else bytes(stop - start)
     bad = data[:start] + hole + data[stop:] if indexed else data[:start] + hole + data[stop:-240]
-    found, repaired_data = repair_file(bad, tmp_path)
+    report, repaired_data = repair_file(bad, tmp_path)
     assert count_kept_values(repaired_data, whole) == 120 * 96
-    assert found.runs == {"a": [(0, 120)]}
+    assert report.runs == {"a": [(0, 120)]}
     for name, signals in values_of(bad, salvage=True).items():
         values = signals["motion"]
         valid = ~np.isnan(values)
@@ -272,8 +272,8 @@ def test_a_lost_head_and_alias_are_in_the_index(archive: bytes, tmp_path: Path) 
     bad = bytearray(archive)
     for row in chunks:
         bad[body_of(*row)] ^= 6
-    found, repaired_data = repair_file(bytes(bad), tmp_path)
-    assert found.lost == []
+    report, repaired_data = repair_file(bytes(bad), tmp_path)
+    assert report.lost == []
     with mcz.open(repaired_data) as file:
         assert file.aliases == aliases
 
@@ -285,9 +285,9 @@ def test_a_lost_skeleton_costs_names_alone(tmp_path: Path) -> None:
     data = (tmp_path / "t.mcz").read_bytes()
     whole = values_of(data)
     (skeleton,) = (row for row in chunks_of(data) if row[0] == "SKEL")
-    found, repaired_data = repair_file(flip_bit(data, body_of(*skeleton), 0), tmp_path)
+    report, repaired_data = repair_file(flip_bit(data, body_of(*skeleton), 0), tmp_path)
     assert count_kept_values(repaired_data, whole) == 180
-    assert any("its skeleton is lost" in line for line in found.lost)
+    assert any("its skeleton is lost" in line for line in report.lost)
     with mcz.open(repaired_data) as file:
         assert file.clips["t"].source is None
 
@@ -349,9 +349,9 @@ def test_what_breaks_a_rule_is_left_out(tmp_path: Path) -> None:
     whole, parts = values_of(data), parts_of(data)
     which = next(i for i, (piece, _) in enumerate(parts) if piece.type == b"QUAL")
     bad = join_parts(replace_payload(parts, which, b"\x05\xff"))
-    found, repaired_data = repair_file(bad, tmp_path)
+    report, repaired_data = repair_file(bad, tmp_path)
     assert check(repaired_data, whole) == 240
-    assert any("break a rule" in line for line in found.lost)
+    assert any("break a rule" in line for line in report.lost)
 
 
 def test_extracts_of_damaged_files_end_with_4_or_1(samples: Path, tmp_path: Path) -> None:

@@ -292,9 +292,9 @@ def test_a_clip_without_its_finest_details(codec: str, tmp_path: Path) -> None:
     mcz.write(smooth(300), whole, codec)
     mcz.extract(whole, part, resolution=1)
     new = np.linspace(0, 50, 300)
-    after, found = replace_values(part.read_bytes(), "knee", new)
+    after, data = replace_values(part.read_bytes(), "knee", new)
     check_others(part.read_bytes(), after, "knee")
-    assert found.max_error < 2
+    assert data.max_error < 2
 
 
 def test_the_quality_record_says_what_is_known() -> None:
@@ -490,8 +490,8 @@ def test_command(walk: Path, suffix: str, capsys: pytest.CaptureFixture[str]) ->
     assert run(*arguments) == 2  # it exists
     capsys.readouterr()
     assert run(*arguments, "--force", "--on-grid") == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["joint"] == joint and said["max_error"] == 0
+    output = json.loads(capsys.readouterr().out)
+    assert output["joint"] == joint and output["max_error"] == 0
     before = walk.read_bytes()
     edit = ("--joint", joint, "--values", table)
     assert run("replace", walk, walk, *edit, "--force") == 2

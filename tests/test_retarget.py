@@ -308,8 +308,10 @@ def test_rest_poses_that_differ_are_told_of_other_skeletons() -> None:
     other = replace(bones, joints=(bones.joints[0], replace(bones.joints[1], offset=(1, 0, 0))))
     motion = Motion(bones, (Signal(values_for(bones)),))
     with pytest.warns(mcz.SkeletonWarning, match=r"a by 90 degrees; match_rest="):
-        told = mcz.retarget(motion, other)
-    np.testing.assert_array_equal(told.values, mcz.retarget(motion, other, match_rest=()).values)
+        retargeted = mcz.retarget(motion, other)
+    np.testing.assert_array_equal(
+        retargeted.values, mcz.retarget(motion, other, match_rest=()).values
+    )
     assert mcz.retarget(motion, other, match_rest="a").n_frames == motion.n_frames
 
 
@@ -396,8 +398,8 @@ def test_flavors_of_real_clips_are_recognized(data: Path) -> None:
         ("cmu/bvh-3dsmax/131_01.bvh", "cmu-bvh-3dsmax", 31),
         ("cmu/bvh-daz/02_01.bvh", "cmu-bvh-daz", 43),
     ):
-        found = mcz.joint_map(mcz.read(data / path).skeleton, kind)
-        assert len(found) == count, path
+        decoded = mcz.joint_map(mcz.read(data / path).skeleton, kind)
+        assert len(decoded) == count, path
 
 
 @pytest.mark.real

@@ -175,8 +175,8 @@ def test_pack_notes_and_unpack_gives_a_choice(tmp_path: Path) -> None:
     assert {o.path for o in strict.failures} == noted
     portable = mcz.unpack(tmp_path / "a.mcz", tmp_path / "portable", names="portable")
     assert not portable.failures
-    found = {p.name: p.read_bytes() for p in (tmp_path / "portable").iterdir()}
-    assert found == {
+    data = {p.name: p.read_bytes() for p in (tmp_path / "portable").iterdir()}
+    assert data == {
         "CON_": b"CON",
         "NOTES.TXT": b"NOTES.TXT",
         "fine.txt": b"fine.txt",

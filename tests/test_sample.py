@@ -15,5 +15,5 @@ SHA256 = {
 
 
 def test_files_are_the_same_everywhere(samples: Path) -> None:
-    found = {name: hashlib.sha256((samples / name).read_bytes()).hexdigest() for name in SHA256}
-    assert found == SHA256
+    data = {name: hashlib.sha256((samples / name).read_bytes()).hexdigest() for name in SHA256}
+    assert data == SHA256

@@ -42,18 +42,18 @@ def norms(motion: Motion, at: int = 3) -> np.ndarray:
 @pytest.mark.parametrize("rate", [50, 120, 24.5, 10])
 def test_four_columns_of_unit_norm_turn(names: Sequence[str], rate: float) -> None:
     motion = robot(names)
-    found = mcz.resample(motion, rate)
-    np.testing.assert_allclose(norms(found), 1, atol=1e-12)
+    resampled = mcz.resample(motion, rate)
+    np.testing.assert_allclose(norms(resampled), 1, atol=1e-12)
     if rate != 10:  # of which every third frame is an old one
-        assert found.metadata["source-note"] == "columns 4 to 7 were resampled as quaternions"
-    angles = found.times * 30 / 3 * np.pi / 2
+        assert resampled.metadata["source-note"] == "columns 4 to 7 were resampled as quaternions"
+    angles = resampled.times * 30 / 3 * np.pi / 2
     axis = np.array([0.36, 0.48, 0.8])
     wanted = np.column_stack([np.sin(angles)[:, None] * axis, np.cos(angles)])
-    same = np.abs((found.values[:, 3:7] * wanted).sum(axis=1))
+    same = np.abs((resampled.values[:, 3:7] * wanted).sum(axis=1))
     np.testing.assert_allclose(same, 1, atol=1e-9)  # whichever sign
     plain = mcz.resample(motion, rate, components=True)
     others = [0, 1, 2, 7, 8]
-    np.testing.assert_array_equal(found.values[:, others], plain.values[:, others])
+    np.testing.assert_array_equal(resampled.values[:, others], plain.values[:, others])
     assert "source-note" not in plain.metadata
     if rate != 10:
         assert norms(plain).min() < 0.9
@@ -62,10 +62,10 @@ def test_four_columns_of_unit_norm_turn(names: Sequence[str], rate: float) -> No
 def test_numbers_of_few_decimals_and_gaps() -> None:
     four = turning_quaternions().round(3)
     four[7] = np.nan
-    found = mcz.resample(robot(quaternion=four), 50)
-    known = norms(found)[~np.isnan(norms(found))]
+    resampled = mcz.resample(robot(quaternion=four), 50)
+    known = norms(resampled)[~np.isnan(norms(resampled))]
     np.testing.assert_allclose(known, 1, atol=2e-3)
-    assert len(known) < found.n_frames
+    assert len(known) < resampled.n_frames
 
 
 def test_what_is_not_clear_is_refused() -> None:
@@ -100,9 +100,9 @@ def test_a_table_and_an_array_file(tmp_path: Path) -> None:
     lines = "\n".join(",".join(f"{v:.6f}" for v in row) for row in values.tolist())
     (tmp_path / "a.csv").write_text(lines + "\n")
     for name, at in (("a.npz", 0), ("a.csv", 3)):
-        found = mcz.resample(mcz.read(tmp_path / name, rate=30), 50)
-        np.testing.assert_allclose(norms(found, at), 1, atol=1e-4)
-        assert "as quaternions" in found.metadata["source-note"]
+        decoded = mcz.resample(mcz.read(tmp_path / name, rate=30), 50)
+        np.testing.assert_allclose(norms(decoded, at), 1, atol=1e-4)
+        assert "as quaternions" in decoded.metadata["source-note"]
 
 
 def test_the_greatest_error_of_scalars_is_said(
@@ -114,11 +114,11 @@ def test_the_greatest_error_of_scalars_is_said(
     source, path = str(tmp_path / "a.csv"), str(tmp_path / "a.mcz")
     options = ["--rate", "30", "--codec", "posewave", "--param", "step=0.001", "-o", path]
     assert run("encode", source, *options) == 0
-    said = capsys.readouterr().out
+    output = capsys.readouterr().out
     with mcz.open(path) as file:
         clip = file.only_clip()
         errors = np.abs(clip.values[:] - mcz.read(source).values)
         assert not any(key.startswith("max_channel_error") for key in clip.quality or {})
     frame, column = divmod(int(errors.argmax()), 2)
     where = f"(frame {frame}, column {column + 1}.value)"
-    assert f"greatest error {errors.max():.6g} {where}; no bound is kept for channels" in said
+    assert f"greatest error {errors.max():.6g} {where}; no bound is kept for channels" in output

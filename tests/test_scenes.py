@@ -254,8 +254,8 @@ def test_decode_says_what_it_reached(call: Call) -> None:
     assert "points up is unknown: taken for y" in err
     motion = mcz.read("walk.amc", rate=120)
     expected = mcz.to_glb(replace(motion, source=None), key_error_mm=1)
-    found = Path("a.glb").read_bytes()
-    assert len(found) == pytest.approx(len(expected.data), abs=100)  # the name of the source
+    data = Path("a.glb").read_bytes()
+    assert len(data) == pytest.approx(len(expected.data), abs=100)  # the name of the source
     code, out, _ = call("decode", "bvh.mcz", "--to", "glb", "--frames", "9:19", "--json")
     scene = json.loads(out)["scene"]
     assert code == 0 and scene["max_error"] <= scene["key_error"]
@@ -381,9 +381,9 @@ def test_blender_puts_the_bones_there(tmp_path: Path, kind: str) -> None:
     environment = {key: value for key, value in os.environ.items() if key not in python}
     ran = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
     (line,) = (line for line in ran.stdout.splitlines() if line.startswith("{"))
-    found = json.loads(line)
-    assert (found["bones"], found["frames"]) == (skeleton.n_joints, motion.n_frames)
-    assert found["distance"] < 2e-4
+    document = json.loads(line)
+    assert (document["bones"], document["frames"]) == (skeleton.n_joints, motion.n_frames)
+    assert document["distance"] < 2e-4
 
 
 REAL = [

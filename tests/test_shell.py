@@ -50,18 +50,18 @@ def test_without_axis_and_tails_shell_and_markers_are_the_same() -> None:
 
 def test_a_hinge_by_hand() -> None:
     """Points 3 cm off the origin: those of x and y turn by a quarter, that of z does not."""
-    found = mcz.compare(hinge([0, 0, 0]), hinge([0, 90, -90]))
-    assert found.shell_radius_cm == 3
-    assert found.shell_max_cm == pytest.approx(3 * np.sqrt(2))
-    assert found.shell_mean_cm == pytest.approx(2 * 3 * np.sqrt(2) / 3)
-    assert found.shell_where == (1, "arm")
-    entries = found.entries()
+    comparison = mcz.compare(hinge([0, 0, 0]), hinge([0, 90, -90]))
+    assert comparison.shell_radius_cm == 3
+    assert comparison.shell_max_cm == pytest.approx(3 * np.sqrt(2))
+    assert comparison.shell_mean_cm == pytest.approx(2 * 3 * np.sqrt(2) / 3)
+    assert comparison.shell_where == (1, "arm")
+    entries = comparison.entries()
     assert (entries["shell_max_frame"], entries["shell_max_joint"]) == (1, "arm")
-    assert entries["shell_mean_cm"] == found.shell_mean_cm
+    assert entries["shell_mean_cm"] == comparison.shell_mean_cm
     wide = mcz.compare(hinge([0, 0, 0]), hinge([0, 90, -90]), shell_cm=12.0)
     assert wide.shell_radius_cm == 12
     assert wide.shell_max_cm == pytest.approx(12 * np.sqrt(2))
-    assert wide.mean_position_error == found.mean_position_error
+    assert wide.mean_position_error == comparison.mean_position_error
 
 
 def test_axes_of_an_asf_do_not_turn_the_shell() -> None:
@@ -74,8 +74,8 @@ def test_axes_of_an_asf_do_not_turn_the_shell() -> None:
 
     along = np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0])
     apart = np.sqrt(1 - along**2) * 3 * 2  # half a turn about ``along``
-    found = mcz.compare(bone(0), bone(180))
-    assert found.shell_max_cm == pytest.approx(apart.max())
+    comparison = mcz.compare(bone(0), bone(180))
+    assert comparison.shell_max_cm == pytest.approx(apart.max())
 
 
 @pytest.mark.parametrize("radius", [0.0, -1.0, np.inf, np.nan])
@@ -92,33 +92,41 @@ def test_a_shell_needs_a_unit() -> None:
     unknown = replace(smooth().skeleton, unit_cm=None)
     with pytest.raises(OptionError, match="length unit is unknown.*3 cm.*unit="):
         shell_points_of(unknown, smooth().values)
-    found = mcz.compare(hinge([0.0], unit_cm=None), hinge([9.0], unit_cm=None))
-    assert (found.shell_mean_cm, found.shell_radius_cm, found.shell_where) == (None, None, None)
+    comparison = mcz.compare(hinge([0.0], unit_cm=None), hinge([9.0], unit_cm=None))
+    assert (comparison.shell_mean_cm, comparison.shell_radius_cm, comparison.shell_where) == (
+        None,
+        None,
+        None,
+    )
 
 
 def test_the_shell_can_be_left_out() -> None:
-    found = mcz.compare(smooth(), noisy(smooth()), shell_cm=None)
-    assert (found.shell_mean_cm, found.shell_max_cm, found.shell_radius_cm) == (None, None, None)
-    assert found.virtual_marker_mean_cm is not None
+    comparison = mcz.compare(smooth(), noisy(smooth()), shell_cm=None)
+    assert (comparison.shell_mean_cm, comparison.shell_max_cm, comparison.shell_radius_cm) == (
+        None,
+        None,
+        None,
+    )
+    assert comparison.virtual_marker_mean_cm is not None
     alone = mcz.compare(smooth(), noisy(smooth()), virtual_markers=False)
     assert (alone.virtual_marker_mean_cm, alone.shell_mean_cm is None) == (None, False)
 
 
 def test_where_shells_cannot_be_compared() -> None:
     walk = acclaim_walk()
-    found = mcz.compare(walk, mcz.in_positions(walk, virtual_markers=True))
-    assert found.virtual_marker_mean_cm is not None and found.shell_mean_cm is None
-    assert any("has virtual markers: no errors of shells" in note for note in found.notes)
-    found = mcz.compare(walk, mcz.in_positions(walk))
-    assert found.shell_mean_cm is None
-    assert any("virtual markers and shells" in note for note in found.notes)
+    comparison = mcz.compare(walk, mcz.in_positions(walk, virtual_markers=True))
+    assert comparison.virtual_marker_mean_cm is not None and comparison.shell_mean_cm is None
+    assert any("has virtual markers: no errors of shells" in note for note in comparison.notes)
+    comparison = mcz.compare(walk, mcz.in_positions(walk))
+    assert comparison.shell_mean_cm is None
+    assert any("virtual markers and shells" in note for note in comparison.notes)
     one = hinge([0.0])
     other = Joint("b", 0, (2.0, 0.0, 0.0), channels=(Channel("rz"),))
     two = Skeleton((Joint("a"), other), unit_cm=100.0)
-    found = mcz.compare(one, Motion(two, one.signals))
-    assert found.points == 2
-    assert found.shell_mean_cm is found.virtual_marker_mean_cm is None
-    assert any("1 and 2 joints: no errors" in note for note in found.notes)
+    comparison = mcz.compare(one, Motion(two, one.signals))
+    assert comparison.points == 2
+    assert comparison.shell_mean_cm is comparison.virtual_marker_mean_cm is None
+    assert any("1 and 2 joints: no errors" in note for note in comparison.notes)
 
 
 @given(motions(), st.floats(0.5, 20))
@@ -126,7 +134,7 @@ def test_beside_plain_sums(motion: Motion, radius: float) -> None:
     """Any values, masks and gaps: the figures by joint and over all, from arrays of points."""
     values = np.clip(np.nan_to_num(motion.values, nan=1.0), -1e300, 1e300)
     other = motion.with_values(values * (1 + 1e-9))
-    found = mcz.compare(motion, other, shell_cm=radius)
+    comparison = mcz.compare(motion, other, shell_cm=radius)
     with np.errstate(all="ignore"):
         a, b = (
             shell_points_of(m.skeleton, m.values, radius).reshape(m.n_frames, 4, 3, 3)
@@ -136,21 +144,21 @@ def test_beside_plain_sums(motion: Motion, radius: float) -> None:
         p, q = (positions_of(m.skeleton, m.values) for m in (motion, other))
         points = np.sqrt(((p - q) ** 2).sum(axis=2))
         known = np.isfinite(a).all(axis=(2, 3)) & np.isfinite(b).all(axis=(2, 3))
-    plain = same_figures(found.shell_mean_cm, found.shell_max_cm, shell, known)
+    plain = same_figures(comparison.shell_mean_cm, comparison.shell_max_cm, shell, known)
     first = 0
     for index, own in enumerate(points_of(motion.skeleton)):
-        joint = found.by_joint[index]
+        joint = comparison.by_joint[index]
         assert joint.points == len(own)
         same_figures(joint.shell_mean_cm, joint.shell_max_cm, shell[:, [index]], known[:, [index]])
         columns = slice(first, first + len(own))
         valid = np.isfinite(p[:, columns]).all(axis=2) & np.isfinite(q[:, columns]).all(axis=2)
         same_figures(joint.mean_position_error, joint.max_position_error, points[:, columns], valid)
         first += len(own)
-    if plain and found.shell_where is not None:
-        frame, name = found.shell_where
+    if plain and comparison.shell_where is not None:
+        frame, name = comparison.shell_where
         at = motion.skeleton.addresses().index(name)
-        assert shell[frame, at] == pytest.approx(found.shell_max_cm, rel=1e-9)
-        assert found.by_joint[at].shell_frame == frame
+        assert shell[frame, at] == pytest.approx(comparison.shell_max_cm, rel=1e-9)
+        assert comparison.by_joint[at].shell_frame == frame
 
 
 def same_figures(
@@ -172,14 +180,14 @@ def test_frames_of_several_rows() -> None:
     pairs = [
         replace(m, signals=(replace(m.signals[0], samples_per_frame=2),)) for m in (motion, other)
     ]
-    found = mcz.compare(*pairs)
-    assert found.shell_where == (2, "arm")
-    assert (found.by_joint[0].frame, found.by_joint[0].shell_frame) == (2, 2)
+    comparison = mcz.compare(*pairs)
+    assert comparison.shell_where == (2, "arm")
+    assert (comparison.by_joint[0].frame, comparison.by_joint[0].shell_frame) == (2, 2)
 
 
 def test_without_points_there_are_no_figures_by_joint() -> None:
-    found = mcz.compare(hinge([0.0], ""), hinge([1.0], ""))
-    assert (found.by_joint, found.shell_mean_cm, found.points) == ((), None, None)
+    comparison = mcz.compare(hinge([0.0], ""), hinge([1.0], ""))
+    assert (comparison.by_joint, comparison.shell_mean_cm, comparison.points) == ((), None, None)
 
 
 def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

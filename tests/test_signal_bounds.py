@@ -322,8 +322,8 @@ def test_a_restored_file_keeps_the_bound(processor: int, size: int, tmp_path: Pa
     with mcz.open(path) as file:
         clip = file.only_clip()
         assert not clip.gives_file()
-        held, restored = clip.motion(), c3d.read(clip.source_bytes(), "clip")
-    for found in (held, restored):
+        decoded, restored = clip.motion(), c3d.read(clip.source_bytes(), "clip")
+    for found in (decoded, restored):
         signals = {signal.role: signal for signal in (*motion.signals, *found.signals)}
         given = next(signal for signal in motion.signals if signal.role == "analog")
         errors = np.abs(given.values - signals["analog"].values)

@@ -81,8 +81,8 @@ def read(path: Path, **options: object) -> tuple[mcz.Motion, list[str]]:
 )
 def test_without_a_word(tmp_path: Path, amc: str, asfs: dict[str, str], note: str) -> None:
     """Skeletons are chosen by the take's name if bones and DOFs fit the file."""
-    motion, said = read(put_files(tmp_path, amc, **asfs))
-    assert said == []
+    motion, decoded = read(put_files(tmp_path, amc, **asfs))
+    assert decoded == []
     assert note in motion.metadata["skeleton-note"]
     assert motion.skeleton.n_joints == 2 and motion.skeleton.base is None
 
@@ -98,9 +98,9 @@ def test_without_a_word(tmp_path: Path, amc: str, asfs: dict[str, str], note: st
     ],
 )
 def test_with_a_line(tmp_path: Path, amc: str, asfs: dict[str, str], words: str) -> None:
-    motion, said = read(put_files(tmp_path, amc, **asfs))
-    assert len(said) == 1
-    assert words in said[0]
+    motion, decoded = read(put_files(tmp_path, amc, **asfs))
+    assert len(decoded) == 1
+    assert words in decoded[0]
     assert motion.skeleton.n_joints == 2
 
 
@@ -149,24 +149,24 @@ def test_bones_that_come_late(tmp_path: Path) -> None:
     path.write_bytes(AMC + b"3\nroot 0 0 0 0 0 0\nspine 1 2\nprop 7\n")
     with pytest.raises(SourceError, match=r"lacks prop; skeleton="):
         mcz.read(path)
-    motion, said = read(path, skeleton=tmp_path / "walk.asf")
-    assert "lacks prop; they are scalars without kinematics" in said[0]
+    motion, decoded = read(path, skeleton=tmp_path / "walk.asf")
+    assert "lacks prop; they are scalars without kinematics" in decoded[0]
     assert motion.skeleton.n_joints == 3
 
 
 def test_one_that_is_given(tmp_path: Path) -> None:
     path = put_files(tmp_path, "05_01", a="fits", b="dofs", c="foreign")
-    motion, said = read(path, skeleton=tmp_path / "a.asf")
-    assert (said, motion.metadata["skeleton-note"]) == ([], "ASF as given: a.asf")
+    motion, decoded = read(path, skeleton=tmp_path / "a.asf")
+    assert (decoded, motion.metadata["skeleton-note"]) == ([], "ASF as given: a.asf")
     again = read(path, skeleton=mcz.read_skeleton(tmp_path / "a.asf"))[0]
     assert (again.skeleton, again.metadata) == (motion.skeleton, motion.metadata)
-    motion, said = read(path, skeleton=tmp_path / "b.asf")
-    assert "the dofs of spine are not those of the file" in said[0]
+    motion, decoded = read(path, skeleton=tmp_path / "b.asf")
+    assert "the dofs of spine are not those of the file" in decoded[0]
     assert motion.metadata["skeleton-note"].startswith("ASF as given: b.asf; the channels of")
     with pytest.raises(SourceError, match=r"c\.asf has none of its bones: spine"):
         mcz.read(path, skeleton=tmp_path / "c.asf")
-    motion, said = read(path, skeleton="none")
-    assert said == []
+    motion, decoded = read(path, skeleton="none")
+    assert decoded == []
     assert motion.metadata["skeleton-note"].startswith("no ASF")
 
 
@@ -176,8 +176,8 @@ def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
         (tmp_path / "caf\udce9.asf").write_bytes(FITS)
     except (OSError, UnicodeError):
         pytest.skip("this file system has no such names")
-    motion, said = read(path)
-    assert len(said) == 1
+    motion, decoded = read(path)
+    assert len(decoded) == 1
     assert "caf\\udce9.asf" in motion.metadata["skeleton-note"]
     report = mcz.pack(tmp_path, tmp_path / "a.mcz")
     assert report.count("parsed") == 1

@@ -27,13 +27,13 @@ def walk() -> tuple[mcz.Motion, np.ndarray]:
 
 def test_without_any_error_nothing_slides() -> None:
     motion, _ = walk()
-    found = mcz.compare(motion, motion, contacts=True)
-    assert found.sliding is not None
-    sliding = found.sliding
+    comparison = mcz.compare(motion, motion, contacts=True)
+    assert comparison.sliding is not None
+    sliding = comparison.sliding
     assert sliding.contacts == mcz.contacts(motion)
     assert (sliding.mean_mm, sliding.max_mm) == (0, 0)
     assert sliding.path_mm == sliding.path_original_mm
-    entries = found.entries()
+    entries = comparison.entries()
     assert (entries["contacts"], entries["slide_max_mm"]) == (3, 0)
     assert entries["contact_frames"] == sum(slide.n_frames for slide in sliding.slides)
     assert mcz.compare(motion, motion).sliding is None
@@ -45,23 +45,25 @@ def test_a_slide_by_hand() -> None:
     still = np.zeros((61, 1, 3))
     moved = still + np.array([5.0, 0, 0])
     moved[:, 0, 2] += np.arange(61) * 0.01
-    found = mcz.compare(markers("lfoot", still), markers("lfoot", moved), contacts=True).sliding
-    (slide,) = found.slides
+    comparison = mcz.compare(
+        markers("lfoot", still), markers("lfoot", moved), contacts=True
+    ).sliding
+    (slide,) = comparison.slides
     assert (slide.joint, slide.first, slide.n_frames) == ("lfoot", 0, 61)
-    assert slide.mean_mm == found.mean_mm == pytest.approx(0.1 * 61 / 2)
-    assert slide.max_mm == found.max_mm == pytest.approx(6.0)
+    assert slide.mean_mm == comparison.mean_mm == pytest.approx(0.1 * 61 / 2)
+    assert slide.max_mm == comparison.max_mm == pytest.approx(6.0)
     assert (slide.path_mm, slide.path_original_mm) == (pytest.approx(6.0), 0)
-    assert found.where == (60, "lfoot")
-    assert found.entries()["slide_max_frame"] == 60
+    assert comparison.where == (60, "lfoot")
+    assert comparison.entries()["slide_max_frame"] == 60
 
 
 @given(SHIFTS, st.sampled_from([0.125, 1.0, 2.5]))
 def test_a_shift_of_all_is_no_sliding(shift: list[int], unit: float) -> None:
     motion, places = walk()
     other = markers("lfoot body", (places + shift) / unit, unit_cm=unit)
-    found = mcz.compare(motion, other, contacts=True).sliding
-    assert found.max_mm == pytest.approx(0, abs=1e-8)
-    assert found.path_mm == pytest.approx(found.path_original_mm, abs=1e-7)
+    comparison = mcz.compare(motion, other, contacts=True).sliding
+    assert comparison.max_mm == pytest.approx(0, abs=1e-8)
+    assert comparison.path_mm == pytest.approx(comparison.path_original_mm, abs=1e-7)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -69,7 +71,7 @@ def test_beside_plain_sums(seed: int) -> None:
     motion, places = walk()
     noise = np.random.default_rng(seed).normal(0, 0.2, places.shape)
     other = markers("lfoot body", places + noise)
-    found = mcz.compare(motion, other, contacts=True).sliding
+    comparison = mcz.compare(motion, other, contacts=True).sliding
     errors, path, meant = [], 0.0, 0.0
     for run in mcz.contacts(motion).runs:
         p = places[run.first : run.first + run.n_frames, 0] * 10
@@ -77,10 +79,10 @@ def test_beside_plain_sums(seed: int) -> None:
         errors += [np.linalg.norm((y - q[0]) - (x - p[0])) for x, y in zip(p, q, strict=True)][1:]
         path += sum(np.linalg.norm(y - x) for x, y in zip(q, q[1:], strict=False))
         meant += sum(np.linalg.norm(y - x) for x, y in zip(p, p[1:], strict=False))
-    assert found.mean_mm == pytest.approx(np.mean(errors))
-    assert found.max_mm == pytest.approx(max(errors))
-    assert found.path_mm == pytest.approx(path)
-    assert found.path_original_mm == pytest.approx(meant)
+    assert comparison.mean_mm == pytest.approx(np.mean(errors))
+    assert comparison.max_mm == pytest.approx(max(errors))
+    assert comparison.path_mm == pytest.approx(path)
+    assert comparison.path_original_mm == pytest.approx(meant)
 
 
 def test_contacts_that_are_given() -> None:
@@ -90,11 +92,11 @@ def test_contacts_that_are_given() -> None:
     other = markers("lfoot body", moved)
     runs = (mcz.Contact("body", 65, 10), mcz.Contact("body", 100, 1))
     given_ = mcz.Contacts(runs, ("body",), 300)
-    found = mcz.compare(motion, other, contacts=given_).sliding
-    assert found.contacts is given_
-    assert [slide.n_frames for slide in found.slides] == [10, 1]
-    assert found.slides[0].max_mm == pytest.approx(10 * np.sqrt(3))
-    alone = found.slides[1]  # one frame leaves nothing to measure
+    comparison = mcz.compare(motion, other, contacts=given_).sliding
+    assert comparison.contacts is given_
+    assert [slide.n_frames for slide in comparison.slides] == [10, 1]
+    assert comparison.slides[0].max_mm == pytest.approx(10 * np.sqrt(3))
+    alone = comparison.slides[1]  # one frame leaves nothing to measure
     assert (alone.mean_mm, alone.max_mm, alone.path_mm) == (None, None, None)
     named = mcz.compare(motion, other, contacts=["body"]).sliding
     assert named.contacts == mcz.contacts(motion, ["body"])
@@ -111,33 +113,42 @@ def test_what_is_unknown_does_not_count() -> None:
     moved = np.zeros((60, 1, 3))
     moved[30:, 0, 0] = 0.5
     moved[29:32] = np.nan
-    found = mcz.compare(still, markers("lfoot", moved), contacts=True).sliding
-    assert found.mean_mm == pytest.approx(5 * 28 / 56)
-    assert found.path_mm == 0  # the jump is between places of which one is unknown
+    comparison = mcz.compare(still, markers("lfoot", moved), contacts=True).sliding
+    assert comparison.mean_mm == pytest.approx(5 * 28 / 56)
+    assert comparison.path_mm == 0  # the jump is between places of which one is unknown
     moved[0] = np.nan
-    found = mcz.compare(still, markers("lfoot", moved), contacts=True).sliding
-    assert (found.mean_mm, found.max_mm, found.where, found.path_mm) == (None, None, None, 0)
+    comparison = mcz.compare(still, markers("lfoot", moved), contacts=True).sliding
+    assert (comparison.mean_mm, comparison.max_mm, comparison.where, comparison.path_mm) == (
+        None,
+        None,
+        None,
+        0,
+    )
     nothing = markers("lfoot", np.full((60, 1, 3), np.nan))
-    found = mcz.compare(still, nothing, contacts=True).sliding
-    assert (found.path_mm, found.path_original_mm, len(found.slides)) == (None, None, 1)
+    comparison = mcz.compare(still, nothing, contacts=True).sliding
+    assert (comparison.path_mm, comparison.path_original_mm, len(comparison.slides)) == (
+        None,
+        None,
+        1,
+    )
 
 
 def test_without_feet_or_unit_there_are_no_contacts() -> None:
     hand = markers("hand", np.zeros((60, 1, 3)))
-    found = mcz.compare(hand, hand, contacts=True)
-    assert found.sliding is None
-    assert any("no joint is a foot by its name" in note for note in found.notes)
+    comparison = mcz.compare(hand, hand, contacts=True)
+    assert comparison.sliding is None
+    assert any("no joint is a foot by its name" in note for note in comparison.notes)
     unknown = markers("lfoot", np.zeros((60, 1, 3)), unit_cm=None)
-    found = mcz.compare(unknown, unknown, contacts=True)
-    assert found.sliding is None
-    assert any("length unit" in note for note in found.notes)
+    comparison = mcz.compare(unknown, unknown, contacts=True)
+    assert comparison.sliding is None
+    assert any("length unit" in note for note in comparison.notes)
 
 
 def test_rate_and_up_of_the_other_side() -> None:
     motion, places = walk()
     silent = markers("lfoot body", places, up_axis="", frame_rate=None)
-    found = mcz.compare(silent, motion, contacts=True).sliding
-    assert not (found.contacts.up_guessed or found.contacts.rate_assumed)
+    comparison = mcz.compare(silent, motion, contacts=True).sliding
+    assert not (comparison.contacts.up_guessed or comparison.contacts.rate_assumed)
     slow = replace(motion, frame_rate=Fraction(30))
     assert mcz.compare(silent, slow, contacts=True).sliding.contacts.frame_rate == 30
     alone = mcz.compare(silent, silent, contacts=True).sliding.contacts
@@ -150,8 +161,8 @@ def test_of_frames_of_several_rows_the_first_counts() -> None:
     wrong = doubled.copy()
     wrong[1::2] += 3
     pair = [replace(motion, signals=(Signal(v, samples_per_frame=2),)) for v in (doubled, wrong)]
-    found = mcz.compare(*pair, contacts=True)
-    assert found.sliding.max_mm == 0 and found.max_position_error > 5
+    comparison = mcz.compare(*pair, contacts=True)
+    assert comparison.sliding.max_mm == 0 and comparison.max_position_error > 5
 
 
 def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -193,8 +193,8 @@ def test_export(archive: Path, tmp_path: Path, to: str) -> None:
     if to in ("bvh", "amc"):
         with mcz.open(archive) as file:
             motion = mcz.convert(file["walk"].motion(), to, 120)
-        found = mcz.positions(mcz.read(tmp_path / f"walk.{to}"))
-        np.testing.assert_allclose(found, mcz.positions(motion), atol=1e-4)
+        decoded = mcz.positions(mcz.read(tmp_path / f"walk.{to}"))
+        np.testing.assert_allclose(decoded, mcz.positions(motion), atol=1e-4)
 
 
 def test_the_command(archive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -360,9 +360,9 @@ def test_train_refuses(
 ) -> None:
     monkeypatch.chdir(samples)
     assert run("train", *arguments, "-o", tmp_path / "out") == code
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert all(word in said for word in words), said
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert all(word in errors for word in words), errors
     assert not (tmp_path / "out").exists()
 
 

@@ -82,8 +82,8 @@ def test_no_command_writes_values_that_are_not_those_hashed(
 
 
 def test_a_repaired_file_has_no_clip_of_other_values(wrong: Path, tmp_path: Path) -> None:
-    found = mcz.repair(wrong, tmp_path / "repaired.mcz")
-    assert found.clips == [] and "value hash" in " ".join(found.lost)
+    report = mcz.repair(wrong, tmp_path / "repaired.mcz")
+    assert report.clips == [] and "value hash" in " ".join(report.lost)
     assert mcz.verify(tmp_path / "repaired.mcz") == []
 
 

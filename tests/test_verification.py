@@ -93,8 +93,8 @@ def test_all_faults_are_named(archive_path: Path) -> None:
         cends = [clip.cend for clip in file.container.directory.clips.values()]
     data[rows[0].offset + 9] ^= 1  # a header, behind which the walk finds its way again
     data[cends[1].payload_offset] ^= 1  # a payload
-    found = mcz.verify(bytes(data), quick=True)
-    assert [(problem.offset, problem.heading) for problem in found] == [
+    problems = mcz.verify(bytes(data), quick=True)
+    assert [(problem.offset, problem.heading) for problem in problems] == [
         (rows[0].offset, "CLIP"),
         (cends[1].offset, "CEND"),
     ]
@@ -109,9 +109,9 @@ def test_damaged_packets_are_named() -> None:
     bad = bytearray(data)
     for row in (rows[1], rows[-1]):
         bad[row.offset] ^= 1
-    found = mcz.verify(bytes(bad), quick=True)
-    assert len(found) == 2
-    assert all("crc of packet" in problem.message for problem in found)
+    problems = mcz.verify(bytes(bad), quick=True)
+    assert len(problems) == 2
+    assert all("crc of packet" in problem.message for problem in problems)
 
 
 def test_an_index_of_another_file_is_found(archive_path: Path) -> None:

@@ -119,9 +119,9 @@ def test_what_turns_alike_is_no_error(form: str) -> None:
             size = np.sqrt((own**2).sum(axis=1, keepdims=True))
             values[::3, columns] = own * (1 - 2 * np.pi / np.where(size == 0, np.inf, size))
     other = Motion(skeleton, (Signal(values),), motion.frame_rate)
-    found = mcz.compare(motion, other)
-    assert found.mse is not None and found.mse < 1e-28 and found.mse_raw > 0.1
-    assert found.max_position_error is not None and found.max_position_error < 1e-12
+    comparison = mcz.compare(motion, other)
+    assert comparison.mse is not None and comparison.mse < 1e-28 and comparison.mse_raw > 0.1
+    assert comparison.max_position_error is not None and comparison.max_position_error < 1e-12
     off = Motion(skeleton, (Signal(values + 1e-3),), motion.frame_rate)
     assert mcz.compare(other, off).mse == pytest.approx(1e-6, rel=1e-6)
 
@@ -145,9 +145,9 @@ def test_angles_of_bvh_and_amc(form: str, tmp_path: Path) -> None:
 
     motion = turned_by(acclaim_walk(), form)
     for to in ("bvh", "amc"):
-        found = joint_errors(motion, mcz.convert(motion, to))
-        assert found.greatest is not None and found.greatest < 1e-9 * 18
-        assert len(found.joints) >= motion.skeleton.n_joints - (to == "amc")
+        converted = joint_errors(motion, mcz.convert(motion, to))
+        assert converted.greatest is not None and converted.greatest < 1e-9 * 18
+        assert len(converted.joints) >= motion.skeleton.n_joints - (to == "amc")
     path = tmp_path / "walk.bvh"
     path.write_bytes(converted_files(motion, "bvh")["bvh"])
     other = pybvh.read_bvh_file(path, world_up="+y", warn_on_world_up_disagreement=False)

@@ -40,9 +40,9 @@ def test_windows_are_those_of_the_whole(codec: str, data: st.DataObject) -> None
             a = data.draw(st.integers(0, LENGTH))
             b = data.draw(st.integers(a, LENGTH))
             name = data.draw(st.sampled_from([None, *joints]))
-            found = clip.read((a, b), None if name is None else [name])
-            np.testing.assert_array_equal(found, whole[name][a:b])
-            found[:] = np.nan  # a caller's own
+            decoded = clip.read((a, b), None if name is None else [name])
+            np.testing.assert_array_equal(decoded, whole[name][a:b])
+            decoded[:] = np.nan  # a caller's own
 
 
 def test_a_file_keeps_no_more_than_it_says() -> None:
@@ -80,8 +80,8 @@ def test_damage_later_in_a_run_leaves_what_is_before(name: str) -> None:
     with mcz.open(bytes(data)) as file:
         clip = file.clips["common"]
         for _ in range(2):
-            found = clip.read((first.first, first.stop))
-            np.testing.assert_array_equal(found, whole[first.first : first.stop])
+            decoded = clip.read((first.first, first.stop))
+            np.testing.assert_array_equal(decoded, whole[first.first : first.stop])
             with pytest.raises(ChecksumError):
                 clip.read((last.header.first, last.header.stop))
 

@@ -36,7 +36,7 @@ GROUPS = {"valid": valid.MODULES, "uncommon": uncommon.MODULES, "invalid": ()}
 
 def vectors() -> list[Vector]:
     """Every vector, by group and name."""
-    found = []
+    collected = []
     for group, modules in GROUPS.items():
         made = [vector for module in modules for vector in module.vectors()]
         MADE.update({vector.name: vector.data for vector in made if group == "valid"})
@@ -45,10 +45,10 @@ def vectors() -> list[Vector]:
             made.append(row.vector())
             if group == "valid":
                 MADE[row.name] = made[-1].data
-        found += sorted(made, key=lambda vector: vector.name)
-    names = [vector.name for vector in found]
+        collected += sorted(made, key=lambda vector: vector.name)
+    names = [vector.name for vector in collected]
     assert len(names) == len(set(names)), sorted(n for n in names if names.count(n) > 1)
-    return found
+    return collected
 
 
 def _rests_on_another(row: Row) -> bool:

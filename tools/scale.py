@@ -36,11 +36,11 @@ def measure(what: str, command: list[str], times: int = 1) -> None:
         start = time.perf_counter()
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
             assert run.stderr is not None
-            said = run.stderr.read()
+            decoded = run.stderr.read()
             _, status, used = os.wait4(run.pid, 0)
             run.returncode = os.waitstatus_to_exitcode(status)
         if run.returncode:
-            raise SystemExit(f"{what}: exit code {run.returncode}: {said.decode()[-500:]}")
+            raise SystemExit(f"{what}: exit code {run.returncode}: {decoded.decode()[-500:]}")
         row = time.perf_counter() - start, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
         best = row if best is None else min(best, row)
     assert best is not None
@@ -128,8 +128,8 @@ def remote(address: str) -> None:
         at = row(f"100 frames of one clip of {stored:,} bytes", file, at)
         file.find("n_frames > 300 and duration > 3")
         at = row("find, by frames and duration", file, at)
-        found = file.find("subject == '003'")
-        row(f"find, by subject: {len(found)} clips", file, at)
+        names = file.find("subject == '003'")
+        row(f"find, by subject: {len(names)} clips", file, at)
 
 
 def main() -> None:

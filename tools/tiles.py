@@ -75,9 +75,9 @@ def recordings(folder: Path) -> Iterator[tuple[Path, int, Tile]]:
     """Files below a folder that can be tiled, sorted by name."""
     for path in sorted(folder.rglob("*")):
         reader = READERS.get(path.suffix.lower())
-        found = reader(path.read_bytes()) if reader is not None else None
-        if found is not None:
-            yield path, *found
+        data = reader(path.read_bytes()) if reader is not None else None
+        if data is not None:
+            yield path, *data
 
 
 def write(folder: Path, target: Path, clips: int, frames: int, seed: int) -> int:

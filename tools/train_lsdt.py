@@ -53,10 +53,10 @@ def main(out: str, *given: str) -> None:
     as_bvh = out == "--bvh"
     if as_bvh:
         out, *clips = clips
-    found = training_set(_convert_to_bvh(clip) if as_bvh else mcz.read(clip) for clip in clips)
+    decoded = training_set(_convert_to_bvh(clip) if as_bvh else mcz.read(clip) for clip in clips)
     tries = []
     for start, growth in TRIES:
-        tries.append(replace(SHIPPED, start=start, growth=growth).learn(found))
+        tries.append(replace(SHIPPED, start=start, growth=growth).learn(decoded))
         print(f"from {start}, growth {growth}", *lines(tries[-1]), sep="\n  ", file=sys.stderr)
     trained = reduce(Trained.better, tries)
     Path(out).write_bytes(trained.data)

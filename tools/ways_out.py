@@ -104,8 +104,8 @@ def ways_of(source: Path, folder: Path) -> Iterator[tuple[str, bool]]:
         own.mkdir()
         command, output = way(source, archive, own)
         code, printed = run_command(*command, "--json", "--max-decoded", "2G")
-        found = json.loads(printed) if code == 0 else {}
-        results = {row["result"] for row in found.get("outputs", found.get("files", ()))}
+        document = json.loads(printed) if code == 0 else {}
+        results = {row["result"] for row in document.get("outputs", document.get("files", ()))}
         is_same = code == 0 and output.read_bytes() == data
         yield name, is_same and results == {"restored"}
 

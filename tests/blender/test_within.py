@@ -59,9 +59,9 @@ def run_script(python: str, package: Path, script: Path, *words: Any, **more: st
 def check(python: str, package: Path, *words: Any) -> dict[str, Any]:
     script = ROOT / "tools/blender/check_addon.py"
     out = run_script(python, package, script, *words, "--addon", package / "addons")
-    found: dict[str, Any] = json.loads(out.splitlines()[-1])
-    assert found["distance"] < NEAR and found["compared"] > 20, found
-    return found
+    document: dict[str, Any] = json.loads(out.splitlines()[-1])
+    assert document["distance"] < NEAR and document["compared"] > 20, document
+    return document
 
 
 def options(**given: Any) -> list[str]:

@@ -21,9 +21,9 @@ def fault(vector: dict[str, Any]) -> str | None:
     for request in run.requests(vector, conformance.OPTIONS):
         code, output = answer(request.path.read_bytes(), request.arguments)
         answered = code in (0, 1, 3)
-        said = run.judge(request, code, output) if answered else None
-        if not answered or said:
-            what = f": {said}" if answered else f"{CRASH}{output.decode()}"
+        first = run.judge(request, code, output) if answered else None
+        if not answered or first:
+            what = f": {first}" if answered else f"{CRASH}{output.decode()}"
             return f"{' '.join(request.arguments)}{what}"
     return None
 
@@ -53,13 +53,13 @@ def vectors() -> dict[str, dict[str, Any]]:
 @cache
 def of_rules() -> dict[str, list[str]]:
     """The vectors that the manifest names for each rule, to be refused and small ones first."""
-    found: dict[str, list[str]] = {}
+    vectors_by_rule: dict[str, list[str]] = {}
     for name, row in vectors().items():
         for rule in row["requirements"]:
-            found.setdefault(rule, []).append(name)
-    for names in found.values():
+            vectors_by_rule.setdefault(rule, []).append(name)
+    for names in vectors_by_rule.values():
         names.sort(key=lambda name: (not name.startswith("invalid/"), _size(name)))
-    return found
+    return vectors_by_rule
 
 
 def _size(name: str) -> int:

@@ -25,7 +25,7 @@ class Break:
 
 def parse_breaks(text: str) -> dict[str, list[Break]]:
     """The breaks of each rule, from the blocks of by_hand.txt behind the words at its head."""
-    found: dict[str, list[Break]] = {}
+    breaks: dict[str, list[Break]] = {}
     for block in text.strip().split("\n\n")[2:]:
         head, *lines = block.splitlines()
         rule, _, variant = head.partition(" ")
@@ -37,8 +37,8 @@ def parse_breaks(text: str) -> dict[str, list[Break]]:
             before = line[0]
             patches[-1][before == "+"].append(line[2:])
         texts = (("\n".join(old), "\n".join(new)) for old, new in patches)
-        found.setdefault(rule, []).append(Break(variant, tuple(texts)))
-    return found
+        breaks.setdefault(rule, []).append(Break(variant, tuple(texts)))
+    return breaks
 
 
 BREAKS = parse_breaks(Path(__file__).with_suffix(".txt").read_text("utf-8"))

@@ -218,7 +218,7 @@ def word(node: ast.AST) -> Changed:
 @cache
 def words(function: str) -> dict[int, dict[str, None]]:
     """The words that functions of this name are given anywhere, by the number of the argument."""
-    found: dict[int, dict[str, None]] = {}
+    words_by_line: dict[int, dict[str, None]] = {}
     for module in modules():
         if function not in source(module):
             continue
@@ -226,8 +226,8 @@ def words(function: str) -> dict[int, dict[str, None]]:
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
                 for i, arg in enumerate(node.args if _name(node.func) == function else ()):
                     if isinstance(arg, ast.Constant) and isinstance(arg.value, str):
-                        found.setdefault(i, {})[arg.value] = None
-    return found
+                        words_by_line.setdefault(i, {})[arg.value] = None
+    return words_by_line
 
 
 def lenient(node: ast.AST) -> Changed:

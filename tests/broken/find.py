@@ -87,8 +87,8 @@ def vectors_of(rule: str, known: Iterable[Catch] = ()) -> list[str]:
     They are those that are said to (requirements.txt), or all that the manifest names.
     """
     named = answers.of_rules()[rule]
-    said = requirements.read_catches().get(rule) or named[:MOST]
-    return list(dict.fromkeys([*(c.vector for c in known if c.vector in named), *said]))
+    noticing = requirements.read_catches().get(rule) or named[:MOST]
+    return list(dict.fromkeys([*(c.vector for c in known if c.vector in named), *noticing]))
 
 
 def search(nursery: Nursery, rule: str, known: Sequence[Catch] = ()) -> list[Catch]:
@@ -97,24 +97,24 @@ def search(nursery: Nursery, rule: str, known: Sequence[Catch] = ()) -> list[Cat
     weak = [name for name in names if any(f".{operator}." in name for operator in WEAK)]
     strong = [name for name in names if name not in weak]
     first = [catch.variant for catch in known if catch.variant in names]
-    said = vectors_of(rule, known)
-    more = [name for name in answers.of_rules()[rule][:MOST] if name not in said]
+    candidates = vectors_of(rule, known)
+    more = [name for name in answers.of_rules()[rule][:MOST] if name not in candidates]
     for tried, most, vectors, seconds in (
-        ([*first, *strong], FEW, said, SHORT),
-        (strong, len(names), said, SHORT),
-        (weak, len(names), said, SHORT),
+        ([*first, *strong], FEW, candidates, SHORT),
+        (strong, len(names), candidates, SHORT),
+        (weak, len(names), candidates, SHORT),
         ([*first, *names], len(names), more, SHORT),
-        ([*first, *strong], FEW, said, LONG),
+        ([*first, *strong], FEW, candidates, LONG),
     ):
-        found = []
+        catches = []
         for place in dict.fromkeys(map(variants.place_of, names)):
-            if place == variants.ALL and found:
+            if place == variants.ALL and catches:
                 break
             own = list(dict.fromkeys(n for n in tried if variants.place_of(n) == place))
             catch = nursery.catch(rule, own[:most], vectors, seconds) if vectors else None
-            found += [catch] if catch else []
-        if found:
-            return found
+            catches += [catch] if catch else []
+        if catches:
+            return catches
     return []
 
 

@@ -63,11 +63,11 @@ def forget_known_answers() -> None:
 
 def live() -> Live:
     """All functions of mcz that are there, by their code."""
-    found: Live = {}
+    functions: Live = {}
     for thing in gc.get_objects():
         if isinstance(thing, FunctionType) and thing.__module__ in modules():
-            found.setdefault(thing.__code__, []).append(thing)
-    return found
+            functions.setdefault(thing.__code__, []).append(thing)
+    return functions
 
 
 def swap(codes: Mapping[str, CodeType], functions: Live) -> bool:
@@ -93,7 +93,7 @@ def _pairs(old: CodeType, new: CodeType) -> list[tuple[CodeType, CodeType]] | No
     """(before, after) of each function that has changed; None if what runs on import has."""
     if _own(old) != _own(new):
         return None
-    found = []
+    pairs = []
     for a, b in zip(_inner(old), _inner(new), strict=True):
         if a == b:
             continue
@@ -101,23 +101,23 @@ def _pairs(old: CodeType, new: CodeType) -> list[tuple[CodeType, CodeType]] | No
             inner = _pairs(a, b)
             if inner is None:
                 return None
-            found += inner
+            pairs += inner
         elif a.co_name.startswith("<") and a.co_name != "<lambda>":  # a loop that runs on import
             return None
         else:
-            found += _below(a, b)
-    return found
+            pairs += _below(a, b)
+    return pairs
 
 
 def _below(old: CodeType, new: CodeType) -> list[tuple[CodeType, CodeType]]:
     """A function and, as far as they are the same in number, those within it."""
-    found = [(old, new)]
+    pairs = [(old, new)]
     inner = _inner(old), _inner(new)
     if len(inner[0]) == len(inner[1]):
         for a, b in zip(*inner, strict=True):
             if a != b:
-                found += _below(a, b)
-    return found
+                pairs += _below(a, b)
+    return pairs
 
 
 def _inner(code: CodeType) -> list[CodeType]:

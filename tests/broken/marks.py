@@ -39,9 +39,9 @@ class Slot:
 
     @property
     def node(self) -> ast.AST:
-        held = getattr(self.holder, self.field)
-        found: ast.AST = held if self.index is None else held[self.index]
-        return found
+        value = getattr(self.holder, self.field)
+        child: ast.AST = value if self.index is None else value[self.index]
+        return child
 
     def put(self, node: ast.AST) -> None:
         if self.index is None:
@@ -78,8 +78,8 @@ def marks(text: str) -> Iterator[tuple[int, tuple[str, ...]]]:
     waiting: list[str] = []
     code = 0  # the last line with code
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type == tokenize.COMMENT and (found := MARK.fullmatch(token.string)):
-            ids = (found[1] or found[2]).split(", ")
+        if token.type == tokenize.COMMENT and (match := MARK.fullmatch(token.string)):
+            ids = (match[1] or match[2]).split(", ")
             if token.start[0] == code:
                 yield code, tuple(ids)
             else:
@@ -94,12 +94,12 @@ def marks(text: str) -> Iterator[tuple[int, tuple[str, ...]]]:
 @cache
 def places() -> dict[str, tuple[Place, ...]]:
     """The marked places of each rule, in the order of modules and lines."""
-    found: dict[str, set[Place]] = {}
+    places_by_rule: dict[str, set[Place]] = {}
     for module in modules():
         for line, ids in marks(source(module)):
             for id_ in ids:
-                found.setdefault(id_, set()).add(Place(module, line))
-    return {id_: tuple(sorted(set_)) for id_, set_ in sorted(found.items())}
+                places_by_rule.setdefault(id_, set()).add(Place(module, line))
+    return {id_: tuple(sorted(set_)) for id_, set_ in sorted(places_by_rule.items())}
 
 
 def places_in(rule: str, texts: Mapping[str, str]) -> list[Place]:
@@ -110,11 +110,11 @@ def places_in(rule: str, texts: Mapping[str, str]) -> list[Place]:
 
 def slots(node: ast.AST) -> Iterator[Slot]:
     """The slots of the children of ``node``."""
-    for field, held in ast.iter_fields(node):
-        if isinstance(held, ast.AST):
+    for field, value in ast.iter_fields(node):
+        if isinstance(value, ast.AST):
             yield Slot(node, field, None)
-        elif isinstance(held, list):
-            yield from (Slot(node, field, i) for i, h in enumerate(held) if isinstance(h, ast.AST))
+        elif isinstance(value, list):
+            yield from (Slot(node, field, i) for i, h in enumerate(value) if isinstance(h, ast.AST))
 
 
 def targets(tree: ast.Module, line: int) -> list[Slot]:
@@ -122,9 +122,9 @@ def targets(tree: ast.Module, line: int) -> list[Slot]:
 
     If none begins there, it is the smallest expression that contains the line.
     """
-    found = list(_slots_at(tree, line))
-    statements = [slot for slot in found if isinstance(slot.node, ast.stmt)]
-    return statements or found or [_smallest(tree, line)]
+    slots_here = list(_slots_at(tree, line))
+    statements = [slot for slot in slots_here if isinstance(slot.node, ast.stmt)]
+    return statements or slots_here or [_smallest(tree, line)]
 
 
 def _slots_at(node: ast.AST, line: int) -> Iterator[Slot]:
@@ -136,15 +136,15 @@ def _slots_at(node: ast.AST, line: int) -> Iterator[Slot]:
 
 
 def _smallest(tree: ast.Module, line: int) -> Slot:
-    found: Slot | None = None
+    smallest: Slot | None = None
     node: ast.AST = tree
     while True:
         inner = [s for s in slots(node) if _spans(s.node, line)]
         if not inner:
-            assert found is not None, f"a mark of nothing at line {line}"
-            return found
-        found = inner[-1]
-        node = found.node
+            assert smallest is not None, f"a mark of nothing at line {line}"
+            return smallest
+        smallest = inner[-1]
+        node = smallest.node
 
 
 def _spans(node: ast.AST, line: int) -> bool:

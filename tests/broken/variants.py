@@ -32,7 +32,7 @@ def names(rule: str) -> list[str]:
     """The variants of ``rule``: by hand, or by operator, those of all its places last."""
     if rule in by_hand.BREAKS:
         return [f"{HAND}.{number + 1}" for number in range(len(by_hand.BREAKS[rule]))]
-    found: list[str] = []
+    variants: list[str] = []
     checks: list[list[str]] = []
     there = places().get(rule, ())
     for number, place in enumerate(there, 1):
@@ -40,12 +40,12 @@ def names(rule: str) -> list[str]:
         counts = Counter(name for name, _, _ in changes(targets(tree, place.line)))
         own = [f"{number}.{name}.{i + 1}" for name in counts for i in range(counts[name])]
         checks.append([name for name in own if _operator(name) in CHECKS])
-        found += own
-    found.sort(key=lambda name: list(OPERATORS).index(_operator(name)))
+        variants += own
+    variants.sort(key=lambda name: list(OPERATORS).index(_operator(name)))
     if len(there) < 2 or not all(checks):
-        return found
+        return variants
     each = max(1, int(MOST ** (1 / len(there))))
-    return found + ["+".join(row) for row in product(*(own[:each] for own in checks))]
+    return variants + ["+".join(row) for row in product(*(own[:each] for own in checks))]
 
 
 def place_of(name: str) -> str:

@@ -248,8 +248,8 @@ def test_diff_names_what_is_beside_the_numbers(folder: Path, call: Call) -> None
     ]
     assert shown[2].startswith("groups of parameters: ") and "EVENT" in shown[2]
     code, text, _ = call("diff", gait, plain, "--json")
-    found = {each["what"]: each for each in json.loads(text)["clips"][0]["differences"]}
-    assert found["events"] == {
+    document = {each["what"]: each for each in json.loads(text)["clips"][0]["differences"]}
+    assert document["events"] == {
         "what": "events",
         "a": 1,
         "b": 0,
@@ -257,7 +257,7 @@ def test_diff_names_what_is_beside_the_numbers(folder: Path, call: Call) -> None
         "only_in_b": [],
         "changed": [],
     }
-    assert "EVENT" in found["groups of parameters"]["only_in_a"]
+    assert "EVENT" in document["groups of parameters"]["only_in_a"]
     code, text, _ = call("diff", plain, gait)
     assert lines_in(text)[0].endswith("only in B: Left Foot Strike at 0.25 s")
 

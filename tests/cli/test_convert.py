@@ -74,9 +74,9 @@ def test_columns_and_signals_that_are_lost_are_said(tmp_path: Path, call: Call, 
             continue  # the same format: restored
         code, out, err = call(*words)
         assert code == 0 and "converted" in out
-        told = json.loads(call(*words, "--json")[1])["left_out"]["a"]
+        document = json.loads(call(*words, "--json")[1])["left_out"]["a"]
         for lost in ("left out: signal Devices", "left out: columns of text: A:A.State"):
-            assert err.count(lost) == 1 and any(line.startswith(lost) for line in told)
+            assert err.count(lost) == 1 and any(line.startswith(lost) for line in document)
 
 
 def test_a_plain_c3d_names_the_groups_that_it_has_not(folder: Path, call: Call) -> None:

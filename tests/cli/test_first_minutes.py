@@ -152,8 +152,8 @@ def test_quality_is_the_greatest_error(quality: str, most: float, folder: Path, 
     whole = mcz.read("walk.bvh", unit="cm")
     with mcz.open("q.mcz") as file:
         assert file.clips["walk"].codec == "posewave"
-        found = mcz.compare(whole, file.clips["walk"].motion()).entries()
-    assert most / 3 < float(found["max_position_error_cm"]) <= most
+        decoded = mcz.compare(whole, file.clips["walk"].motion()).entries()
+    assert most / 3 < float(decoded["max_position_error_cm"]) <= most
 
 
 def test_quality_is_said_once_and_of_a_length(folder: Path, call: Call) -> None:

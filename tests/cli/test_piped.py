@@ -264,8 +264,8 @@ def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
     assert report.remarks == ()
     with mcz.open(out.getvalue()) as file:
         assert file.clips["live"].frame_numbers.tolist() == [1, 2, 4]
-        found = file.clips["live"].read()
-        np.testing.assert_array_equal(np.isnan(found), np.isnan(whole.values))
+        decoded = file.clips["live"].read()
+        np.testing.assert_array_equal(np.isnan(decoded), np.isnan(whole.values))
         assert file.skeleton_bytes(file.clips["live"].skeleton_id) == ASF
 
 
@@ -302,8 +302,8 @@ def test_real_clips_live(data: Path) -> None:
     encoding = EncodingOptions("lsdt-frame", {"step": 0.05})
     encode_live(lines(text), out, "amc", SourceOptions(skeleton=asf), encoding)
     with mcz.open(out.getvalue()) as file:
-        found = file.clips["live"].read().reshape(motion.n_frames, -1, 3)
-    distances = np.sqrt(((found - mcz.positions(motion)) ** 2).sum(axis=2))
+        decoded = file.clips["live"].read().reshape(motion.n_frames, -1, 3)
+    distances = np.sqrt(((decoded - mcz.positions(motion)) ** 2).sum(axis=2))
     assert distances.mean() < 0.05
     for path in (bvh,) if bvh.exists() else ():
         np.testing.assert_array_equal(parse_rows("bvh", path.read_bytes()), mcz.read(path).values)

@@ -33,8 +33,8 @@ def places(samples: Path, tmp_path: Path) -> Path:
 
 
 def read_motion(file: Path) -> Motion:
-    with mcz.open(file) as held:
-        return next(iter(held.clips.values())).motion()
+    with mcz.open(file) as reader:
+        return next(iter(reader.clips.values())).motion()
 
 
 def test_tables(markers: Path, tmp_path: Path, call: Call) -> None:
@@ -75,8 +75,10 @@ def test_inverse_kinematics_after_the_filter(places: Path, tmp_path: Path, call:
     assert code == 0, err
     assert "inverse kinematics: 31 points" in err
     seen = mcz.positions(mcz.post_filter(read_motion(places), rate=120))
-    found = mcz.positions(mcz.read(out))
-    assert np.abs(found - seen).mean() < np.abs(found - mcz.positions(read_motion(places))).mean()
+    decoded = mcz.positions(mcz.read(out))
+    assert (
+        np.abs(decoded - seen).mean() < np.abs(decoded - mcz.positions(read_motion(places))).mean()
+    )
     code, _, err = call("decode", places, "--post-filter", "--rate", "120")
     assert code != 0
     assert "choose a format with --to" in err

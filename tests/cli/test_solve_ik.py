@@ -104,8 +104,8 @@ def test_what_the_command_refuses(walk: Motion, samples: Path, tmp_path: Path, c
 def test_a_clip_of_positions(walk: Motion, tmp_path: Path) -> None:
     file = write_positions(tmp_path / "walk.mcz", walk, virtual_markers=True)
     points, markers = points_and_markers_of(walk.skeleton, walk.values)
-    with mcz.open(file) as held:
-        clip = held.clips[walk.name]
+    with mcz.open(file) as reader:
+        clip = reader.clips[walk.name]
         motion, base = clip.motion(), clip.base_skeleton
         assert base == walk.skeleton
         assert base is not None
@@ -119,11 +119,11 @@ def test_a_clip_of_positions(walk: Motion, tmp_path: Path) -> None:
         assert motion.metadata["source-note"].startswith(NOTE)
     both = np.concatenate([points, markers], axis=1)
     assert (motion.values.reshape(both.shape) == both).all()
-    with mcz.open(tmp_path / "walk.mcz") as held:
-        assert held.clips[walk.name].skeleton.base is not None
+    with mcz.open(tmp_path / "walk.mcz") as reader:
+        assert reader.clips[walk.name].skeleton.base is not None
     mcz.write(walk, tmp_path / "plain.mcz")
-    with mcz.open(tmp_path / "plain.mcz") as held:
-        assert held.clips[walk.name].base_skeleton is None
+    with mcz.open(tmp_path / "plain.mcz") as reader:
+        assert reader.clips[walk.name].base_skeleton is None
 
 
 def test_there_and_back_keeps_the_rest(walk: Motion) -> None:

@@ -140,8 +140,8 @@ def test_only_one_module_prints() -> None:
 def ways_around(tree: ast.Module) -> list[str]:
     banned = {"click.echo", "click.secho", "click.echo_via_pager", "print", "click.style"}
     banned |= {"sys.stdout.write", "sys.stderr.write", "sys.stdout.buffer.write", "os.write"}
-    found = [ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    return [name for name in found if name in banned or name.endswith(("stdout.buffer.write",))]
+    parsed = [ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    return [name for name in parsed if name in banned or name.endswith(("stdout.buffer.write",))]
 
 
 @pytest.mark.parametrize("text", ["click.echo(1)", "print(2)", "sys.stderr.write('a')"])

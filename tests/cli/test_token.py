@@ -64,10 +64,10 @@ def test_a_silent_client_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -
 )
 def test_a_client_is_told(given: str | None, hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "PATIENCE", 0.2)
-    with listen() as listener, pytest.raises(Failure) as found:  # noqa: SIM117
+    with listen() as listener, pytest.raises(Failure) as raised:  # noqa: SIM117
         with tcp.connected(listener.address, given):
             pass
-    assert hint in str(found.value)
+    assert hint in str(raised.value)
 
 
 def test_a_token_to_one_who_asks_for_none() -> None:

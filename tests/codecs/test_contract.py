@@ -69,11 +69,13 @@ def test_values_come_back(name: str, n_frames: int) -> None:
     with mcz.open(data) as file:
         clip = file.only_clip()
         assert (clip.codec, clip.n_frames) == (case.name, n_frames)
-        found = clip.read()
+        decoded = clip.read()
     wanted = expected_values(case, smooth(n_frames))
-    assert found.shape == wanted.shape
-    assert np.abs(found - wanted).max(initial=0) <= case.error
-    assert found.size < 99 or (found == wanted).all() == case.codec.lossless or name == "overlap"
+    assert decoded.shape == wanted.shape
+    assert np.abs(decoded - wanted).max(initial=0) <= case.error
+    assert (
+        decoded.size < 99 or (decoded == wanted).all() == case.codec.lossless or name == "overlap"
+    )
 
 
 @EVERY
@@ -83,13 +85,13 @@ def test_segments_hold_what_one_would(name: str, length: int) -> None:
     with mcz.open(many) as file, mcz.open(write_smooth(name, 100, 4096)) as other:
         clip, whole = file.only_clip(), other.only_clip().read()
         rows = [row.header for row in clip.signals[0].rows]
-        found = clip.read()
+        decoded = clip.read()
     assert len(rows) > 1
     assert [row.first for row in rows] == [0, *(row.stop for row in rows[:-1])]
     assert rows[-1].stop == 100
-    assert np.abs(found - expected_values(case, smooth(100))).max() <= case.error
+    assert np.abs(decoded - expected_values(case, smooth(100))).max() <= case.error
     if case.is_free:
-        assert found.tobytes() == whole.tobytes()
+        assert decoded.tobytes() == whole.tobytes()
 
 
 @EVERY
@@ -178,8 +180,8 @@ def test_details_that_are_not_stored_are_those_left_out(name: str) -> None:
     coded = small(name)
     for k in range(coded.layout.n_resolutions):
         shorter = replace(coded.layout, n_resolutions=coded.layout.n_resolutions - k)
-        found = coded.read(changes={"layout": shorter})
-        assert found.tobytes() == coded.read(resolution=k).tobytes()
+        decoded = coded.read(changes={"layout": shorter})
+        assert decoded.tobytes() == coded.read(resolution=k).tobytes()
 
 
 @EVERY
@@ -319,9 +321,9 @@ def test_odd_clips(name: str, odd: str) -> None:
         with pytest.raises((mcz.MotionError, mcz.OptionError)):
             write_case(motion, case)
         return
-    found, wanted = encode_and_decode(motion, case), expected_values(case, motion)
-    assert found.shape == wanted.shape
-    assert np.abs(found - wanted).max(initial=0) <= (3 if odd == "wide" else 1) * case.error
+    decoded, wanted = encode_and_decode(motion, case), expected_values(case, motion)
+    assert decoded.shape == wanted.shape
+    assert np.abs(decoded - wanted).max(initial=0) <= (3 if odd == "wide" else 1) * case.error
 
 
 @LOSSY
@@ -472,9 +474,9 @@ def test_a_quality_record_says_how_and_how_well(name: str) -> None:
     case, motion = CASES[name], smooth(100)
     with mcz.open(write_smooth(name)) as file:
         quality = file.only_clip().quality
-        found = mcz.compare(motion, file.only_clip().motion())
+        decoded = mcz.compare(motion, file.only_clip().motion())
     assert quality["codec"] == case.name
     recorded = {key: quality[f"param.{key}"] for key in case.params}
     assert case.codec.options(recorded) == case.codec.options(case.params)
-    assert float(quality["mean_position_error"]) == pytest.approx(found.mean_position_error)
+    assert float(quality["mean_position_error"]) == pytest.approx(decoded.mean_position_error)
     assert "target_reached" not in quality

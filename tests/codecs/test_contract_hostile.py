@@ -29,12 +29,12 @@ def outcome(coded: Direct, changes: dict[str, Any]) -> str:
     """The values in hexadecimal, or the error: of the whole, then of a part of a resolution."""
     last, coarsest = (len(coded.layout.groups) - 1,), coded.layout.n_resolutions - 1
     try:
-        found = coded.read(changes=changes).tobytes().hex()
+        decoded = coded.read(changes=changes).tobytes().hex()
         coded.read(3, 9, last, coarsest, changes=changes)
     except mcz.MczError as error:
         assert str(error)
         return type(error).__name__
-    return found
+    return decoded
 
 
 @EVERY

@@ -185,10 +185,10 @@ def test_a_damaged_packet_costs_the_frames_up_to_a_fresh_one(name: str) -> None:
     with mcz.open(data) as file, pytest.raises(mcz.ChecksumError):
         file.only_clip().read()
     with mcz.open(data, salvage=True) as file:
-        found = file.only_clip().read()
-    lost = np.isnan(found).any(axis=1)
+        decoded = file.only_clip().read()
+    lost = np.isnan(decoded).any(axis=1)
     assert np.flatnonzero(lost).tolist() == list(range(every + 1, 2 * every))
-    np.testing.assert_array_equal(found[~lost], whole[~lost])
+    np.testing.assert_array_equal(decoded[~lost], whole[~lost])
 
 
 @pytest.mark.parametrize(

@@ -84,8 +84,8 @@ def test_table_4_of_khan2016(data: Path) -> None:
     for T_g, (error, ratio) in PUBLISHED.items():
         stored = encode_file("mrdwt", motion, preset="khan2016", T_g=T_g)
         with mcz.open(stored) as file:
-            found = compare(motion, file.only_clip().motion(), virtual_markers=False)
-        assert found.rms_coordinate_error == pytest.approx(error, abs=0.0005), T_g
+            decoded = compare(motion, file.only_clip().motion(), virtual_markers=False)
+        assert decoded.rms_coordinate_error == pytest.approx(error, abs=0.0005), T_g
         assert SIZES["17_10"] / bytes_of(stored) >= (2.1 if T_g <= 30 else 2.0) * ratio, T_g
 
 
@@ -96,8 +96,8 @@ def test_figure_8_of_khan2016(data: Path) -> None:
     stored = encode_file("mrdwt", motion, preset="khan2016", threshold_rule="flat", T_g=1)
     with mcz.open(stored) as file:
         for resolution, mse in ((0, 0.103), (2, 0.658), (3, 4.699)):
-            found = file.only_clip().read(resolution=resolution)[:, column]
-            assert np.mean((found - meant) ** 2) == pytest.approx(mse, abs=0.01)
+            decoded = file.only_clip().read(resolution=resolution)[:, column]
+            assert np.mean((decoded - meant) ** 2) == pytest.approx(mse, abs=0.01)
 
 
 def test_defaults_of_mrdwt_need_fewer_bytes_than_the_preset(data: Path) -> None:

@@ -51,8 +51,8 @@ def test_a_coefficient_loses_at_most_the_threshold(
     step = 2.0**power
     params = {"step": step, "coder": coder, "basis": basis, "segment_frames": segment_frames}
     params |= {"window": 24} if codec == "lsdt-clip" else {}
-    found = encode_and_decode(codec, motion, **{k: v for k, v in params.items() if v is not None})
-    squares = (found - motion.values) ** 2
+    decoded = encode_and_decode(codec, motion, **{k: v for k, v in params.items() if v is not None})
+    squares = (decoded - motion.values) ** 2
     parts = (
         [squares[a : a + 24] for a in range(0, n_frames, min(24, segment_frames or 24))]
         if codec == "lsdt-clip"
@@ -100,8 +100,10 @@ def test_a_window_decodes_without_the_others() -> None:
     for kept in range(5):  # the others are damaged
         broken = [part if i == kept else b"\xff" * len(part) for i, part in enumerate(parts)]
         stream = b"".join(varint(len(part)) + part for part in broken)
-        found = coded.read(20 * kept, 20 * kept + 20, changes=coded.with_stream((0, 0, 0), stream))
-        np.testing.assert_array_equal(found, whole[20 * kept : 20 * kept + 20])
+        decoded = coded.read(
+            20 * kept, 20 * kept + 20, changes=coded.with_stream((0, 0, 0), stream)
+        )
+        np.testing.assert_array_equal(decoded, whole[20 * kept : 20 * kept + 20])
 
 
 @pytest.mark.parametrize("params", [{"preset": "hou2016"}, {"segment_frames": 50}], ids=str)
@@ -164,8 +166,8 @@ def test_a_real_clip_at_its_target(data: Path, codec: str) -> None:
     motion = amc(data, "17_10")
     held = encode_file(codec, motion, mean_error_cm=0.3)
     with mcz.open(held) as file:
-        found = file.only_clip().motion()
-    distance = np.sqrt(((mcz.positions(found) - mcz.positions(motion)) ** 2).sum(axis=2)).mean()
+        decoded = file.only_clip().motion()
+    distance = np.sqrt(((mcz.positions(decoded) - mcz.positions(motion)) ** 2).sum(axis=2)).mean()
     assert 0.97 * 0.3 <= distance * motion.skeleton.unit_cm <= 0.3
     most = {"lsdt-clip": 16_000, "lsdt-frame": 34_000}[codec]
     assert bytes_of(held) < most
@@ -191,5 +193,5 @@ def test_clips_of_a_file_share_a_basis(tmp_path: Path) -> None:
     assert (tmp_path / "all.mcz").read_bytes().count(b"MODL") == 1
     with mcz.open(tmp_path / "all.mcz") as file:
         for seed in range(3):
-            found = file.clips[f"c{seed}"].read()
-            assert np.abs(found - markers(50, 4, seed).values).max() < 2
+            decoded = file.clips[f"c{seed}"].read()
+            assert np.abs(decoded - markers(50, 4, seed).values).max() < 2

@@ -58,8 +58,8 @@ def test_without_cuts_a_coefficient_loses_at_most_the_threshold(
     """Bases are nearly orthogonal: an error of all frames is that of the coefficients."""
     motion = markers(n_frames, n_markers)
     step = 2.0**power
-    found = encode_and_decode(codec, motion, step=step, coder=coder, window=window, **ALL)
-    assert root_mean_square(found - motion.values) <= BOUND * step + 1e-9
+    decoded = encode_and_decode(codec, motion, step=step, coder=coder, window=window, **ALL)
+    assert root_mean_square(decoded - motion.values) <= BOUND * step + 1e-9
 
 
 @given(st.sampled_from(NAMES), st.integers(1, 200), st.integers(1, 6), st.floats(-3, 6))
@@ -158,11 +158,13 @@ def test_places_far_away() -> None:
     for away in (1e6, 1e9, 1e13):
         values = motion.values + away
         step = max(0.1, away * 1e-8)
-        found = encode_and_decode("pca-rdo", replace(motion, signals=(Signal(values),)), step=step)
-        assert np.abs(found - values).max() < 3 * step
+        decoded = encode_and_decode(
+            "pca-rdo", replace(motion, signals=(Signal(values),)), step=step
+        )
+        assert np.abs(decoded - values).max() < 3 * step
     values = motion.values + 1e6
-    found = encode_and_decode("pca-rdo", replace(motion, signals=(Signal(values),)), step=1e-6)
-    assert np.abs(found - values).max() < 1e-5
+    decoded = encode_and_decode("pca-rdo", replace(motion, signals=(Signal(values),)), step=1e-6)
+    assert np.abs(decoded - values).max() < 1e-5
 
 
 # Clips
@@ -175,8 +177,8 @@ def test_a_clip_of_channels_becomes_places(codec) -> None:
         clip = file.only_clip()
         n_points = len(point_names(motion.skeleton))
         assert len(clip.skeleton.joints) == n_points + 3 * len(motion.skeleton.joints)
-        found = mcz.positions(clip.motion())[:, :n_points]
-    np.testing.assert_allclose(found, mcz.positions(motion), atol=0.01)
+        decoded = mcz.positions(clip.motion())[:, :n_points]
+    np.testing.assert_allclose(decoded, mcz.positions(motion), atol=0.01)
 
 
 @pytest.mark.parametrize("codec", NAMES)

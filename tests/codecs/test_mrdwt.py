@@ -100,14 +100,14 @@ def test_errors_are_bounded(n_frames, kinds, name, levels, T_g, decimals, seed) 
     motion = random_walks(n_frames, kinds, seed)
     params = {} if decimals is None else {"Q": decimals}
     params |= {"T_g": T_g, "N": levels, "wavelet": name, "threshold_rule": "flat"}
-    found = encode_and_decode(motion, **params)
+    decoded = encode_and_decode(motion, **params)
     meant = unwrap(motion.values, motion.skeleton)
     for column, T in enumerate(thresholds(motion, T_g)):
         step = T / 0.8 * math.sqrt(5 / 4)  # step codes are quarters of an octave or a little more
         half = 0.5 * 10.0 ** -(decimals or 0)
         errors = (step / 2, 0.8 * step) if decimals is None else (half, max(T, half))
         most = bound(name, levels, *errors) + 1e-9 * (1 + np.abs(meant).max())
-        assert np.abs(found[:, column] - meant[:, column]).max() <= most
+        assert np.abs(decoded[:, column] - meant[:, column]).max() <= most
 
 
 @given(st.floats(1e-12, 1e12))
@@ -123,12 +123,12 @@ def test_step_codes_are_the_nearest(ratio: float) -> None:
 
 def test_gaps_are_filled_by_straight_lines() -> None:
     motion = markers_with_gaps()
-    found = Direct(motion, Q=6, T_g=0, N=3).read()
+    decoded = Direct(motion, Q=6, T_g=0, N=3).read()
     known = motion.signals[0].values
     line = np.linspace(known[43, 3], known[61, 3], 19)
-    np.testing.assert_allclose(found[43:62, 3], line, atol=1e-4)
-    np.testing.assert_allclose(found[:5, 3], known[5, 3], atol=1e-4)
-    np.testing.assert_allclose(found[97:, 3], known[96, 3], atol=1e-4)
+    np.testing.assert_allclose(decoded[43:62, 3], line, atol=1e-4)
+    np.testing.assert_allclose(decoded[:5, 3], known[5, 3], atol=1e-4)
+    np.testing.assert_allclose(decoded[97:, 3], known[96, 3], atol=1e-4)
 
 
 def test_a_marker_that_is_never_there() -> None:
@@ -151,9 +151,9 @@ def test_radians_are_coded_like_degrees() -> None:
             T_g=1.0,
             threshold_rule=rule,
         )
-        found = np.degrees(radians.read())
+        decoded = np.degrees(radians.read())
         error = np.abs(degrees.read() - unwrap(motion.values, motion.skeleton)).max()
-        np.testing.assert_allclose(found, degrees.read(), atol=1.5 * error)
+        np.testing.assert_allclose(decoded, degrees.read(), atol=1.5 * error)
         sizes = [sum(len(t) for s in c.segments for t in s.streams) for c in (degrees, radians)]
         assert sizes[0] == pytest.approx(sizes[1], rel=0.05)
 

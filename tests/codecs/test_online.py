@@ -99,8 +99,8 @@ def test_decoding_begins_at_an_intra_coded_unit() -> None:
     assert len(coded.segments) == 1
     units[2] = replace(units[2], data=b"\xff" * 50)
     with_damage = coded.with_stream((0, 0, 0), build_units(units))
-    found = coded.read(40, 100, changes=with_damage)
-    np.testing.assert_array_equal(found, meant[40:])
+    decoded = coded.read(40, 100, changes=with_damage)
+    np.testing.assert_array_equal(decoded, meant[40:])
     with pytest.raises(mcz.FormatError):
         coded.read(39, 100, changes=with_damage)
 

@@ -29,10 +29,10 @@ def test_all_components_lose_only_rounding(
     """Half a step for each component, the mean, and the basis that is rounded."""
     motion = random_walks(n_frames, kinds)
     extra = {} if segment_frames is None else {"segment_frames": segment_frames}
-    found = encode_and_decode("pca", motion, preset=preset, q=len(kinds), Q=decimals, **extra)
+    decoded = encode_and_decode("pca", motion, preset=preset, q=len(kinds), Q=decimals, **extra)
     meant = unwrap(motion.values, motion.skeleton)
     most = (len(kinds) + 1) * 1.1 * 10.0**-decimals + 1e-9 * (1 + np.abs(meant).max())
-    assert np.abs(found - meant).max() <= most
+    assert np.abs(decoded - meant).max() <= most
 
 
 @given(st.integers(2, 150), KINDS, st.integers(1, 8))
@@ -42,8 +42,8 @@ def test_the_error_is_near_that_of_the_components_left_out(n_frames, kinds, q) -
     meant = unwrap(motion.values, motion.skeleton)
     rest = meant - meant.mean(axis=0)
     lost = float((np.linalg.svd(rest, compute_uv=False)[q:] ** 2).sum()) / rest.size
-    found = float(np.mean((encode_and_decode("pca", motion, q=q, Q=5) - meant) ** 2))
-    assert found <= lost * 1.001 + 1e-8
+    decoded = float(np.mean((encode_and_decode("pca", motion, q=q, Q=5) - meant) ** 2))
+    assert decoded <= lost * 1.001 + 1e-8
     coarse = float(np.mean((encode_and_decode("pca", motion, q=q) - meant) ** 2))
     assert coarse <= 12 * lost + 1e-4 * (1 + float(np.mean(meant**2)))
 

@@ -101,9 +101,9 @@ def test_a_bound_is_met_by_refining_frames() -> None:
     motion = smooth(400)
     data = encode_file(NAME, motion, max_error_cm=0.2)
     with mcz.open(data) as file:
-        found = file.only_clip().motion()
+        decoded = file.only_clip().motion()
         quality = file.only_clip().quality
-    error = mcz.compare(motion, found).max_position_error_cm
+    error = mcz.compare(motion, decoded).max_position_error_cm
     assert error is not None and error <= 0.2
     assert not any("refinement" in key for key in quality)
 
@@ -151,9 +151,9 @@ def test_text_of_many_grids() -> None:
     motion = clip_of(values)
     motion = replace(motion, signals=(Signal(values, (Grid(GridKind.FIXED, 3),) * 4),))
     with mcz.open(encode_file(NAME, motion, step=0.05)) as file:
-        found = file.only_clip().motion()
-    assert not len(found.signals[0].exceptions)
-    assert not np.isin([1e-9], found.values).any()
+        decoded = file.only_clip().motion()
+    assert not len(decoded.signals[0].exceptions)
+    assert not np.isin([1e-9], decoded.values).any()
 
 
 @pytest.mark.real

@@ -79,15 +79,15 @@ RUNS = ("LeftFoot", 5, 40), ("RightFoot", 30, 60), ("LeftFoot", 50, 3), ("LeftFo
 def test_feet_keep_their_places(step: float, unit: str) -> None:
     motion = walk_motion(angle_unit=unit)
     coded = Direct("posewave", motion, step=step, contacts=RUNS)
-    found = coded.read()
-    assert errors_cm(motion, found, RUNS).max() <= TOLERANCE
+    decoded = coded.read()
+    assert errors_cm(motion, decoded, RUNS).max() <= TOLERANCE
     without = Direct("posewave", motion, step=step)
     assert errors_cm(motion, without.read(), RUNS).min() > TOLERANCE
     # No point is farther off than without contacts, or hardly.
     source = positions_of(motion.skeleton, np.asarray(motion.values))
     off, usual = (
         np.linalg.norm(positions_of(motion.skeleton, values) - source, axis=2)
-        for values in (found, without.read())
+        for values in (decoded, without.read())
     )
     assert off.mean() < usual.mean() and off.max() < 1.5 * usual.max()
     # Coarser requests know nothing of contacts.
@@ -113,9 +113,9 @@ def test_contacts_go_on_across_segments() -> None:
     runs = ("LeftFoot", 5, 300), ("RightFoot", 120, 250)
     coded = Direct("posewave", motion, step=0.2, contacts=runs, segment_frames=64)
     assert len(coded.segments) == 7
-    found = coded.read()
-    assert errors_cm(motion, found, runs).max() <= TOLERANCE
-    assert np.array_equal(coded.read(150, 260), found[150:260])
+    decoded = coded.read()
+    assert errors_cm(motion, decoded, runs).max() <= TOLERANCE
+    assert np.array_equal(coded.read(150, 260), decoded[150:260])
 
 
 def test_two_points_of_a_foot() -> None:
@@ -135,15 +135,15 @@ def test_real_clips(name: str, data: Path) -> None:
     assert [run[:3] for run in runs] == [
         (run.joint, run.first, run.n_frames) for run in mcz.contacts(motion).runs
     ]
-    found = coded.read()
-    assert errors_cm(motion, found, runs).max() <= TOLERANCE
+    decoded = coded.read()
+    assert errors_cm(motion, decoded, runs).max() <= TOLERANCE
     usual = Direct("posewave", motion, step=0.1)
     n_frames = sum(count for _, _, count in runs)
     assert coded.n_bytes - usual.n_bytes < 1.75 * n_frames
     source = positions_of(motion.skeleton, np.asarray(motion.values))
     off, before = (
         np.linalg.norm(positions_of(motion.skeleton, values) - source, axis=2)
-        for values in (found, usual.read())
+        for values in (decoded, usual.read())
     )
     assert off.mean() < before.mean() and off.max() <= 1.25 * before.max()
 

@@ -42,9 +42,9 @@ def test_exact_joints_come_back_at_every_resolution(words: str) -> None:
     names = words.split(",") if isinstance(words, str) else words
     columns = [c for name in names for c in motion.skeleton.columns(motion.skeleton.find(name))]
     for resolution in range(3):
-        found = read(data, resolution=resolution)
-        assert same_bits(found[:, columns], motion.values[:, columns])
-        others = np.delete(found, columns, 1)
+        decoded = read(data, resolution=resolution)
+        assert same_bits(decoded[:, columns], motion.values[:, columns])
+        others = np.delete(decoded, columns, 1)
         assert not others.size or not same_bits(others, np.delete(motion.values, columns, 1))
 
 
@@ -81,14 +81,14 @@ def test_grids_exceptions_and_gaps_of_exact_channels() -> None:
     motion = replace(motion, signals=(signal,))
     with mcz.open(encode_file(NAME, motion, step=0.5, lossless="spine")) as file:
         clip = file.only_clip()
-        found = clip.motion().signals[0]
+        decoded = clip.motion().signals[0]
         assert [row.header.first for row in clip.signals[0].rows] == [0, 40]
         alone = clip.read(joints=["spine"])
-    assert same_bits(found.values[:, SPINE], values[:, SPINE])
+    assert same_bits(decoded.values[:, SPINE], values[:, SPINE])
     assert same_bits(alone[mask[:, SPINE]], values[:, SPINE][mask[:, SPINE]])
-    assert np.array_equal(found.mask, mask)
-    assert set(found.exceptions.channels.tolist()) == {6, 8}
-    assert found.grid_changes == ((40, 7, SIX),)
+    assert np.array_equal(decoded.mask, mask)
+    assert set(decoded.exceptions.channels.tolist()) == {6, 8}
+    assert decoded.grid_changes == ((40, 7, SIX),)
 
 
 def test_segments_of_exact_joints_are_those_that_fast_has() -> None:
@@ -123,8 +123,8 @@ def test_targets_and_quality(target: dict[str, Any]) -> None:
         encode_file(NAME, motion, lossless="knee", quality="spine=2mm", **target)
     ) as file:
         clip = file.only_clip()
-        found, quality = clip.motion(), clip.quality
-    assert same_bits(found.values[:, 9], motion.values[:, 9])
+        decoded, quality = clip.motion(), clip.quality
+    assert same_bits(decoded.values[:, 9], motion.values[:, 9])
     assert quality["param.lossless"] == "knee" and "target_reached" in quality
 
 
@@ -143,6 +143,6 @@ def test_commands_name_exact_joints(
     assert run(cli, "mcz", ["info", str(path)]) == 0
     assert "  exact      rfoot, rtoes\n" in capsys.readouterr().out
     assert run(cli, "mcz", ["diff", str(data / "cmu/amc/16_02.amc"), str(path)]) == 0
-    said = capsys.readouterr().out
-    (line,) = [line for line in said.split("\n") if "equal in every bit" in line]
+    output = capsys.readouterr().out
+    (line,) = [line for line in output.split("\n") if "equal in every bit" in line]
     assert "rfoot, rtoes" in line and "lfoot" not in line

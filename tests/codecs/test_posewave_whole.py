@@ -37,8 +37,8 @@ def version(path: Path) -> int:
 def test_targets_in_cm_are_met(form: str, target: str, limit: float, tmp_path: Path) -> None:
     motion = turned_by(WALK, form, np.float32)
     path = tmp_path / "walk.mcz"
-    found = mcz.compare(motion, write_and_read(motion, path, **{target: limit}))
-    reached = found.max_position_error_cm if "max" in target else found.mean_position_error_cm
+    decoded = mcz.compare(motion, write_and_read(motion, path, **{target: limit}))
+    reached = decoded.max_position_error_cm if "max" in target else decoded.mean_position_error_cm
     assert reached is not None and limit / 2 < reached <= limit
     assert version(path) == 1
     # About as small as the same walk by angles.
@@ -69,9 +69,9 @@ def test_parts_and_live_frames(form: str, tmp_path: Path) -> None:
             writer.push(row)
     assert version(live) == 1
     with mcz.open(live) as file:
-        found = file.clips["live"].motion()
+        decoded = file.clips["live"].motion()
     first = replace(motion, signals=(Signal(motion.values[:50]),))
-    assert mcz.compare(first, found).max_position_error_cm <= 0.5
+    assert mcz.compare(first, decoded).max_position_error_cm <= 0.5
 
 
 def test_vectors_that_jump_are_coded_as_if_they_did_not(tmp_path: Path) -> None:
@@ -86,8 +86,8 @@ def test_vectors_that_jump_are_coded_as_if_they_did_not(tmp_path: Path) -> None:
     values[:, root] = turned
     jumping = replace(motion, signals=(Signal(values),))
     path = tmp_path / "jumping.mcz"
-    found = write_and_read(jumping, path, max_error_cm=0.5)
-    assert mcz.compare(jumping, found).max_position_error_cm <= 0.5
+    decoded = write_and_read(jumping, path, max_error_cm=0.5)
+    assert mcz.compare(jumping, decoded).max_position_error_cm <= 0.5
     still = tmp_path / "still.mcz"
     write_and_read(motion, still, max_error_cm=0.5)
     assert path.stat().st_size < 1.5 * still.stat().st_size
@@ -100,6 +100,6 @@ def test_parts_alone_turn_nothing(tmp_path: Path) -> None:
     values = np.insert(WALK.values, 6, [[1.0], [2.0]], axis=1)
     motion = replace(WALK, skeleton=skeleton, signals=(Signal(values),), source=None)
     path = tmp_path / "parts.mcz"
-    found = write_and_read(motion, path)
+    decoded = write_and_read(motion, path)
     assert version(path) == 0
-    np.testing.assert_allclose(found.values[:, 6:8], values[:, 6:8], atol=0.1)
+    np.testing.assert_allclose(decoded.values[:, 6:8], values[:, 6:8], atol=0.1)

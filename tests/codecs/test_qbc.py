@@ -158,8 +158,8 @@ def test_fewest_breaks_take_fewer_bytes() -> None:
 
 def test_a_limit_of_0_keeps_what_decimals_hold() -> None:
     motion = smooth(90)
-    found = encode_and_decode(motion, d2_lmt=0, Q=4)
-    np.testing.assert_allclose(found, motion.values, rtol=0, atol=1e-9)
+    decoded = encode_and_decode(motion, d2_lmt=0, Q=4)
+    np.testing.assert_allclose(decoded, motion.values, rtol=0, atol=1e-9)
 
 
 def test_a_parabola_is_one_curve() -> None:
@@ -202,8 +202,8 @@ def test_a_part_fetches_the_next_segment_only_where_it_must() -> None:
 
 def test_points_up_to_the_limit_are_coded() -> None:
     values = np.array([[2.0**40, -(2.0**40)], [-(2.0**40), 2.0**40], [0, 1], [2.0**40, 5]])
-    found = encode_and_decode(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=1)
-    np.testing.assert_array_equal(found, values)
+    decoded = encode_and_decode(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=1)
+    np.testing.assert_array_equal(decoded, values)
     with pytest.raises(mcz.MotionError, match="exceeds"):  # a middle point lies beyond
         encode_file(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=2)
     with pytest.raises(mcz.MotionError, match="exceeds"):

@@ -62,10 +62,10 @@ def check(data: bytes, other: Server, what: object) -> None:
             requests += [[*own, "--resolution", str(resolution)] for resolution in coarser]
     for request in requests:
         code, output = conformance.answer(data, request)
-        told = other.ask(request, data, MOST_OUTPUT)
+        answer = other.ask(request, data, MOST_OUTPUT)
         assert code == 0, (what, request)
-        assert (told.code, told.fault) == (0, ""), (what, request, told.errors)
-        assert equal(output, told.output), (what, request)
+        assert (answer.code, answer.fault) == (0, ""), (what, request, answer.errors)
+        assert equal(output, answer.output), (what, request)
 
 
 @pytest.mark.parametrize(("codec", "params"), CASES, ids=str)
@@ -107,11 +107,11 @@ def salvage_arrays(data: bytes) -> tuple[Arrays, set[str]]:
 
 def salvage_in_javascript(data: bytes, other: Server) -> Arrays:
     """Arrays that the decoder in JavaScript salvages; it must not crash or hang."""
-    told = other.ask(["--salvage"], data, MOST_OUTPUT)
-    assert (told.code in (0, 1), told.fault) == (True, ""), told.errors
-    if told.code:
+    answer = other.ask(["--salvage"], data, MOST_OUTPUT)
+    assert (answer.code in (0, 1), answer.fault) == (True, ""), answer.errors
+    if answer.code:
         return []
-    line, _, content = told.output.partition(b"\n")
+    line, _, content = answer.output.partition(b"\n")
     found: Arrays = []
     for row in json.loads(line)["arrays"]:
         size = row["bytes"]
@@ -177,6 +177,6 @@ def test_files_made_at_random(part: int, other: Server) -> None:
     for seed in range(COUNT + part, COUNT + 60, 4):
         vector = vector_of(seed)
         for request in run.requests(make_vectors.row(vector), conformance.OPTIONS):
-            told = other.ask(request.arguments, vector.data, MOST_OUTPUT)
-            fault = run.judge(request, told.code, told.output)
-            assert fault is None, (seed, request.arguments, fault, told.errors)
+            answer = other.ask(request.arguments, vector.data, MOST_OUTPUT)
+            fault = run.judge(request, answer.code, answer.output)
+            assert fault is None, (seed, request.arguments, fault, answer.errors)

@@ -347,9 +347,9 @@ def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: 
     assert mcz.render(body, tmp_path / "still.svg").notes[0] == said
     offsets = np.vstack([np.zeros((1, 3)), np.full((23, 3), 0.1)])
     shaped = mcz.with_offsets(body, offsets)
-    found = mcz.compare(body, shaped)
-    assert found.mse == 0 and found.max_position_error is None
-    assert "no bone has a length, but on the other side: no positions" in found.notes[-1]
+    comparison = mcz.compare(body, shaped)
+    assert comparison.mse == 0 and comparison.max_position_error is None
+    assert "no bone has a length, but on the other side: no positions" in comparison.notes[-1]
     assert said not in (*mcz.left_out(shaped, "bvh"), *mcz.render(shaped, tmp_path / "b.svg").notes)
 
 
@@ -522,10 +522,10 @@ def test_commands_say_what_is_read_and_what_is_kept(
     capsys.readouterr()
     for file in (held, path):
         assert run("info", file) == 0
-        said = capsys.readouterr().out
-        assert "  array      points: 12 columns of <f8, by columns, in motion\n" in said
-        assert "  array      steps: 1 column of >i4, in steps\n" in said
-        assert "  kept       as bytes: betas, old\n" in said
+        output = capsys.readouterr().out
+        assert "  array      points: 12 columns of <f8, by columns, in motion\n" in output
+        assert "  array      steps: 1 column of >i4, in steps\n" in output
+        assert "  kept       as bytes: betas, old\n" in output
     assert run("info", "--json", held) == 0
     (clip,) = json.loads(capsys.readouterr().out)["clips"]
     assert clip["arrays"][3] == {

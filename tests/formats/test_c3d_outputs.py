@@ -82,8 +82,8 @@ def test_whatever_is_listed_comes_back(
     assert c3d.write(motion) == data
     stream = io.BytesIO()
     mcz.write(motion, stream)
-    with mcz.open(stream.getvalue()) as held:
-        clip = held.clips["clip"]
+    with mcz.open(stream.getvalue()) as reader:
+        clip = reader.clips["clip"]
         assert clip.source_bytes() == data
         for signal in motion.signals:
             assert np.array_equal(clip.read(signal=signal.name), signal.masked(), equal_nan=True)
@@ -120,8 +120,8 @@ def test_a_file_of_before_still_says_what_it_said(monkeypatch: pytest.MonkeyPatc
         old = c3d.read(data, "clip")
         stream = io.BytesIO()
         mcz.write(old, stream)
-    with mcz.open(stream.getvalue()) as held:
-        clip = held.clips["clip"]
+    with mcz.open(stream.getvalue()) as reader:
+        clip = reader.clips["clip"]
         assert clip.source is not None and clip.source.format == "c3d"
         assert clip.n_channels == 12 and clip.source_bytes() == data
         assert np.array_equal(clip.values[:], old.signals[0].values)
@@ -132,8 +132,8 @@ def test_lossy_codecs_and_distances_leave_them_alone() -> None:
     motion = c3d.read(file.build(), "clip")
     stream = io.BytesIO()
     mcz.write(motion, stream, codec="mrdwt", mean_error_cm=0.1)
-    with mcz.open(stream.getvalue()) as held:
-        clip = held.clips["clip"]
+    with mcz.open(stream.getvalue()) as reader:
+        clip = reader.clips["clip"]
         outputs = signal_of(motion, "outputs")
         assert np.array_equal(clip.read(signal="outputs"), outputs.values)
         again = c3d.read(clip.source_bytes(), "again")

@@ -39,9 +39,9 @@ def with_analog(file: Made, **more: Any) -> Made:
 
 
 def recording_of(file: Made) -> mcz.Recording:
-    found = mcz.recording(c3d.read(file.build(), "clip"))
-    assert found is not None
-    return found
+    decoded = mcz.recording(c3d.read(file.build(), "clip"))
+    assert decoded is not None
+    return decoded
 
 
 @pytest.mark.parametrize("processor", ORDERS)
@@ -69,8 +69,8 @@ def test_analog_is_in_units_and_words_are_kept(processor: int, size: int) -> Non
     assert c3d.write(motion) == data
     stream = io.BytesIO()
     mcz.write(motion, stream)
-    with mcz.open(stream.getvalue()) as held:
-        clip = held.clips["clip"]
+    with mcz.open(stream.getvalue()) as reader:
+        clip = reader.clips["clip"]
         assert np.array_equal(clip.read(signal="analog"), wanted)
         assert np.array_equal(clip.read(signal=2, frames=(1, 3)), wanted[4:12])
         assert np.array_equal(clip.read_masked(signal="analog")[0], analog.stored)
@@ -127,8 +127,8 @@ def test_any_scale_gives_the_words_back(scales: list[float]) -> None:
     assert c3d.write(motion) == data
     stream = io.BytesIO()
     mcz.write(motion, stream)
-    with mcz.open(stream.getvalue()) as held:
-        assert held.clips["clip"].source_bytes() == data
+    with mcz.open(stream.getvalue()) as reader:
+        assert reader.clips["clip"].source_bytes() == data
 
 
 def test_changed_values_become_the_nearest_words() -> None:
@@ -151,10 +151,10 @@ def test_without_its_source_a_clip_has_the_values() -> None:
     motion = c3d.read(file.build(), "clip")
     stream = io.BytesIO()
     mcz.write(replace(motion, source=None), stream)
-    with mcz.open(stream.getvalue()) as held:
-        found = analog_of(held.clips["clip"].motion())
-    assert np.array_equal(found.values, analog_of(motion).values)
-    assert found.channels == analog_of(motion).channels and found.scaling is None
+    with mcz.open(stream.getvalue()) as reader:
+        decoded = analog_of(reader.clips["clip"].motion())
+    assert np.array_equal(decoded.values, analog_of(motion).values)
+    assert decoded.channels == analog_of(motion).channels and decoded.scaling is None
 
 
 def test_a_scaling_that_the_source_does_not_say_is_refused() -> None:
@@ -232,13 +232,13 @@ def test_events_of_the_header(processor: int, key: int, n: int) -> None:
     data[298:302] = word(key, processor) + word(n, processor)
     data[304:312] = real(0.5, processor) + real(2.0, processor)
     data[396:404] = b"LHS RTO "
-    found = mcz.recording(c3d.read(bytes(data), "clip"))
-    assert found is not None
+    decoded = mcz.recording(c3d.read(bytes(data), "clip"))
+    assert decoded is not None
     if not key:
-        assert found.events == ()
+        assert decoded.events == ()
     else:
-        assert found.events[:2] == (mcz.Event("LHS", 0.5), mcz.Event("RTO", 2.0))
-        assert len(found.events) == min(n, 18)
+        assert decoded.events[:2] == (mcz.Event("LHS", 0.5), mcz.Event("RTO", 2.0))
+        assert len(decoded.events) == min(n, 18)
 
 
 @pytest.mark.parametrize("processor", ORDERS)

@@ -53,19 +53,19 @@ class Case:
 
     def back(self, data: bytes) -> Any:
         """The motion of the file, which is written as the same bytes."""
-        found = self.read(data)
-        assert FORMATS[self.format].write(found) == data
-        return found
+        decoded = self.read(data)
+        assert FORMATS[self.format].write(decoded) == data
+        return decoded
 
     def back_or_refused(self, data: bytes) -> Any:
         """The same, or None for what is refused in one line."""
         try:
-            found = self.read(data)
+            decoded = self.read(data)
         except (mcz.SourceError, mcz.LimitError) as error:
             assert "\n" not in str(error)
             return None
-        assert FORMATS[self.format].write(found) == data
-        return found
+        assert FORMATS[self.format].write(decoded) == data
+        return decoded
 
 
 def build_file(file: Any) -> bytes:

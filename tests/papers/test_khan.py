@@ -54,7 +54,7 @@ def test_all_tables_of_generated_clips(
         arguments = [paper, str(tmp_path), "--jobs", "1", "--no-cache", "--out", str(out)]
         assert run_command(command, "papers", arguments) == 0
         shown, told = capsys.readouterr()
-        found = json.loads((out / "results.json").read_text())["tables"]
-        assert len(found) == n_tables and all(table["title"] in shown for table in found)
-        assert all(table["rows"] for table in found)
+        document = json.loads((out / "results.json").read_text())["tables"]
+        assert len(document) == n_tables and all(table["title"] in shown for table in document)
+        assert all(table["rows"] for table in document)
         assert "clips that are not here" in told

@@ -263,16 +263,16 @@ def test_all_tables_of_generated_clips(
     shown, told = capsys.readouterr()
     assert "Kwak and Bajic, claim by claim" in shown
     assert "clips that are not here: 85_12" in told
-    found = {t["title"]: t for t in json.loads((out / "results.json").read_text())["tables"]}
-    assert len(found) == 14
-    for title, table in found.items():
+    document = {t["title"]: t for t in json.loads((out / "results.json").read_text())["tables"]}
+    assert len(document) == 14
+    for title, table in document.items():
         assert table["rows"], title
-    held = found["Kwak and Bajic, Tables VIII and IX: rate control"]["rows"]
+    held = document["Kwak and Bajic, Tables VIII and IX: rate control"]["rows"]
     assert [row[1] for row in held] == list(printed.TARGETS)
     assert held[0][-2:] == [3.01, 3.02]
-    markers = found["Kwak and Bajic, Table VI: bytes a group"]["rows"]
+    markers = document["Kwak and Bajic, Table VI: bytes a group"]["rows"]
     assert [row[0] for row in markers] == ["13_29.amc, 41 markers", "86_02.c3d"]
-    bd_rows = found["Kwak and Bajic, Table III: BD SQNR and BD rate"]["rows"]
+    bd_rows = document["Kwak and Bajic, Table III: BD SQNR and BD rate"]["rows"]
     assert {"MOD", "RC", "RCA", "FIL", "ours", "ours + filter"} <= {row[1] for row in bd_rows}
     if can_draw():
         names = {path.name for path in out.glob("*.png")}

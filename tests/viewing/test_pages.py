@@ -131,9 +131,9 @@ def test_a_codec_makes_it_small_and_says_how_far_it_is(
     (file,) = files_of(embedded_data(tmp_path / "x.html"))
     assert file["walk"].codec == "mrdwt"
     assert file["walk"].quality["param.T_g"] == "4.0"
-    told = json.loads(printed)
-    assert told["size"] == (tmp_path / "x.html").stat().st_size
-    assert told["files"] == [{"name": "a.mcz", "size": file.size, "n_clips": 1}]
+    document = json.loads(printed)
+    assert document["size"] == (tmp_path / "x.html").stat().st_size
+    assert document["files"] == [{"name": "a.mcz", "size": file.size, "n_clips": 1}]
     held = embedded_data(tmp_path / "x.html")["files"][0]["base64"]
     (tmp_path / "b.mcz").write_bytes(base64.b64decode(held))
     assert call(tmp_path / "a.mcz", tmp_path / "b.mcz", "-o", tmp_path / "y.html")[0] == 0

@@ -143,12 +143,12 @@ def _run(
 
 def _add(outcome: Outcome, figures: Path, log: Path) -> None:
     if figures.exists():
-        found = json.loads(figures.read_text())
-        outcome.executions += found["executions"]
-        outcome.decoded += found["decoded"]
+        document = json.loads(figures.read_text())
+        outcome.executions += document["executions"]
+        outcome.decoded += document["decoded"]
         for kind in ("refused", "findings"):
             counts = getattr(outcome, kind)
-            for key, count in found[kind].items():
+            for key, count in document[kind].items():
                 counts[key] = counts.get(key, 0) + count
     for match in _statuses(log):
         outcome.coverage, outcome.features, outcome.corpus = map(int, match.groups())

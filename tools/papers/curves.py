@@ -82,14 +82,14 @@ def point_of(loaded: Loaded, variant: Variant, params: Mapping[str, Any]) -> Rec
     with mcz.open(data, max_decoded=2**53) as file:
         clip = file.only_clip()
         sizes = clip_sizes(file.container, clip)
-        found = mcz.compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
-    if found.mean_position_error_cm is None:
-        raise MotionError(f"{motion.name}: {'; '.join(found.notes) or 'no figure in cm'}")
-    coded, n_points = sizes.payload + sizes.overhead, found.points or 0
+        decoded = mcz.compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
+    if decoded.mean_position_error_cm is None:
+        raise MotionError(f"{motion.name}: {'; '.join(decoded.notes) or 'no figure in cm'}")
+    coded, n_points = sizes.payload + sizes.overhead, decoded.points or 0
     plain = POINT_BYTES * n_points * motion.n_frames
     return {
         "setting": next(iter(params.values())),
-        "cm": found.mean_position_error_cm,
+        "cm": decoded.mean_position_error_cm,
         "coded_bytes": coded + sizes.models,
         "model_bytes": sizes.models,
         "cr": plain / (coded + sizes.models),

@@ -99,8 +99,8 @@ for _make in (
 @base
 def by_hand(name: str) -> Base:
     """A file that was written as hex, see ``build/by_hand.py``."""
-    held, sources = written.HELD[name]
-    return Base(held, written.bytes_of(name), sources)
+    motions, sources = written.HELD[name]
+    return Base(motions, written.bytes_of(name), sources)
 
 
 @base
@@ -328,11 +328,11 @@ def segments_of_zeros(n_rows: int, n_segments: int, padding: int = 0, n_channels
     return finish_file(crafter)
 
 
-def _limited_file(found: Base, options: dict[str, Any]) -> bytes:
+def _limited_file(base: Base, options: dict[str, Any]) -> bytes:
     """The file of clips beyond the base profile, which its HEAD has all the same."""
     crafter = Crafter()
     crafter.profile = LARGE
-    for motion in found.motions:
+    for motion in base.motions:
         crafter.clip(motion, **options)
     return finish_file(crafter)
 
@@ -351,22 +351,22 @@ def attached(name: str, content: str, alias: str = "") -> Base:
     return Base((), None, ((name, content.encode()),), ((name, alias),))
 
 
-def _with_attachments(found: Base, index: bool = True) -> bytes:
-    return _body(Crafter(), found, index)
+def _with_attachments(base: Base, index: bool = True) -> bytes:
+    return _body(Crafter(), base, index)
 
 
-def _body(crafter: Crafter, found: Base, index: bool) -> bytes:
-    for (name, content), (_, alias) in zip(found.sources, found.attached, strict=True):
+def _body(crafter: Crafter, base: Base, index: bool) -> bytes:
+    for (name, content), (_, alias) in zip(base.sources, base.attached, strict=True):
         crafter.parts(name, content)
         if alias:
             crafter.alias(alias, payloads.OF_ATTACHMENT, name.encode())
-    return finish_file(crafter, *found.motions, index=index)
+    return finish_file(crafter, *base.motions, index=index)
 
 
-def _append_clips(found: Base, index: bool = True, continued: bool = False) -> bytes:
+def _append_clips(base: Base, index: bool = True, continued: bool = False) -> bytes:
     crafter = Crafter()
     crafter.continued = continued
-    for body in found.bodies:
+    for body in base.bodies:
         _body(crafter, body, index)
     return crafter.data
 
@@ -388,8 +388,8 @@ def base_of(text: str) -> Base:
     """The base that a row names."""
     if text.startswith("valid/"):
         return Base((), MADE.get(text) or (VECTORS / f"{text}.mcz").read_bytes())
-    found: Base = _evaluate(ast.parse(text, mode="eval").body)
-    return found
+    result: Base = _evaluate(ast.parse(text, mode="eval").body)
+    return result
 
 
 def base_bytes(text: str, options: Mapping[str, Any]) -> bytes:
@@ -400,16 +400,16 @@ def base_bytes(text: str, options: Mapping[str, Any]) -> bytes:
 
 @cache
 def _write_base(text: str, options: tuple[tuple[str, Any], ...]) -> bytes:
-    found = base_of(text)
-    if found.data is not None:
-        return found.data
+    content = base_of(text)
+    if content.data is not None:
+        return content.data
     named = dict(options)
-    if found.bodies:
-        return _append_clips(found, **named)
-    if found.attached:
-        return _with_attachments(found, **named)
+    if content.bodies:
+        return _append_clips(content, **named)
+    if content.attached:
+        return _with_attachments(content, **named)
     if "codec" in named:
         (named["codec"],) = (c for c in CODECS.values() if c.name == named["codec"])
     if named.pop("beyond", False):
-        return _limited_file(found, named)
-    return file_of(*found.motions, **named)
+        return _limited_file(content, named)
+    return file_of(*content.motions, **named)

@@ -253,5 +253,5 @@ def keys_of_bone(
 
 def markers_of(motion: mcz.Motion, up: str, scale: float) -> Floats:
     """Marker positions of ``motion``, (n_frames, n_markers, 3), NaN for missing ones."""
-    found: Floats = mcz.positions(motion) @ (TO_Z_UP[up] * scale).T
-    return found
+    positions: Floats = mcz.positions(motion) @ (TO_Z_UP[up] * scale).T
+    return positions

@@ -41,13 +41,13 @@ def way_back(case: Case, step_cm: float | None, virtual_markers: bool) -> Record
             sizes, seen = clip_sizes(file.container, clip), clip.motion()
         coded["coded_bytes"] = sizes.payload + sizes.overhead + sizes.models
     solved, _ = from_positions(seen, motion.skeleton)
-    found = mcz.compare(motion, solved)
+    comparison = mcz.compare(motion, solved)
     angles = angle_errors(motion.skeleton, floats_of(motion), floats_of(solved))
     return coded | {
         "seen_cm": _seen_error(places, seen) * unit,
-        "cm": found.mean_position_error_cm,
-        "max_cm": found.max_position_error_cm,
-        "markers_cm": found.virtual_marker_mean_cm,
+        "cm": comparison.mean_position_error_cm,
+        "max_cm": comparison.max_position_error_cm,
+        "markers_cm": comparison.virtual_marker_mean_cm,
         "channel_deg": float(np.abs(angles).mean()),
         "turn_deg": _turn_error(motion, solved),
     }

@@ -217,10 +217,10 @@ def _file_point(motion: Motion, options: Mapping[str, Any], with_filter: bool) -
         clip = file.only_clip()
         sizes, decoded = clip_sizes(file.container, clip), clip.motion()
     decoded = mcz.post_filter(decoded) if with_filter else decoded
-    found = mcz.compare(motion, decoded, virtual_markers=False, shell_cm=None)
+    comparison = mcz.compare(motion, decoded, virtual_markers=False, shell_cm=None)
     coded = sizes.payload + sizes.overhead + sizes.models
-    plain = POINT_BYTES * (found.points or 0) * motion.n_frames
-    cm, ratio = found.mean_position_error_cm, plain / coded
+    plain = POINT_BYTES * (comparison.points or 0) * motion.n_frames
+    cm, ratio = comparison.mean_position_error_cm, plain / coded
     return {"cm": cm, "coded_bytes": coded, "setting": options["bitrate"], "cr": ratio}
 
 

@@ -88,7 +88,7 @@ class _Unchecked(ClipCopy):
         self._segments.setdefault(header.signal, []).append((header, streams))
 
     def decoded(self, motion: Motion, coded: Sequence[SignalPlan]) -> list[Decoded]:
-        found = []
+        signals = []
         for index, (part, signal) in enumerate(zip(coded, motion.signals, strict=True)):
             free, segments = part.lossy_channels(), self._segments.get(index, [])
             values = signal.values
@@ -96,8 +96,8 @@ class _Unchecked(ClipCopy):
                 values = np.array(values, np.float64)
                 groups = [g for g in part.source.layout.groups if free[list(g)].any()]
                 values[:, [c for g in groups for c in g]] = _lossy(part, segments, free)
-            found.append(Decoded(values, value_hash(values, signal.mask)))
-        return found
+            signals.append(Decoded(values, value_hash(values, signal.mask)))
+        return signals
 
 
 def _lossy(
@@ -234,12 +234,12 @@ class Crafter(Writer):
 
     def _repeated_chunks(self) -> bytes:
         """Content of a REPT in a file of one clip."""
-        data, at, found = self.data, len(SIGNATURE), b""
+        data, at, repeated = self.data, len(SIGNATURE), b""
         while at < len(data):
             chunk = parse_header(data[at : at + HEADER.size], at)
-            found += data[at : at + chunk.size] if chunk.type in REPEATED else b""
+            repeated += data[at : at + chunk.size] if chunk.type in REPEATED else b""
             at += chunk.size
-        return found
+        return repeated
 
     def _begin_data(self, opening: bytes) -> None:
         if self._n_data in self.repeat:
@@ -266,14 +266,14 @@ class Crafter(Writer):
         clip: ClipRow | None = self._clip
         assert clip is not None
         assert self._next_packet is not None
-        told, segment = self._implying or (None, b"")
+        packet_mask, segment = self._implying or (None, b"")
         mask = mask_of(segment) if segment else b""
         implied = implied_by(header.first, mask)
         made = Packet(FRAME, self._next_packet, stream, bool(header.flags & FRESH), implied)
         packet = build_packet(made)
         at = self.offset + len(packet) - CHECK_SIZE - len(stream)
-        told = told if header.flags & MASKS else None
-        clip.segments.append(SegmentRow(at, len(stream), header, made.kind, told))
+        packet_mask = packet_mask if header.flags & MASKS else None
+        clip.segments.append(SegmentRow(at, len(stream), header, made.kind, packet_mask))
         self._write(self.apply_edit("packet", packet))
         self._next_packet += 1
 

@@ -116,10 +116,10 @@ def segment_of(text: str, constants: Mapping[str, str]) -> tuple[SegmentHeader, 
     first, n_frames, more, streams = match.groups()
     fields = {key: int(value) for key, value in (word.split("=") for word in more.split())}
     header = SegmentHeader(fields.pop("signal", 0), int(first), int(n_frames), **fields)
-    found = []
+    parts = []
     for stream, times in STREAM.findall(streams):
-        found += [_bytes(stream, constants)] * int(times or 1)
-    return header, found
+        parts += [_bytes(stream, constants)] * int(times or 1)
+    return header, parts
 
 
 def _model(text: str, constants: Mapping[str, str]) -> Model:

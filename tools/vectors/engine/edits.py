@@ -53,15 +53,15 @@ class Target:
     def of(cls, match: re.Match[str] | None) -> Target:
         if match is None:
             raise ValueError("an edit names no place")
-        found = match.groupdict()
-        stream, own = found["stream"], found["own"]
+        fields = match.groupdict()
+        stream, own = fields["stream"], fields["own"]
         return cls(
-            found["name"],
-            int(found["number"] or 0),
+            fields["name"],
+            int(fields["number"] or 0),
             None if stream is None else int(stream),
             None if own is None else own[1:],
-            found["path"][1:],
-            found["slice"],
+            fields["path"][1:],
+            fields["slice"],
         )
 
     @property

@@ -199,10 +199,10 @@ class Layout:
 
     def find(self, type_: bytes, number: int = 0) -> Part:
         """The part of this type and number, from 0, or from the end where it is negative."""
-        found = [part for part in self.parts if part.type == type_]
-        if not -len(found) <= number < len(found):
+        parts = [part for part in self.parts if part.type == type_]
+        if not -len(parts) <= number < len(parts):
             raise ValueError(f"there is no {type_.decode()} {number}")
-        return found[number]
+        return parts[number]
 
     def settle(self) -> None:
         """Build segments that were edited, and give shared chunks their ids."""
@@ -225,20 +225,20 @@ class Layout:
 
     def _imply(self) -> None:
         """Derive the frame and mask of packets of kind 2 from the packets before them."""
-        due, told = 0, b""
+        due, mask = 0, b""
         for part in self.parts:
             packet = part.packet
             if packet is None or "number" in part.frame:
                 continue
             if packet.kind == FRAME:
                 with suppress(MczError):
-                    part.packet = replace(packet, implied=implied_by(due, mask_of(told)))
+                    part.packet = replace(packet, implied=implied_by(due, mask_of(mask)))
                 due += 1
             elif packet.kind == SEGMENT:
                 with suppress(MczError):
                     header, _ = parse_segment(part.payload)
                     if header.signal == 0:
-                        due, told = header.stop, part.payload
+                        due, mask = header.stop, part.payload
 
     def place(self) -> None:
         """Offsets of all parts."""
@@ -285,9 +285,9 @@ class Layout:
             self._follow(clip, part)
         clip.clip, clip.segments = start, list(self._segment_rows(start, was))
         end = clip.segments[-1].stop if clip.segments else start.stop
-        found = None if cend is None else _move_chunk(cend, moved)
+        moved_end = None if cend is None else _move_chunk(cend, moved)
         assert cend is not None
-        clip.cend = found or replace(cend, offset=end + cend.offset - last)
+        clip.cend = moved_end or replace(cend, offset=end + cend.offset - last)
         ancillary = (_move_chunk(chunk, moved) for chunk in clip.ancillary)
         clip.ancillary = sorted(
             (chunk for chunk in ancillary if chunk and chunk.offset >= clip.cend.stop),

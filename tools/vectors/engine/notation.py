@@ -50,11 +50,11 @@ def integer(text: str) -> int:
 
 def number(text: str) -> bytes:
     """The bytes of a number behind its type, such as v:300."""
-    kind, _, said = text.partition(":")
+    kind, _, digits = text.partition(":")
     if kind in "df":
-        value = math.nan if said == "nan" else float(said)
+        value = math.nan if digits == "nan" else float(digits)
         return struct.pack("<" + kind, value)
-    value = integer(said)
+    value = integer(digits)
     if kind == "v":
         return varint(value)
     if kind == "z":

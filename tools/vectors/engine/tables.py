@@ -95,14 +95,14 @@ class Row:
         exit_ = fields.get("exit", REFUSED if group == "invalid" else OK)
         exit_ = tuple(exit_) if isinstance(exit_, list) else (exit_,)
         data, modes = self.data, tuple(fields.get("modes", "arrays").split())
-        held, listed = Base(), ()
+        content, listed = Base(), ()
         if OK in exit_ and (self.has_segments or fields.get("holds") == DECODED):
             listed = _decode_arrays(data)
             restored = _decode_arrays(data, "--source") if "sources" in modes else ()
-            held = Base(sources=tuple((row["path"], content) for row, content in restored))
+            content = Base(sources=tuple((row["path"], content) for row, content in restored))
         elif OK in exit_:
-            held = base_of(fields.get("holds", fields["base"]))
-            listed = arrays(*held.motions)
+            content = base_of(fields.get("holds", fields["base"]))
+            listed = arrays(*content.motions)
         return Vector(
             self.name,
             tuple(heading.strip() for heading in fields["spec"].split(";")),
@@ -110,10 +110,10 @@ class Row:
             data,
             exit=exit_,
             arrays=listed,
-            sources=held.sources if "sources" in modes else (),
+            sources=content.sources if "sources" in modes else (),
             modes=modes,
             parts=tuple(
-                _part(data, held, text) if OK in exit_ else (tuple(text.split()), ())
+                _part(data, content, text) if OK in exit_ else (tuple(text.split()), ())
                 for text in fields.get("parts", ())
             ),
             since=fields.get("since", FORMAT_NAME),
@@ -124,20 +124,20 @@ def _decode_arrays(data: bytes, *arguments: str) -> Arrays:
     """The arrays of a file or of a part of it, or its sources, as mcz decodes them."""
     _, output = answer(data, arguments)
     line, _, content = output.partition(b"\n")
-    found = []
+    arrays = []
     for row in next(iter(json.loads(line).values())):
         size = row.pop("bytes")
-        found.append((row, content[:size]))
+        arrays.append((row, content[:size]))
         content = content[size:]
-    return tuple(found)
+    return tuple(arrays)
 
 
-def _part(data: bytes, held: Base, text: str) -> Any:
+def _part(data: bytes, content: Base, text: str) -> Any:
     """A partial read: ``dance 1:3`` or ``dance 1:3 0,2``, clip, frames, joints, or arguments."""
     if text.startswith("--"):
         return tuple(text.split()), _decode_arrays(data, *text.split())
     clip, frames, *joints = text.rsplit(" ", text.count(" "))
-    (motion,) = (motion for motion in held.motions if motion.name == clip)
+    (motion,) = (motion for motion in content.motions if motion.name == clip)
     start, _, stop = frames.partition(":")
     listed = [int(joint) for joint in joints[0].split(",")] if joints else None
     return partial(motion, (int(start), int(stop)), listed)
@@ -145,16 +145,16 @@ def _part(data: bytes, held: Base, text: str) -> Any:
 
 def rows_of(path: Path) -> Iterator[Row]:
     """The rows of one table; raises ValueError for what no table has."""
-    found = tomllib.loads(path.read_text("utf-8"))
-    head, constants = found.pop("TABLE"), found.pop("BYTES", {})
-    bases = found.pop("BASES", {})
-    faults = {key: Fault.of(text) for key, text in found.pop("FAULTS", {}).items()}
+    document = tomllib.loads(path.read_text("utf-8"))
+    head, constants = document.pop("TABLE"), document.pop("BYTES", {})
+    bases = document.pop("BASES", {})
+    faults = {key: Fault.of(text) for key, text in document.pop("FAULTS", {}).items()}
     if set(head) - HEAD:
         raise ValueError(f"{path.name}: TABLE has no {sorted(set(head) - HEAD)}")
     folders = head["folder"]
     for folder in [folders] if isinstance(folders, str) else folders:
         used = set()
-        for name, row in found.items():
+        for name, row in document.items():
             unknown = sorted(set(row) - ROW)
             if unknown or ("fault" in row) != folder.startswith("invalid/"):
                 raise ValueError(f"{path.name}: {name}: {unknown or 'fault'}")
@@ -191,13 +191,13 @@ def tables() -> dict[str, tuple[Row, ...]]:
 @cache
 def rows() -> dict[str, Row]:
     """All rows by the names of their vectors."""
-    found: dict[str, Row] = {}
+    rows_by_name: dict[str, Row] = {}
     for table, listed in tables().items():
         for row in listed:
-            if row.name in found:
+            if row.name in rows_by_name:
                 raise ValueError(f"{table}: {row.name} is in two tables")
-            found[row.name] = row
-    alone = [name for name, row in found.items() if row.fault and row.fault.kind == CHECKSUM]
+            rows_by_name[row.name] = row
+    alone = [name for name, row in rows_by_name.items() if row.fault and row.fault.kind == CHECKSUM]
     if sum(not name.startswith(PARTS) for name in alone) > MOST_CHECKSUMS:
         raise ValueError(f"more than {MOST_CHECKSUMS} vectors of checksums alone")
-    return found
+    return rows_by_name
