@@ -347,7 +347,7 @@ def test_a_partial_decoder_is_judged_on_what_it_has(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("declared", "passed", "said"),
+    ("declared", "passed", "message"),
     [
         ({"codecs": [], "sources": []}, 2, "container, no sources: 2/2, 4 not asked"),
         ({"codecs": ["mrdwt"]}, 4, "container + mrdwt: 4/4, 2 not asked"),
@@ -430,7 +430,7 @@ def test_only() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["--decoder", "no-such-program"], "there is no command"),
         (["--decoder", "true", "--only", "nothing"], "no vector is meant by 'nothing'"),
