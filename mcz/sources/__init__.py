@@ -141,7 +141,7 @@ FORMATS: dict[str, Format] = {
             Format(
                 name,
                 format_id,
-                (f".{name}",) if kind else (".csv", ".tsv"),
+                (".csv", ".tsv") if name == "csv" else (f".{name if kind else 'csv'}",),
                 _of(module, f"read{kind}"),
                 _of(module, f"write{kind}"),
                 _of("tables.source", "join_table_notes"),
