@@ -1,4 +1,4 @@
-"""Rate-distortion plots as PNG; matplotlib is imported when the first is drawn."""
+"""A whole run of the benchmark: its measurements, document, report and plots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``mcz pack``: a folder of motion files to one .mcz file."""
+"""``mcz pack``, ``append``, ``unpack`` and ``export``: many motion files into an .mcz, and back."""
 
 from __future__ import annotations
 

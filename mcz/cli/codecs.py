@@ -1,4 +1,4 @@
-"""``mcz codecs``: which codecs there are, and the parameters of each."""
+"""``mcz codecs`` and ``mcz train``: the parameters of each codec, and bases learned from clips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options of ``mcz decode``, and checks of their combinations."""
+"""Options and input of ``mcz decode`` and ``mcz convert``, and checks of their combinations."""
 
 from __future__ import annotations
 

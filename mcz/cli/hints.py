@@ -1,4 +1,4 @@
-"""Hints in words of the command line."""
+"""Hints in words of the command line, and the hint at what can be salvaged from a damaged file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skeletons and frame rates as the lines that ``mcz info`` prints."""
+"""Text of ``mcz info``: skeletons, times, recordings, arrays, source files and previews."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``mcz``: the table of commands; each is loaded when it is called."""
+"""``mcz``: the table of commands, each loaded when it is called; ``mcz completion``, ``sample``."""
 
 from __future__ import annotations
 

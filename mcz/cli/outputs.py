@@ -1,4 +1,4 @@
-"""Names of outputs: which format their suffix stands for, where ``--to`` does not say it."""
+"""Outputs: the formats that their suffixes stand for, and writing them, all or none."""
 
 from __future__ import annotations
 

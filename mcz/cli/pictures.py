@@ -1,4 +1,4 @@
-"""``mcz render``: a motion as a film, a still or a sheet of poses."""
+"""``mcz render`` and ``mcz plot``: a motion as a film, a still, a sheet of poses or a chart."""
 
 from __future__ import annotations
 

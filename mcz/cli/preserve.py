@@ -1,4 +1,4 @@
-"""``mcz protect``: recovery data for an .mcz, from which a damaged one is made whole again."""
+"""``mcz protect``, ``repair`` and ``bag``: recovery data, salvage, and bags (BagIt, RFC 8493)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``mcz delete``: delete clips from an .mcz, and all their bytes."""
+"""``mcz delete``, ``rename``, ``reorder``, ``split`` and ``merge``: clips without re-encoding."""
 
 from __future__ import annotations
 

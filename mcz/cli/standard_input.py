@@ -1,4 +1,4 @@
-"""``mcz encode -``: a motion on standard input, frame by frame where its codec can do that."""
+"""Standard input: a whole file, a motion coded frame by frame, or rows of numbers."""
 
 from __future__ import annotations
 

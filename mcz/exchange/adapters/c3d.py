@@ -1,4 +1,4 @@
-"""``c3d.Reader``: a C3D file that is read frame by frame."""
+"""C3D in memory: ``c3d.Reader``, read frame by frame, and the dictionary of ``ezc3d.c3d``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Requests: permission, ranges of bytes, and posted data."""
+"""Requests: permission, ranges of bytes, posted forms, and the bytes of a served file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks of the server for the page: convert, re-encode, compare, export."""
+"""Tasks of the page's server (convert, re-encode, compare, export), its site and open pages."""
 
 from __future__ import annotations
 

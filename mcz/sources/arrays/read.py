@@ -1,7 +1,7 @@
 """NPY and NPZ: bytes -> Motion, and back.
 
 SPEC.md, "Template of arrays", is normative for the way back. ``meaning.py`` says which array is the
-motion, ``pieces.py`` what a file is made of.
+motion, ``restore.py`` what a file is made of.
 """
 
 from __future__ import annotations
