@@ -84,8 +84,7 @@ if TYPE_CHECKING:
     from mcz.kinematics.rest_pose import rest_positions
     from mcz.kinematics.retargeting.joint_maps import joint_map
     from mcz.kinematics.retargeting.mirroring import mirror
-    from mcz.kinematics.retargeting.offsets import with_offsets
-    from mcz.kinematics.retargeting.renaming import rename
+    from mcz.kinematics.retargeting.renaming import rename, with_offsets
     from mcz.kinematics.retargeting.retargeting import retarget
     from mcz.kinematics.retargeting.selection import select
     from mcz.model.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
@@ -184,8 +183,7 @@ _HOMES = {
     "mcz.sources.c3d.recording": ("Event", "ForcePlatform", "Recording"),
     "mcz.kinematics.retargeting.joint_maps": ("joint_map",),
     "mcz.kinematics.retargeting.mirroring": ("mirror",),
-    "mcz.kinematics.retargeting.offsets": ("with_offsets",),
-    "mcz.kinematics.retargeting.renaming": ("rename",),
+    "mcz.kinematics.retargeting.renaming": ("rename", "with_offsets"),
     "mcz.kinematics.retargeting.retargeting": ("retarget",),
     "mcz.kinematics.retargeting.selection": ("select",),
     "mcz.files.live.generators": ("LiveReader", "stream_decode", "stream_encode"),

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import mcz
 from mcz import Channel, Joint, Motion, Signal
-from mcz.kinematics.rotation_vectors import continuous
+from mcz.kinematics.rotations import continuous
 from mcz.model.motion import POSITION_KINDS, QUATERNION_KINDS, TURNING_KINDS, VECTOR_KINDS
 
 NO_AXIS = (0.0, 0.0, 0.0)

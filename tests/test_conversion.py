@@ -17,7 +17,7 @@ import mcz
 from mcz import Channel, Joint, Motion, MotionError, OptionError, Signal, Skeleton
 from mcz.exchange.conversion import converted_files
 from mcz.kinematics import point_names, positions, reach
-from mcz.kinematics.euler import ORDERS, euler_angles, euler_order
+from mcz.kinematics.rotations import ORDERS, euler_angles, euler_order
 from mcz.sources import FORMATS
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import skeletons, values_for

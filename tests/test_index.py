@@ -55,7 +55,7 @@ ITEMS = st.builds(
 
 @given(st.lists(ITEMS, max_size=5), NUMBERS)
 def test_a_table_is_its_columns(items: list[Item], last: int) -> None:
-    from mcz.model.schema.varints import varint
+    from mcz.model.schema.types import varint
 
     made = build(Items(items=items, last=last), "items")
     plain = varint(len(items))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import Channel, Joint, MotionError, OptionError, Signal, Skeleton
+from mcz.codecs.channel_weights import sensitivities
 from mcz.kinematics import (
     chain,
     depths,
@@ -23,7 +24,6 @@ from mcz.kinematics import (
     virtual_markers_of,
 )
 from mcz.kinematics.frames import FramePositions
-from mcz.kinematics.sensitivity import sensitivities
 from mcz.sources.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for
 

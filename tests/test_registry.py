@@ -11,7 +11,7 @@ import pytest
 from mcz import compare
 from mcz.codecs import CODECS, bitstream_name
 from mcz.codecs.basis_models import known_model_name
-from mcz.codecs.online.options import PRESET_IDS
+from mcz.codecs.online.rate_control import PRESET_IDS
 from mcz.codecs.transforms.wavelets import IDS, WAVELETS
 from mcz.container import limits
 from mcz.container.chunks import FLAGS_OF, ChunkType

@@ -19,7 +19,7 @@ from mcz import Signal
 from mcz.cli.figures import figure_lines
 from mcz.cli.info_lines import _tree
 from mcz.codecs import codec_by_name
-from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms import wavelets
 from mcz.container import strict
 from mcz.container.chunks import build_header
 from mcz.container.writer import Writer
@@ -286,8 +286,8 @@ def test_reading_many_segments_is_not_quadratic(monkeypatch: pytest.MonkeyPatch)
         counted[0] += 1
         return own_range(*args)
 
-    own_range = dwt.own_range
-    monkeypatch.setattr(dwt, "own_range", count_range)
+    own_range = wavelets.own_range
+    monkeypatch.setattr(wavelets, "own_range", count_range)
     counts = []
     for n_frames in (4096, 16384):
         motion = replace(smooth(2), signals=(Signal(np.zeros((n_frames, 10))),))

@@ -90,7 +90,7 @@ def test_spec_never_defers(word: str) -> None:
 
 
 def test_annexes_are_there_once() -> None:
-    from mcz.model.annexes import FOLDER
+    from mcz.model.extras import FOLDER
 
     assert (ROOT / "conformance/annex").resolve() == FOLDER.resolve()
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mcz import OptionError
-from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms import wavelets
 from mcz.codecs.transforms.wavelets import IDS, INLINE, MAX_TAPS, WAVELETS, Wavelet, by_id, by_name
 
 REGISTERED = tuple(WAVELETS)
@@ -34,7 +34,7 @@ def reference(signal: np.ndarray, name: str, levels: int) -> list[np.ndarray]:
 
 def whole(signal: np.ndarray, wavelet: Wavelet, levels: int) -> list[np.ndarray]:
     n = len(signal)
-    return dwt.analyze(signal, 0, 0, n, wavelet.lengths(n, levels), wavelet)
+    return wavelets.analyze(signal, 0, 0, n, wavelet.lengths(n, levels), wavelet)
 
 
 def synthesize_range(
@@ -42,10 +42,10 @@ def synthesize_range(
 ) -> np.ndarray:
     """Frames of a range from no more than the coefficients that it needs."""
     levels = len(bands) - 1
-    ranges = dwt.needed_ranges(start, stop, levels, wavelet.n_taps)
+    ranges = wavelets.needed_ranges(start, stop, levels, wavelet.n_taps)
     places = [ranges[levels], *reversed(ranges[1:])] if levels else [ranges[0]]
     cut = [band[a:b] if len(band) else band for band, (a, b) in zip(bands, places, strict=True)]
-    return dwt.synthesize(cut, [a for a, _ in ranges[1:]], start, stop, wavelet)
+    return wavelets.synthesize(cut, [a for a, _ in ranges[1:]], start, stop, wavelet)
 
 
 @given(NAMES, SIZES, LEVELS)
@@ -93,7 +93,7 @@ def test_analysis_of_windows_is_that_of_the_whole(name: str, n: int, levels: int
     for first, stop in zip(bounds, bounds[1:], strict=False):
         at = max(0, first - -(-wavelet.lead(levels) // unit) * unit)
         end = min(n, max(stop, -(-wavelet.mirrored(levels) // unit) * unit))
-        parts.append(dwt.analyze(signal[at:end], at, first, stop, lengths, wavelet))
+        parts.append(wavelets.analyze(signal[at:end], at, first, stop, lengths, wavelet))
     for number, meant in enumerate(whole(signal, wavelet, levels)):
         joined = np.concatenate([part[number] for part in parts])
         assert joined.tobytes() == meant.tobytes()

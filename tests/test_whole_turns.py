@@ -15,7 +15,7 @@ from mcz import Channel, Joint, Motion, Signal, Skeleton
 from mcz.exchange.conversion import converted_files
 from mcz.kinematics.angles import Unwrapper, unwrap
 from mcz.kinematics.metrics.joint_errors import joint_errors
-from mcz.kinematics.rotation_vectors import (
+from mcz.kinematics.rotations import (
     continuous,
     matrices_of_vectors,
     spins_of_vectors,

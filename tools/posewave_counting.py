@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from mcz.codecs.coding import mixing
 from mcz.codecs.posewave import decision_kernels, row_coder, segment
-from mcz.codecs.posewave.model import Start, make_model
+from mcz.codecs.posewave.model import Prior, Start, make_model
 from mcz.codecs.posewave.model_state import N_OPINIONS, Model
-from mcz.codecs.posewave.priors import Prior
 
 Ints = NDArray[np.int64]
 

@@ -19,7 +19,7 @@ import numpy as np
 from mcz.container.dictionary_deflate import chunk_id, plain_id
 from mcz.container.payloads import AFTER_WORDS, ENCODING
 from mcz.errors import MczError
-from mcz.model.annexes import annex_bytes
+from mcz.model.extras import annex_bytes
 from mcz.model.schema import EXTENDED, Record, build, read_varint, varint
 from mcz.model.schema.columns import Columns, read_column, read_varints
 from mcz.model.schema.records import RecordType

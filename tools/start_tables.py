@@ -30,7 +30,7 @@ def reset_state(state: np.ndarray) -> np.ndarray:
 
 
 def table(state: np.ndarray, n_mixers: int, max_count: int) -> dict[str, object]:
-    """The fields that ``mcz.codecs.coding.start_states.start_state`` reads."""
+    """The fields that ``mcz.codecs.coding.streams.start_state`` reads."""
     probabilities = np.clip(state[mixing.MODELS :: 2] >> 8, 0, 255)
     counts = np.minimum(state[mixing.MODELS + 1 :: 2], max_count)
     return {

@@ -16,8 +16,8 @@ import numpy as np
 
 import mcz
 from mcz.codecs.coding import mixing, residuals
-from mcz.codecs.coding.start_states import start_states
-from mcz.codecs.lossless import best_streams
+from mcz.codecs.coding.streams import start_states
+from mcz.codecs.lossless import best
 from mcz.codecs.lossless.best import CODEC
 from mcz.files.writing.signal_source import MemorySource
 from tools.start_tables import Kept, reset_state, table
@@ -31,7 +31,7 @@ def train(paths: list[Path]) -> np.ndarray:
     state = np.zeros(mixing.MODELS + 2 * residuals.N_CONTEXTS, np.int64)
     state[: mixing.WEIGHTS] = start_states("best")[0][: mixing.WEIGHTS]
     state = reset_state(state)
-    best_streams.start_states = lambda _: (state.view(Kept),)  # type: ignore[assignment]
+    best.start_states = lambda _: (state.view(Kept),)  # type: ignore[assignment]
     total = np.zeros_like(state)
     for number, path in enumerate([*paths, *paths]):
         motion, size = mcz.read(path), 0

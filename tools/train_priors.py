@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 
 from mcz.codecs.posewave import choices
 from mcz.codecs.posewave.header import Header, parse_header
-from mcz.codecs.posewave.model import VARIANCE
+from mcz.codecs.posewave.model import SEEN, UNITS, VARIANCE, VARIANCE_UNITS, layout_of
 from mcz.codecs.posewave.orders import Orders
-from mcz.codecs.posewave.priors import SEEN, UNITS, VARIANCE_UNITS, layout_of
 from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import classes_of, encode_segment, kinds_of
 from mcz.model.motion import Skeleton

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.codecs.coding import residuals
+from mcz.codecs.coding import residuals, space_kernels
 from mcz.codecs.contract import Codec
 from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.curves import qbc
@@ -29,13 +29,7 @@ from mcz.codecs.online import online
 from mcz.codecs.pca import kernels as pca_kernels
 from mcz.codecs.pca import pca
 from mcz.codecs.pca import streams as pca_streams
-from mcz.codecs.spatial import (
-    lsdt_clip,
-    lsdt_frame,
-    lsdt_frame_kernels,
-    window_kernels,
-    window_streams,
-)
+from mcz.codecs.spatial import lsdt_clip, lsdt_frame, windows
 from mcz.codecs.wavelet import mrdwt
 from mcz.codecs.wavelet import streams as wavelet_streams
 from mcz.files.writing.planning import prepare
@@ -106,9 +100,9 @@ PLANS = {
         ),
     ),
     "window": Plan(
-        window_streams,
+        windows,
         lsdt_clip.CODEC,
-        (window_kernels.N_SETS * residuals.N_MIXERS,),
+        (space_kernels.N_SETS * residuals.N_MIXERS,),
         60,  # of the few bits of a window
         (
             {"step": 0.02},
@@ -123,7 +117,7 @@ PLANS = {
     "frame": Plan(
         lsdt_frame,
         lsdt_frame.CODEC,
-        (lsdt_frame_kernels.N_SETS * residuals.N_MIXERS,),
+        (space_kernels.N_SETS * residuals.N_MIXERS,),
         24,
         (
             {"step": 0.02},

@@ -41,11 +41,10 @@ def codecs_command(names: tuple[str, ...], as_json: bool) -> Exit:
     mcz encode --codec NAME --param KEY=VALUE sets one.
     """
     from mcz.codecs import CODECS, DEFAULT, codec_by_name
-    from mcz.codecs.listing import codec_document
 
     codecs = [codec_by_name(name) for name in names] or list(CODECS.values())
     if as_json:
-        print_json({"default": DEFAULT, "codecs": [codec_document(codec) for codec in codecs]})
+        print_json({"default": DEFAULT, "codecs": [codec.document() for codec in codecs]})
         return Exit.FINE
     if names:
         for number, codec in enumerate(codecs):
@@ -68,13 +67,11 @@ def _overview(codecs: list[Codec], default: str) -> Iterator[str]:
 
 
 def _codec_lines(codec: Codec) -> Iterator[str]:
-    from mcz.codecs.listing import parameter_document, parameters_of
-
     kind = "lossless" if codec.lossless else "lossy"
     dial = f"; {codec.dial.parameter} trades quality for size" if codec.dial else ""
     yield f"{codec.name} (codec {codec.id}, {kind}){dial}"
     rows = [["parameter", "default", "range", "meaning"]]
-    for facts in map(parameter_document, parameters_of(codec)):
+    for facts in codec.document()["parameters"]:
         default = "none" if facts["default"] is None else text_of(facts["default"])
         first, *rest = _wrapped(facts["meaning"])
         rows.append([facts["name"], default, facts["range"], first])

@@ -13,15 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.start_states import start_states
-from mcz.codecs.coding.streams import code, uncode
+from mcz.codecs.coding.streams import code, start_states, uncode
 from mcz.codecs.contract import Layout, Model, model_id
 from mcz.errors import FormatError, MotionError, UnsupportedError
-from mcz.model.annexes import annex_bytes, annex_names
+from mcz.model.extras import annex_bytes, annex_names
 from mcz.model.schema import read_varint, varint
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats, Ints
 
 BASES = 1  # the kind of model
 MAX_BASES = 16
@@ -43,8 +40,7 @@ class Basis:
     @property
     def vectors(self) -> Floats:
         """(n_vectors, n_points), exact."""
-        vectors: Floats = np.ldexp(self.entries.astype(np.float64), -self.shifts[:, None])
-        return vectors
+        return np.ldexp(self.entries.astype(np.float64), -self.shifts[:, None])
 
 
 def round_vectors(vectors: Floats, shift: int | Sequence[int] | Ints = FINE) -> Basis:

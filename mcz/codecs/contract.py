@@ -11,15 +11,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mcz.codecs.parameters import TARGETS, Dial, Parameter
 from mcz.errors import FormatError, OptionError
 from mcz.model.motion import Skeleton
 from mcz.model.numbers import Grid
 from mcz.model.schema import varint
-from mcz.model.types import Params, Settings, Values
+from mcz.model.types import Bools, Floats, Ints, Params, Settings, Values
 
 Domain = Literal["ordinals", "values"]
 Grouping = Literal["all", "joint", "channel"]
@@ -117,7 +114,7 @@ class SignalSource(Protocol):
     layout: Layout
     breaks: Sequence[int]  # frames at which a segment of an ordinals codec must begin
 
-    def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
+    def ordinals(self, start: int, stop: int) -> Ints:
         """Grid ordinals of frames start <= f < stop, (rows, n_channels)."""
         ...
 
@@ -125,11 +122,11 @@ class SignalSource(Protocol):
         """The grids in force at a frame."""
         ...
 
-    def values(self, start: int, stop: int) -> NDArray[np.float64]:
+    def values(self, start: int, stop: int) -> Floats:
         """Values of these frames in source units, (rows, n_channels)."""
         ...
 
-    def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
+    def valid(self, start: int, stop: int) -> Bools | None:
         """Mask of the valid values, None if all are valid."""
         ...
 
@@ -212,9 +209,7 @@ class LiveEncoder(Protocol):
     preset: int = 0
     is_reference: bool = False  # the last frame does not need the one before
 
-    def push(
-        self, values: NDArray[np.float64], valid: NDArray[np.bool_] | None = None
-    ) -> tuple[bytes, bool]:
+    def push(self, values: Floats, valid: Bools | None = None) -> tuple[bytes, bool]:
         """Encode the next frame, (n_channels,): its stream, and True if its segment is fresh."""
         ...
 
@@ -239,7 +234,7 @@ class LiveDecoder(Protocol):
     A frame that needs a lost one raises LostFrameError; frames that need none still decode.
     """
 
-    def push(self, stream: bytes, fresh: bool) -> NDArray[np.float64]:
+    def push(self, stream: bytes, fresh: bool) -> Floats:
         """Decode the next frame, (n_channels,)."""
         ...
 
@@ -263,7 +258,7 @@ Exact = Callable[[bytes, Layout], tuple[int, ...]]
 
 # (header, layout, spans) -> the stored frames, ascending, that the coarsest resolution alone
 # decodes exactly
-Preview = Callable[[bytes, Layout, Sequence[Span]], NDArray[np.int64]]
+Preview = Callable[[bytes, Layout, Sequence[Span]], Ints]
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,12 +329,31 @@ class Codec:
         shown = {name: known[name].recorded_value(value) for name, value in options.items()}
         return {name: value for name, value in shown.items() if not known[name].inner}
 
+    @property
+    def all_parameters(self) -> tuple[Parameter, ...]:
+        """Parameters, plus the targets if there is a dial."""
+        return (*self.parameters, *(TARGETS if self.dial else ()))
+
+    def document(self) -> Settings:
+        """Entry of ``mcz codecs --json``; its keys are stable."""
+        return {
+            "name": self.name,
+            "id": self.id,
+            "preset": self.preset,
+            "version": self.version,
+            "lossless": self.lossless,
+            "positions": self.positions,
+            "live": self.live is not None,
+            "quality": self.dial.parameter if self.dial else None,
+            "parameters": [p.document() for p in self.all_parameters if not p.inner],
+        }
+
     def options(self, given: Params, *, inner: bool = False) -> Settings:
         """Return all parameters, given ones parsed; raises OptionError for an unknown or bad one.
 
         ``inner`` permits parameters that only a search sets.
         """
-        known = {p.name: p for p in (*self.parameters, *(TARGETS if self.dial else ()))}
+        known = {parameter.name: parameter for parameter in self.all_parameters}
         listed = [name for name, parameter in known.items() if inner or not parameter.inner]
         unknown = sorted(set(given) - set(listed))
         if unknown:

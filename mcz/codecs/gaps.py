@@ -5,14 +5,12 @@ from __future__ import annotations
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout, SignalSource
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import MotionError
 from mcz.kinematics.angles import Unwrapper
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Bools, Floats
 
 
 class FrameReader:
@@ -77,7 +75,7 @@ class LiveRows:
         self._last = np.full(layout.n_channels, np.nan)
         self._next = self._unwrapper, self._last
 
-    def row(self, values: Floats, valid: NDArray[np.bool_] | None, at: int) -> Floats:
+    def row(self, values: Floats, valid: Bools | None, at: int) -> Floats:
         """Unwrap frame ``at``, (1, n_channels); raises MotionError for a value not finite."""
         row = np.asarray(values, np.float64)[None]
         known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
@@ -93,7 +91,7 @@ class LiveRows:
         self._unwrapper, self._last = self._next
 
 
-def fill_gaps(values: Floats, valid: NDArray[np.bool_], before: Floats) -> Floats:
+def fill_gaps(values: Floats, valid: Bools, before: Floats) -> Floats:
     """Interpolate ``values`` (n_rows, n_channels) linearly where they are not ``valid``.
 
     A gap that reaches the end holds the last value; one at the start begins at ``before``.

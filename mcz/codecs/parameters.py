@@ -1,19 +1,23 @@
-"""Parameters of codecs: their parsers, defaults, targets and presets."""
+"""Parameters of codecs: their parsers, defaults, targets and presets; step codes."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.model.arguments import choice as choice
-from mcz.model.arguments import in_range as in_range
-from mcz.model.arguments import integer as integer
-from mcz.model.arguments import number as number
+from mcz.model.checks import choice as choice
+from mcz.model.checks import in_range as in_range
+from mcz.model.checks import integer as integer
+from mcz.model.checks import number as number
 from mcz.model.types import Params, Settings
 
 MAX_DECIMALS = 15
 SCALED = 255  # in place of decimals: there are steps
+MIDDLE_CODE = 128  # the step code of 1
+DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the clip decides
 
 Presets = Mapping[str, Params]
 
@@ -41,6 +45,13 @@ class Parameter:
     def range(self) -> str:
         """Range in words; "" if ``parse`` states none."""
         return str(getattr(self.parse, "range", ""))
+
+    def document(self) -> Settings:
+        """Name, default, range and meaning, as JSON has them."""
+        match = DEFAULT_IN_HELP.fullmatch(self.help)
+        decided, meaning = (match[2], match[1]) if match else (None, self.help)
+        default = decided if self.default is None else self.default
+        return {"name": self.name, "default": default, "range": self.range, "meaning": meaning}
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,3 +132,21 @@ def preset_values(presets: Presets, params: Params) -> Settings:
     """Values of a preset, each replaced by the caller's where given."""
     values = presets[params["preset"]].items()
     return {name: value if params[name] is None else params[name] for name, value in values}
+
+
+def ratio_of(code: int) -> float:
+    """Step of a step code, about 2^((code - 128) / 4). SPEC.md, "Steps and scales"."""
+    return math.ldexp(4 + code % 4, code // 4 - 34)
+
+
+def code_of(ratio: float) -> int:
+    """The step code nearest to a ratio."""
+    if ratio <= 0:
+        return 0
+    if ratio == math.inf:
+        return 255
+    guess = int(4 * math.log2(ratio)) + MIDDLE_CODE
+    near = range(max(0, guess - 2), min(255, guess + 3) + 1)
+    return min(
+        near, key=lambda c: abs(math.log(ratio_of(c) / ratio)), default=0 if guess < 0 else 255
+    )

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
     Codec,
@@ -27,7 +26,7 @@ from mcz.codecs.contract import (
 from mcz.codecs.parameters import Parameter, integer
 from mcz.codecs.segments import Sizing, gather, segments_by_guess
 from mcz.errors import FormatError
-from mcz.model.types import Params
+from mcz.model.types import Ints, Params
 
 MAX_ROWS = 2**20
 SIZING = Sizing(target=58_000, most=62_000, value_bytes=4, most_rows=MAX_ROWS)
@@ -45,7 +44,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     return Encoded(b"", segments_by_guess(source, params["segment_frames"], SIZING, prepare))
 
 
-def _build(ordinals: NDArray[np.int64]) -> bytes:
+def _build(ordinals: Ints) -> bytes:
     """One stream: ``ordinals`` of one group, (rows, channels)."""
     parts = []
     for column in ordinals.T:
@@ -67,18 +66,18 @@ def recode(asked: RecodeRequest) -> Iterator[tuple[bytes, ...]]:
 
 def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
-) -> NDArray[np.int64]:
+) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("raw", header, layout)
 
-    def rows(index: int, group: int) -> NDArray[np.int64]:
+    def rows(index: int, group: int) -> Ints:
         n_rows = spans[index].n_frames * layout.samples_per_frame
         return _parse(fetch(index, 0, group), n_rows, len(layout.groups[group]))
 
     return gather(layout, spans, request, rows)
 
 
-def _parse(stream: bytes, n_rows: int, n_channels: int) -> NDArray[np.int64]:
+def _parse(stream: bytes, n_rows: int, n_channels: int) -> Ints:
     """The ordinals of one stream, (n_rows, n_channels)."""
     columns, at = [], 0
     for channel in range(n_channels):

@@ -9,12 +9,12 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.parameters import Parameter, integer
 from mcz.errors import MotionError
 from mcz.model.motion import Skeleton
+from mcz.model.types import Floats, Ints
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
@@ -206,8 +206,8 @@ def gather(
     layout: Layout,
     spans: Sequence[Span],
     request: Request,
-    decode_group: Callable[[int, int], NDArray[np.int64]],
-) -> NDArray[np.int64]:
+    decode_group: Callable[[int, int], Ints],
+) -> Ints:
     """Gather the requested rows and groups of a codec whose segments do not overlap.
 
     ``decode_group(segment, group)`` returns all rows of one group in one segment.
@@ -229,7 +229,7 @@ def gather(
     return out
 
 
-def sample(source: SignalSource, most: int) -> NDArray[np.float64]:
+def sample(source: SignalSource, most: int) -> Floats:
     """Sample at most ``most`` frames of a signal, evenly spread; invalid values are NaN."""
     layout = source.layout
     rows = [np.zeros((0, layout.n_channels))]

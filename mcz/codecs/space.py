@@ -11,18 +11,15 @@ from functools import partial
 
 import numpy as np
 from construct import Float64l, If, Int8ul, this
-from numpy.typing import NDArray
 
 from mcz.codecs.basis_models import MAX_POINTS, Basis, Head, find_bases
 from mcz.codecs.coding.space_kernels import Transform
 from mcz.codecs.contract import ID_SIZE, Layout, Span
-from mcz.codecs.step_codes import ratio_of
+from mcz.codecs.parameters import ratio_of
 from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import FormatError
 from mcz.model.schema import Checked, Exactly, Record, bounded, counted, field, one_of
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats, Ints
 
 APART, WEIGHTED, MEAN, COURSES = 1, 2, 4, 8  # flags
 COSINES, LEARNED = 0, 1  # basis

@@ -13,7 +13,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.basis_models import (
     MAX_POINTS,
@@ -28,7 +27,7 @@ from mcz.codecs.basis_models import (
 from mcz.codecs.channel_weights import RULES, weights_of
 from mcz.codecs.contract import Layout, Model, SignalSource, model_id
 from mcz.codecs.gaps import fill_gaps
-from mcz.codecs.parameters import Parameter, choice, in_range, integer, number
+from mcz.codecs.parameters import Parameter, choice, code_of, in_range, integer, number, ratio_of
 from mcz.codecs.segments import skeleton_of
 from mcz.codecs.space import (
     APART,
@@ -39,7 +38,6 @@ from mcz.codecs.space import (
     SpaceFields,
     columns_of,
 )
-from mcz.codecs.step_codes import code_of, ratio_of
 from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import (
     AccessError,
@@ -49,8 +47,7 @@ from mcz.errors import (
 )
 from mcz.kinematics.angles import Unwrapper
 from mcz.model.motion import POSITION_KINDS, Skeleton
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats
 
 DEFAULT_SHARE = 1 / 100  # of the spread of a clip's points: the step where none is given
 DEFAULT_DEGREES = 0.2  # of channels: the step for a rotation of average effect

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mcz.codecs.contract import SignalSource
 from mcz.model.motion import Joint, Skeleton
 from mcz.model.numbers import Grid
+from mcz.model.types import Bools, Floats, Ints
 
 Item = TypeVar("Item", bound=np.generic)
 Read = Callable[[int, int], NDArray[Item]]  # frames first <= f < stop
@@ -40,17 +41,17 @@ class SubsetSource:
         )
         self.breaks = source.breaks
 
-    def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
+    def ordinals(self, start: int, stop: int) -> Ints:
         return self._read_columns(self._source.ordinals, start, stop)
 
     def grids(self, frame: int) -> tuple[Grid, ...]:
         grids = self._source.grids(frame)
         return tuple(grids[column] for column in self._columns)
 
-    def values(self, start: int, stop: int) -> NDArray[np.float64]:
+    def values(self, start: int, stop: int) -> Floats:
         return self._read_columns(self._source.values, start, stop)
 
-    def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
+    def valid(self, start: int, stop: int) -> Bools | None:
         if self._source.valid(0, 0) is None:
             return None
         return self._read_columns(cast("Read[np.bool_]", self._source.valid), start, stop)

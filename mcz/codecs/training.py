@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.basis_models import build_bases
 from mcz.codecs.gaps import fill_gaps
@@ -20,9 +19,8 @@ from mcz.errors import MotionError, OptionError
 from mcz.kinematics import point_names, positions
 from mcz.model.motion import Motion
 from mcz.model.skeleton import column_of
-from mcz.model.types import JsonObject
+from mcz.model.types import Floats, JsonObject
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
 KINDS = ("frames", "steps", "windows")
@@ -276,8 +274,7 @@ class Trained:
     def left_out(self, found: Learned) -> Floats:
         """Rms residual of a point with the start and after each iteration, in units."""
         size = max(1, self.n_vectors * len(self.source.names))
-        rms: Floats = np.sqrt(found.objective / size)
-        return rms
+        return np.sqrt(found.objective / size)
 
     def document(self) -> JsonObject:
         """For JSON and people; ``left_out`` is rms, at the start and after each iteration."""

@@ -17,7 +17,7 @@ from mcz.container.chunks import Chunk, ChunkType
 from mcz.container.directory import AttachmentRow
 from mcz.container.limits import LARGE, Profile, check, check_decoded
 from mcz.errors import ChecksumError, FormatError
-from mcz.model.annexes import annex_bytes
+from mcz.model.extras import annex_bytes
 from mcz.model.schema import EXTENDED, TEXT, UVARINT, Record, build, deflate, field, inflate, parse
 
 PACKED = 2  # bit 1 of the flags of SKEL

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 UNITS: dict[str, tuple[str, ...]] = {
     "fast": (
-        "mcz.codecs.coding.fast.column_kernels",
         "mcz.codecs.coding.fast.head_kernels",
         "mcz.codecs.coding.fast.lane_kernels",
         "mcz.codecs.coding.fast.parent_kernels",
@@ -16,40 +15,33 @@ UNITS: dict[str, tuple[str, ...]] = {
     ),
     "best": (
         "mcz.codecs.coding.mixing",
-        "mcz.codecs.table_kernels",
         "mcz.codecs.lossless.best_kernels",
+        "mcz.codecs.table_kernels",
     ),
     "numbers": (
         "mcz.codecs.coding.forms.product_kernels",
-        "mcz.sources.text.text_kernels",
         "mcz.model.numbers.kernels",
-        "mcz.model.numbers.ordinal_kernels",
         "mcz.model.numbers.print_kernels",
         "mcz.model.numbers.survey_kernels",
         "mcz.model.numbers.value_kernels",
+        "mcz.sources.text.text_kernels",
     ),
     "curves": (
-        "mcz.codecs.curves.fit_kernels",
         "mcz.codecs.curves.kernels",
         "mcz.codecs.pca.kernels",
     ),
     "online": ("mcz.codecs.online.kernels",),
     "spatial": (
-        "mcz.codecs.spatial.lsdt_frame_kernels",
         "mcz.codecs.spatial.prefix_kernels",
-        "mcz.codecs.spatial.window_kernels",
+        "mcz.codecs.spatial.kernels",
         "mcz.codecs.transforms.lsdt_kernels",
     ),
     "wavelets": (
-        "mcz.codecs.wavelet.awt_kernels",
+        "mcz.codecs.transforms.wavelet_kernels",
         "mcz.codecs.wavelet.kernels",
-        "mcz.codecs.transforms.dwt_kernels",
-        "mcz.codecs.transforms.lifting_kernels",
     ),
     "metric": (
-        "mcz.codecs.posewave.apply_kernels",
         "mcz.codecs.posewave.contact_kernels",
-        "mcz.codecs.posewave.course_kernels",
         "mcz.codecs.posewave.metric_kernels",
         "mcz.codecs.posewave.order_kernels",
     ),
@@ -59,10 +51,10 @@ UNITS: dict[str, tuple[str, ...]] = {
         "mcz.codecs.posewave.model_kernels",
     ),
     "motion": (
+        "mcz.codecs.transforms.post_filter_kernels",
+        "mcz.container.recovery.kernels",
         "mcz.exchange.conversion.scenes.key_kernels",
         "mcz.kinematics.frame_kernels",
-        "mcz.container.recovery.kernels",
-        "mcz.codecs.transforms.post_filter_kernels",
     ),
 }
 UNIT_OF = {module: unit for unit, modules in UNITS.items() for module in modules}

@@ -1,7 +1,8 @@
-"""Unwrapping of angles and rotations along time.
+"""Unwrapping of angles, rotation vectors and quaternions along time.
 
 SPEC.md, "Unwrapping", is normative. An ``Unwrapper`` goes through a signal block by block; the
-result does not depend on where the blocks end.
+result does not depend on where the blocks end. v and v (1 + 2 pi n / |v|) turn alike, and so do q
+and -q: metrics take the nearest.
 """
 
 from __future__ import annotations
@@ -11,24 +12,23 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.model.motion import ROTATION_KINDS, Channel, Skeleton
-from mcz.model.whole_turns import Columns, SignKeeper, VectorFollower, quaternions_of, vectors_of
+from mcz.model.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Channel, Skeleton
+from mcz.model.skeleton import first_columns
+from mcz.model.types import Bools, Floats, Ints
 
 FULL_TURN = {"deg": 360.0, "rad": 2 * math.pi}
 # A value of this magnitude or more takes no part. Below it every count of turns, and its product
 # with 360, is exact.
-BEYOND = 2.0**40
 
 
-def rotation_columns(channels: Sequence[Channel]) -> NDArray[np.int64]:
+def rotation_columns(channels: Sequence[Channel]) -> Ints:
     """The columns of rotation channels."""
     kinds = [channel.kind in ROTATION_KINDS for channel in channels]
     return np.flatnonzero(kinds).astype(np.int64)
 
 
-def turns(steps: NDArray[np.float64], full: float) -> NDArray[np.float64]:
+def turns(steps: Floats, full: float) -> Floats:
     """Whole turns in each step from row to row; exactly half a turn, either way, counts as none.
 
     >>> turns(np.array([180.0, 180.5, -180.0, -540.5]), 360.0)
@@ -53,7 +53,7 @@ class Unwrapper:
         self._begun = np.zeros(len(self._columns), np.bool_)  # whether there was one
         self._turns = np.zeros(len(self._columns))
         joints = skeleton if channels is None else Skeleton(())
-        self._followers: list[tuple[Columns, VectorFollower | SignKeeper]] = []
+        self._followers: list[tuple[Ints, VectorFollower | SignKeeper]] = []
         if self._full is not None:
             self._followers += [(c, VectorFollower(self._full)) for c in vectors_of(joints)]
         self._followers += [(c, SignKeeper()) for c in quaternions_of(joints)]
@@ -65,7 +65,7 @@ class Unwrapper:
         made._followers = [(columns, copy(follow)) for columns, follow in self._followers]
         return made
 
-    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, values: Floats) -> Floats:
         """The next rows, (n_rows, n_channels), as a new array; values that are NaN stay NaN."""
         out = np.array(values, dtype=np.float64)
         for columns, follow in self._followers:
@@ -85,7 +85,7 @@ class Unwrapper:
         out[:, self._columns] = np.where(part, block - self._full * counted[1:], block)
         return out
 
-    def _gapped(self, block: NDArray[np.float64], part: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def _gapped(self, block: Floats, part: Bools) -> Floats:
         """Steps from the last value that takes part to the next, 0 where one does not."""
         rows = np.where(part, np.arange(len(block))[:, None], -1)
         latest = np.maximum.accumulate(rows, axis=0)
@@ -99,16 +99,14 @@ class Unwrapper:
         return np.where(part, block, 0.0) - np.where(part, before, 0.0)
 
 
-def unwrap(
-    values: NDArray[np.float64], skeleton: Skeleton, channels: Sequence[Channel] | None = None
-) -> NDArray[np.float64]:
+def unwrap(values: Floats, skeleton: Skeleton, channels: Sequence[Channel] | None = None) -> Floats:
     """A whole signal, (n_rows, n_channels) in source units, unwrapped; a new array."""
     return Unwrapper(skeleton, channels)(values)
 
 
 def without_turns(
-    differences: NDArray[np.float64], skeleton: Skeleton, channels: Sequence[Channel] | None = None
-) -> NDArray[np.float64]:
+    differences: Floats, skeleton: Skeleton, channels: Sequence[Channel] | None = None
+) -> Floats:
     """Differences of two signals, (n_rows, n_channels), those of rotations less their whole turns.
 
     A new array; a difference of ``BEYOND`` or more is left as it is.
@@ -121,3 +119,117 @@ def without_turns(
         counted = turns(np.where(np.abs(block) < BEYOND, block, 0.0), full)
         out[:, columns] = block - full * counted
     return out
+
+
+BEYOND = 2.0**40  # a number of this magnitude or more takes no part
+
+
+def vectors_of(skeleton: Skeleton) -> list[Ints]:
+    """The columns of the rotation vector of every joint that has one."""
+    return _columns(skeleton, VECTOR_KINDS)
+
+
+def quaternions_of(skeleton: Skeleton) -> list[Ints]:
+    """The columns of the quaternion of every joint that has one."""
+    return _columns(skeleton, QUATERNION_KINDS)
+
+
+def _columns(skeleton: Skeleton, kinds: tuple[str, ...]) -> list[Ints]:
+    starts = skeleton.column_starts()
+    found = (
+        first_columns(joint.channels, kinds, start)
+        for joint, start in zip(skeleton.joints, starts, strict=False)
+    )
+    return [np.array(columns, np.int64) for columns in found if columns]
+
+
+class VectorFollower:
+    """Makes one rotation vector follow itself, block after block of rows."""
+
+    def __init__(self, full: float) -> None:
+        self._full = full
+        self._last: Floats | None = None
+
+    def __call__(self, vectors: Floats) -> Floats:
+        """The next rows, (n_rows, 3), each the nearest to the one before of those alike."""
+        rows = np.flatnonzero((np.abs(vectors) < BEYOND).all(axis=1))
+        if not len(rows):
+            return vectors
+        own = vectors[rows]
+        last = own[:1] if self._last is None else self._last[None]
+        counts = _turns(own, np.concatenate([last, own[:-1]]), self._full)[0]
+        if counts.any():  # rare: the rest goes row by row, for each depends on the one before
+            first = int(np.flatnonzero(counts)[0])
+            before = own[first - 1] if first else last[0]
+            for row in range(first, len(own)):
+                own[row] = before = nearest(own[row : row + 1], before[None], self._full)[0]
+            vectors = vectors.copy()
+            vectors[rows] = own
+        self._last = own[-1].copy()
+        return vectors
+
+
+class SignKeeper:
+    """Gives one quaternion the sign that keeps it near the one before, block after block."""
+
+    def __init__(self) -> None:
+        self._last: Floats | None = None
+
+    def __call__(self, quaternions: Floats) -> Floats:
+        """The next rows, (n_rows, 4)."""
+        rows = np.flatnonzero(np.isfinite(quaternions).all(axis=1))
+        if not len(rows):
+            return quaternions
+        own = quaternions[rows]
+        last = own[:1] if self._last is None else self._last[None]
+        dots = (own * np.concatenate([last, own[:-1]])).sum(axis=1)
+        signs = np.cumprod(np.where(dots < 0, -1.0, 1.0))
+        out = quaternions.copy()
+        out[rows] = own * signs[:, None]
+        self._last = out[rows[-1]].copy()
+        return out
+
+
+def nearest(vectors: Floats, wanted: Floats, full: float) -> Floats:
+    """Return the equivalent rotation vectors, (n, 3), nearest to ``wanted``."""
+    counts, axes = _turns(vectors, wanted, full)
+    return np.where(counts[:, None] == 0, vectors, vectors + (full * counts)[:, None] * axes)
+
+
+def _turns(vectors: Floats, wanted: Floats, full: float) -> tuple[Floats, Floats]:
+    """Whole turns from each vector to the nearest equivalent one, and their axes."""
+    sizes = np.sqrt((vectors * vectors).sum(axis=1))
+    others = np.sqrt((wanted * wanted).sum(axis=1))
+    zero = sizes == 0  # any axis is as good: that of what is wanted
+    lengths = np.where(zero, others, sizes)
+    axes = np.where(zero[:, None], wanted, vectors) / np.where(lengths == 0, 1.0, lengths)[:, None]
+    counts = np.rint(((wanted * axes).sum(axis=1) - sizes) / full)
+    return counts, axes
+
+
+def without_whole_turns(
+    original: Floats, decoded: Floats, differences: Floats, skeleton: Skeleton
+) -> Floats:
+    """``differences``, decoded minus original, those of vectors and quaternions the least alike.
+
+    All are (n_rows, n_channels); ``differences`` is written to and returned. Nothing is changed
+    where a number is not below 2^40 in magnitude.
+    """
+    full = {"deg": 360.0, "rad": 2 * math.pi}.get(skeleton.angle_unit, 0.0)
+    for columns in vectors_of(skeleton) if full else []:
+        rows = _known(original, decoded, columns)
+        wanted = original[np.ix_(rows, columns)]
+        differences[np.ix_(rows, columns)] = (
+            nearest(decoded[np.ix_(rows, columns)], wanted, full) - wanted
+        )
+    for columns in quaternions_of(skeleton):
+        rows = _known(original, decoded, columns)
+        one, other = original[np.ix_(rows, columns)], decoded[np.ix_(rows, columns)]
+        signs = np.where((one * other).sum(axis=1) < 0, -1.0, 1.0)
+        differences[np.ix_(rows, columns)] = other * signs[:, None] - one
+    return differences
+
+
+def _known(original: Floats, decoded: Floats, columns: Ints) -> Ints:
+    part = (np.abs(original[:, columns]) < BEYOND) & (np.abs(decoded[:, columns]) < BEYOND)
+    return np.flatnonzero(part.all(axis=1)).astype(np.int64)

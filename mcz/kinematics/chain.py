@@ -14,12 +14,12 @@ from functools import lru_cache
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
-from mcz.kinematics.rotation_vectors import (
+from mcz.kinematics.rotations import (
     matrices_of_quaternions,
     matrices_of_vectors,
+    rotate_axes,
     spins_of_vectors,
 )
 from mcz.model.motion import (
@@ -32,8 +32,7 @@ from mcz.model.motion import (
     Skeleton,
 )
 from mcz.model.skeleton import first_columns
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats as Floats
 
 SCALE_KINDS = ("sx", "sy", "sz")
 QUATERNION, VECTOR = 3, 4  # as an axis of ``Link.turns``
@@ -261,8 +260,7 @@ class Chain:
         scales = np.ones((3, columns.shape[1]))
         for component, column in link.scales:
             scales[component] = columns[column]
-        scaled: Floats = vector * scales
-        return scaled
+        return vector * scales
 
     def tail(self, joint: int, k: int, columns: Floats, pose: Pose) -> Floats:
         """The position of a tail of ``joint`` in the world, (3, F) or (3, 1)."""
@@ -335,27 +333,13 @@ def orientation(joint: Joint, radians: float) -> Floats | None:
     return matrix[:, :, 0]
 
 
-def rotate_axes(axes: Floats, axis: int, angle: Floats) -> Floats:
-    """``axes`` R, R the rotation by ``angle`` in radians, (F,), about axis 0, 1 or 2."""
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    cosine, sine = np.cos(angle), np.sin(angle)
-    result = np.empty((3, 3, len(angle) if axes.shape[2] == 1 else axes.shape[2]))
-    result[:, axis] = axes[:, axis]
-    np.multiply(axes[:, j], cosine, out=result[:, j])
-    result[:, j] += axes[:, k] * sine
-    np.multiply(axes[:, k], cosine, out=result[:, k])
-    result[:, k] -= axes[:, j] * sine
-    return result
-
-
 def multiply_matrices(left: Floats, right: Floats) -> Floats:
     """The products of matrices, (3, 3, F or 1) by (3, n, F or 1)."""
-    result: Floats = (
+    return (
         left[:, 0, None] * right[None, 0]
         + left[:, 1, None] * right[None, 1]
         + left[:, 2, None] * right[None, 2]
     )
-    return result
 
 
 def to_world(axes: Floats, vector: Floats) -> Floats:

@@ -11,18 +11,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
-from mcz.kinematics.chain import Floats
 from mcz.kinematics.joint_groups import find_feet
 from mcz.kinematics.points import first_points, positions_of
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.skeleton import column_of, signs_of
 from mcz.model.text_format import brief, counted
-
-Flags = NDArray[np.bool_]
+from mcz.model.types import Bools, Floats
 
 USUAL_RATE = 120.0  # frames a second where nobody says: that of CMU's AMC files
 AXES = "xyz"
@@ -86,7 +83,7 @@ class Contacts:
             if run.joint not in self.joints or not 0 <= run.first < last <= self.n_frames:
                 raise MotionError(f"{run} is not of {self.n_frames} frames of {self.joints}")
 
-    def frames(self, joint: str) -> Flags:
+    def frames(self, joint: str) -> Bools:
         """Contact state of ``joint`` in every frame, bool (n_frames,).
 
         Raises MotionError where that joint was not looked at.
@@ -213,7 +210,7 @@ def _means(points: Floats) -> Floats:
     with np.errstate(all="ignore"):
         means: Floats = points.sum(axis=1) / points.shape[1]
         if not np.isfinite(means).all():  # a search for what is unknown takes longer
-            known: Flags = np.asarray(np.isfinite(points).all(axis=2))
+            known: Bools = np.asarray(np.isfinite(points).all(axis=2))
             sums = np.where(known[..., None], points, 0.0).sum(axis=1)
             means = sums / known.sum(axis=1)[:, None]
     return means
@@ -221,7 +218,7 @@ def _means(points: Floats) -> Floats:
 
 def lowest_height(track: Floats, up: int, rule: ContactRule = RULE) -> float | None:
     """The height of a point at its lowest, None where it is never known."""
-    known: Flags = np.asarray(np.isfinite(track).all(axis=1))
+    known: Bools = np.asarray(np.isfinite(track).all(axis=1))
     return float(np.percentile(track[known, up], rule.floor)) if known.any() else None
 
 
@@ -234,7 +231,7 @@ def find_runs(
     column of the up axis, ``rate`` in frames a second, ``floor`` a ``lowest_height``; None: that of
     this track.
     """
-    known: Flags = np.asarray(np.isfinite(track).all(axis=1))
+    known: Bools = np.asarray(np.isfinite(track).all(axis=1))
     if not known.any():
         return
     with np.errstate(all="ignore"):  # what overflows does not stand
@@ -257,8 +254,8 @@ def speeds(track: Floats, rate: float, window: float) -> Floats:
     frames = np.arange(len(track))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(track) - 1)
     x, y, z = (track[after] - track[before]).T
-    speed: Floats = np.sqrt(x * x + y * y + z * z) * rate / (after - before)
-    return speed
+    result: Floats = np.sqrt(x * x + y * y + z * z) * rate / (after - before)
+    return result
 
 
 def frames_in(seconds: float, rate: float) -> int:
@@ -266,7 +263,7 @@ def frames_in(seconds: float, rate: float) -> int:
     return int(np.floor(seconds * rate + 0.5))
 
 
-def _join_runs(flags: Flags, known: Flags, gap: int) -> Iterator[tuple[int, int]]:
+def _join_runs(flags: Bools, known: Bools, gap: int) -> Iterator[tuple[int, int]]:
     """First frame and end of every run of ``flags``, runs with up to ``gap`` between them joined.
 
     What is between them must be ``known``.

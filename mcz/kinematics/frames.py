@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from mcz.kinematics.chain import IDENTITY, Chain, Floats, SkeletonKey
+from mcz.kinematics.chain import IDENTITY, Chain, SkeletonKey
 from mcz.kinematics.frame_kernels import (
     Joints,
     Points,
@@ -28,6 +28,7 @@ from mcz.kinematics.points import (
     positions_of,
 )
 from mcz.model.motion import Skeleton
+from mcz.model.types import Floats
 
 
 class FramePoses:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcz.kinematics.chain import Floats, Link, Pose, multiply_matrices
+from mcz.kinematics.chain import Link, Pose, multiply_matrices
 from mcz.kinematics.rotation_fit import set_turns
 from mcz.kinematics.targets import Targets
+from mcz.model.types import Floats
 
 FARTHER = 0.01  # the weight of what hangs on the next turning joint, where that is asked at all
 LINE = 1e-3  # second singular value, of the first: below it all lie on one line, the roll is open
@@ -179,8 +180,8 @@ class InitialPose:
         else:
             base = origin
         weighted = weights[:, None] * (b - base)
-        moment: Floats = np.einsum("nif,njf->ijf", weighted, a)
-        return moment
+        result: Floats = np.einsum("nif,njf->ijf", weighted, a)
+        return result
 
     def _move_joint(
         self,

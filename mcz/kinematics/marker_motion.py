@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.kinematics.points import point_names, point_set, points_and_markers_of, positions_of
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats
 
 NOTE = "positions by forward kinematics"  # begins the source-note of what was computed
 SEPARATOR = "; "

@@ -9,8 +9,9 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
-from mcz.kinematics.chain import Chain, Floats, Pose, chain_of, multiply_matrices
+from mcz.kinematics.chain import Chain, Pose, chain_of, multiply_matrices
 from mcz.model.motion import POSITION_KINDS, Joint, Motion, Skeleton
+from mcz.model.types import Floats
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
 SHELL_CM = (

@@ -6,10 +6,10 @@ import re
 from decimal import ROUND_HALF_UP, Decimal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.kinematics.joint_groups import find_feet
 from mcz.model.motion import POSITION_KINDS, Skeleton
+from mcz.model.types import Floats
 
 NO_LENGTHS = "no bone has a length"
 PEOPLE_CM = 80.0, 260.0  # from a small child to a tall person with arms stretched out
@@ -28,7 +28,7 @@ def has_no_lengths(skeleton: Skeleton) -> bool:
     return turned and not moved and not placed
 
 
-def rest_positions(skeleton: Skeleton) -> NDArray[np.float64]:
+def rest_positions(skeleton: Skeleton) -> Floats:
     """Positions of the joints at rest, float64 (n_joints, 3), in length units.
 
     Nothing is turned, moved or stretched: rotation and length channels are 0, scales are 1. A

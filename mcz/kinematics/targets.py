@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.kinematics.chain import Chain, Floats, Link, Pose, to_world
+from mcz.kinematics.chain import Chain, Link, Pose, to_world
 from mcz.kinematics.points import marker_distance, point_position, points_of, reach
 from mcz.model.motion import Skeleton
+from mcz.model.types import Floats, Ints
 
 TYPICAL_LEVER = 0.125  # of the reach: to turn by one radian counts as to move by so much
 
@@ -64,7 +64,7 @@ class Targets:
             units[link.angles + list(link.vector)] = 1.0 / (self.chain.radians * self.lever)
         return units
 
-    def _below(self) -> list[NDArray[np.int64]]:
+    def _below(self) -> list[Ints]:
         """Targets of every joint and of the joints below it."""
         below: list[list[int]] = [[] for _ in self.chain.links]
         for number, target in enumerate(self.list):
@@ -121,7 +121,7 @@ class Targets:
 
     def _stretches(
         self, joint: int, link: Link, columns: Floats, pose: Pose
-    ) -> Iterator[tuple[int, NDArray[np.int64], Floats]]:
+    ) -> Iterator[tuple[int, Ints, Floats]]:
         """Lengths and scales: channel, the targets that it moves, and how far."""
         if not link.lengths and not link.scales:
             return

@@ -19,10 +19,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.model.numbers import Grid, GridKind
 from mcz.model.skeleton import Channel
-from mcz.model.types import Values
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats, Ints, Values
 
 TIMES = "times"  # the role of a signal of times
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # units of a signal of times
@@ -123,8 +120,7 @@ class Timeline:
             steps = np.concatenate([self.steps, self.steps[-1:], [np.nan]])[: len(self.times)]
             lengths = np.where(np.isnan(steps), self.period or np.nan, steps)
         within = np.arange(per_frame) / per_frame
-        found: Floats = (self.times[:, None] + lengths[:, None] * within).ravel()
-        return found
+        return (self.times[:, None] + lengths[:, None] * within).ravel()
 
     def cut(self, frames: slice) -> Timeline:
         """The times of these frames, at the rate divided by the step of ``frames``."""

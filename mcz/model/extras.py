@@ -1,8 +1,12 @@
-"""Packages that not every installation has: imported on use, named where they are missing."""
+"""Optional packages, imported on use, and the annexes of SPEC.md.
+
+Annexes are in the folder ``annex`` of the package, to which ``conformance/annex`` is a link.
+"""
 
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 from mcz.errors import OptionError
@@ -20,3 +24,16 @@ def import_extra(name: str, extra: str, *, package: str = "", purpose: str = "")
     except ImportError as error:
         missing = f"{purpose} needs {package}, which is" if purpose else f"{package} is"
         raise OptionError(f"{missing} not installed (pip install 'mcz[{extra}]')") from error
+
+
+FOLDER = Path(__file__).parents[1] / "annex"
+
+
+def annex_bytes(name: str) -> bytes:
+    """The annex with this file name."""
+    return (FOLDER / name).read_bytes()
+
+
+def annex_names(pattern: str) -> list[str]:
+    """The file names that fit a pattern such as ``bases_*.bin``, sorted."""
+    return sorted(path.name for path in FOLDER.glob(pattern))

@@ -8,11 +8,11 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import OutOfRangeError
+from mcz.model.types import Ints
 
-Rows = int | range | NDArray[np.int64]
+Rows = int | range | Ints
 
 
 def row_numbers(key: Any, n_rows: int, noun: str) -> Rows:

@@ -12,7 +12,6 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OutOfRangeError
 from mcz.model import text_format
@@ -45,8 +44,8 @@ from mcz.model.clock import (
 )
 from mcz.model.indexing import row_numbers
 from mcz.model.notebook import html_of
-from mcz.model.numbers.blocks import grid_blocks as grid_blocks
-from mcz.model.numbers.exceptions import Exceptions as Exceptions
+from mcz.model.numbers.grid import grid_blocks as grid_blocks
+from mcz.model.numbers.scaling import Exceptions as Exceptions
 from mcz.model.signal import ROLES as ROLES
 from mcz.model.signal import Signal as Signal
 from mcz.model.signal import check_poses as check_poses
@@ -66,7 +65,7 @@ from mcz.model.skeleton import Vector as Vector
 from mcz.model.skeleton import joint_columns as joint_columns
 from mcz.model.source import FrameNotes as FrameNotes
 from mcz.model.source import Source as Source
-from mcz.model.types import Values
+from mcz.model.types import Floats, Ints, Values
 
 
 def frame_rate_of(rate: Any, name: str) -> Fraction:
@@ -114,7 +113,7 @@ class Motion:
     name: str = "motion"
     metadata: Mapping[str, str] = field(default_factory=dict)
     source: Source | None = None
-    frame_numbers: NDArray[np.int64] | None = None
+    frame_numbers: Ints | None = None
     number_step: int = 1
     first_time: float | None = None
 
@@ -234,7 +233,7 @@ class Motion:
             source=self.source and self.source.cut(start, stop),
         )
 
-    def with_values(self, values: NDArray[np.float64]) -> Motion:
+    def with_values(self, values: Floats) -> Motion:
         """The same motion with other values of its motion signal, same shape."""
         signal = replace(self.signals[0], values=np.asarray(values, dtype=np.float64))
         source = self.source and self.source.of_no_file()
@@ -251,7 +250,7 @@ class Motion:
         return timeline_of(counting, self.first_time, column)
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """The time of every frame in seconds, (n_frames,): see ``mcz.times``; OptionError."""
         return known_timeline(self.name, self.timeline).times
 

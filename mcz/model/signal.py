@@ -8,7 +8,6 @@ from operator import itemgetter
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.model import text_format
@@ -24,11 +23,10 @@ from mcz.model.checks import (
     several,
 )
 from mcz.model.numbers import Grid, GridKind, ordinals_of
-from mcz.model.numbers.blocks import grid_blocks
-from mcz.model.numbers.exceptions import Exceptions
-from mcz.model.numbers.scaling import Scaling
+from mcz.model.numbers.grid import grid_blocks
+from mcz.model.numbers.scaling import Exceptions, Scaling
 from mcz.model.skeleton import CHANNELS, Channel
-from mcz.model.types import Values
+from mcz.model.types import Bools, Ints, Values
 
 ROLES = (
     "",
@@ -110,11 +108,11 @@ class Signal:
     grids: tuple[Grid, ...] = ()
     name: str = "motion"
     samples_per_frame: int = 1
-    mask: NDArray[np.bool_] | None = None
+    mask: Bools | None = None
     exceptions: Exceptions = field(default_factory=Exceptions)
     grid_changes: tuple[tuple[int, int, Grid], ...] = ()
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
-    ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
+    ordinals: Ints | None = None  # on their grids; see ``to_ordinals``
     scaling: Scaling | None = None
     stored: Values = None  # type: ignore[assignment]  # set below where it is not given
     role: str | None = None
@@ -274,7 +272,7 @@ class Signal:
         stored = self.scaling.stored(self.values, self.stored)
         return replace(self, values=stored, stored=stored, scaling=None)
 
-    def to_ordinals(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def to_ordinals(self) -> tuple[Ints, Bools]:
         """The ordinal of every value, and whether it gives exactly this value back.
 
         A binary grid has many NaNs, of which ``values`` shows only that they are NaN: where

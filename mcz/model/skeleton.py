@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.model import text_format
@@ -25,6 +24,7 @@ from mcz.model.checks import (
     several,
 )
 from mcz.model.source import Source
+from mcz.model.types import Floats, Ints
 
 Vector = tuple[float, float, float]
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -120,7 +120,7 @@ def column_of(axis: str) -> int:
     return "xyz".index(axis[-1])
 
 
-def signs_of(axis: str) -> NDArray[np.float64]:
+def signs_of(axis: str) -> Floats:
     """Signs of x, y and z that make an axis positive, by half a turn about the one before it.
 
     >>> signs_of("z").tolist(), signs_of("-z").tolist()
@@ -207,12 +207,12 @@ class Skeleton:
         return sum(len(joint.channels) for joint in self.joints)
 
     @property
-    def parents(self) -> NDArray[np.int64]:
+    def parents(self) -> Ints:
         """The index of every joint's parent, int64 (n_joints,), -1 of a root."""
         return np.array([joint.parent for joint in self.joints], dtype=np.int64)
 
     @property
-    def offsets(self) -> NDArray[np.float64]:
+    def offsets(self) -> Floats:
         """From the parent's origin to each joint's own, float64 (n_joints, 3), in length units.
 
         They lie along axes that turn with the parent and are those of the world in the rest pose.

@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 
 from mcz.kernels.types import Items as Items
 
+Ints: TypeAlias = NDArray[np.int64]
+Floats: TypeAlias = NDArray[np.float64]
+Bools: TypeAlias = NDArray[np.bool_]
+
 Values: TypeAlias = NDArray[np.float64 | np.int64]
 """Values of a signal: binary64, or int64 where grids are of integers."""
 

@@ -15,8 +15,8 @@ from mcz.codecs.coding.fast import decoder
 from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
 from mcz.codecs.coding.forms import products
 from mcz.codecs.contract import Layout, Request, Span
-from mcz.codecs.lossless.best_streams import AS_FAST, code_plan
-from mcz.codecs.lossless.references import choose_references
+from mcz.codecs.lossless.best import AS_FAST, code_plan
+from mcz.codecs.lossless.echoes import choose_references
 from mcz.model.numbers import Grid, GridKind
 
 GRIDS = (

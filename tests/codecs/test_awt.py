@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs.contract import SignalSource
-from mcz.codecs.wavelet import awt_choices as choice
+from mcz.codecs.wavelet import awt as choice
 from mcz.codecs.wavelet.awt import CODEC
 from mcz.codecs.wavelet.wavelet import transform_of
 from mcz.files.writing.signal_source import MemorySource

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcz.codecs.contract import Layout
-from mcz.codecs.lossless.best_streams import ECHOED, build_stream
+from mcz.codecs.lossless.best import ECHOED, build_stream
 from mcz.codecs.lossless.echoes import find_echoes
 from tests.codecs.coders import BEST, GRIDS, encode_predicted
 from tests.motions import smooth

@@ -93,7 +93,7 @@ def test_a_basis_that_is_not_there_or_does_not_fit(tmp_path: Path) -> None:
 def test_a_window_decodes_without_the_others() -> None:
     coded = Direct("lsdt-clip", markers(100, 3), step=0.2, window=20)
     whole, data = coded.read(), coded.stream(0, 0, 0)
-    from mcz.codecs.spatial.window_streams import windows_of
+    from mcz.codecs.spatial.windows import windows_of
     from mcz.model.schema import varint
 
     parts = list(windows_of(data, 5, "test"))

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs.channel_weights import weights_of
-from mcz.codecs.step_codes import code_of, ratio_of
+from mcz.codecs.parameters import code_of, ratio_of
 from mcz.codecs.transforms import wavelets
 from mcz.codecs.wavelet.wavelet import WaveletHeader
 from mcz.kinematics.angles import unwrap

@@ -16,7 +16,7 @@ import mcz
 from mcz.codecs import codec_by_name
 from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs_of
 from mcz.codecs.posewave.contact_plan import Contacts, parse_contacts
-from mcz.codecs.posewave.contact_tracker import ContactTracker, Outcome, Piece
+from mcz.codecs.posewave.contacts import ContactTracker, Outcome, Piece
 from mcz.errors import ContactWarning, MotionError, OptionError
 from mcz.files.writing.signal_source import MemorySource
 from mcz.kinematics.points import first_points, positions_of

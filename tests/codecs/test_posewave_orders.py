@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mcz.codecs.posewave.choices import choose
+from mcz.codecs.posewave.choices import choose, choose_orders
 from mcz.codecs.posewave.header import parse_header
-from mcz.codecs.posewave.order_choices import choose_orders
 from mcz.codecs.posewave.orders import SEQUENCES, Orders
 from mcz.codecs.posewave.posewave import CODEC
 from mcz.codecs.posewave.segment import decode_segment, encode_segment

@@ -16,7 +16,7 @@ import pytest
 
 import mcz
 from mcz.codecs import CODECS
-from mcz.model.annexes import annex_bytes
+from mcz.model.extras import annex_bytes
 from mcz.show.viewing.embedding import TABLES, element, tables_for
 from mcz.show.viewing.page import page
 from tests.commands import run

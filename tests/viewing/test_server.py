@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import AccessError, FormatError, OptionError
-from mcz.model.annexes import annex_bytes
+from mcz.model.extras import annex_bytes
 from mcz.show.viewing import file_registry as shelf_module
 from mcz.show.viewing.file_registry import Shelf, put
 from mcz.show.viewing.page import Page, page
@@ -90,8 +90,8 @@ def test_annexes_are_given_and_nothing_else_of_the_disk(server: Server) -> None:
     assert ask(server, "annex/words.bin").body == annex_bytes("words.bin")
     for path in (
         "annex/",
-        "annex/../annexes.py",
-        "annex/..%2fannexes.py",
+        "annex/../extras.py",
+        "annex/..%2fextras.py",
         "annex//etc/passwd",
         "files/",
         "files/../api.json",

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
 from mcz.codecs.parameters import SCALED, preset_values
@@ -18,10 +17,7 @@ from mcz.codecs.segments import segment_frames_of
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, Skeleton
-from mcz.model.types import Params, Settings
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Bools, Floats, Ints, Params, Settings
 
 MAX_INDEX = 2**40
 LEAST_STEP = 2.0**-100
@@ -70,7 +66,7 @@ class Plan:
         return np.asarray(indices / per if per else indices * step, np.float64)
 
 
-def position_channels(layout: Layout) -> NDArray[np.bool_]:
+def position_channels(layout: Layout) -> Bools:
     """Mask of the channels that are lengths and use the position step."""
     if layout.skeleton is None:
         return np.zeros(layout.n_channels, np.bool_)

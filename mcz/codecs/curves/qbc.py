@@ -17,7 +17,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from construct import Float64l, If, Int8ul, this
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
     Codec,
@@ -70,10 +69,7 @@ from mcz.codecs.segments import (
 from mcz.codecs.subset_source import SubsetSource
 from mcz.errors import FormatError, OptionError
 from mcz.model.schema import UVARINT, Checked, Record, bounded, build, field, parse
-from mcz.model.types import Params
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats, Ints, Params
 
 MAX_DELTA = 2**20
 LEAST_FRAMES = 240  # of a segment: in fewer, hundreds of channels would cost more than they save
@@ -187,18 +183,18 @@ def marks_of(first: int, stop: int, n_frames: int, delta: int) -> Ints:
 
 def _joint_streams(points: Floats, marks: Ints, stop: int, plan: Plan) -> tuple[bytes, bytes]:
     """The two streams of a joint; ``marks`` counted from the segment's first frame."""
-    from mcz.codecs.curves import fit_kernels
+    from mcz.codecs.curves import kernels
 
     points = np.ascontiguousarray(points)
     rounded = plan.points(plan.indices(points)) if plan.closed else points
-    find = fit_kernels.breaks_of_fewest if plan.fewest else fit_kernels.breaks_by_splitting
+    find = kernels.breaks_of_fewest if plan.fewest else kernels.breaks_by_splitting
     is_break = np.zeros(len(points), np.bool_)
     is_break[marks] = True
-    rule = fit_kernels.Rule(plan.method, *plan.grid, int(plan.closed))
+    rule = kernels.Rule(plan.method, *plan.grid, int(plan.closed))
     find(points, rounded, marks, plan.limit, rule, is_break)
     breaks = np.flatnonzero(is_break)
     middles = np.zeros((len(breaks) - 1, points.shape[1]))
-    fit_kernels.middles(middles, points, rounded, breaks, plan.method)
+    kernels.middles(middles, points, rounded, breaks, plan.method)
     mids = plan.indices(middles)
     ends = plan.indices(points[breaks])
     mark_points = ends[np.searchsorted(breaks, marks)]

@@ -12,11 +12,9 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.start_states import start_states
-from mcz.codecs.coding.streams import bare_state, code, halves_of, scale_of, uncode
+from mcz.codecs.coding.streams import bare_state, code, halves_of, scale_of, start_states, uncode
 from mcz.errors import FormatError
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints
 
 MARKS, DETAILS = 0, 1  # the sets of the start table
 MAX_SCALE = 63

@@ -10,12 +10,25 @@ predicted from those before it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.fast.decoder import MOST_ROWS, Shape, check_size
+from mcz.codecs.coding.fast.decoder import (
+    MOST_ROWS,
+    SegmentDecoder,
+    Shape,
+    check_size,
+    read_segments,
+)
+from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
+from mcz.codecs.coding.fast.encoder import kernels as fast_kernels
+from mcz.codecs.coding.fast.lanes import fault_of
+from mcz.codecs.coding.forms.ids import WITH_UNIT
+from mcz.codecs.coding.streams import code, start_states, uncode
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -27,13 +40,26 @@ from mcz.codecs.contract import (
     Span,
     refuse_extras,
 )
-from mcz.codecs.lossless.best_streams import build_stream, read_stream
+from mcz.codecs.lossless.echoes import (
+    Echo,
+    build_echoes,
+    choose_references,
+    echo_table,
+    find_echoes,
+    read_echoes,
+)
 from mcz.codecs.segments import Sizing, gather, lossless_segment_frames, segments_by_guess
 from mcz.errors import FormatError
+from mcz.model.numbers import Grid
+from mcz.model.schema import varint
 from mcz.model.threads import in_force
-from mcz.model.types import Params
+from mcz.model.types import Ints, Params
 
-Ints = NDArray[np.int64]
+if TYPE_CHECKING:
+    from mcz.codecs.coding.fast.residual_kernels import Predictors
+    from mcz.codecs.coding.regression import Regressions
+    from mcz.codecs.lossless.best_kernels import Rests
+
 
 SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MOST_ROWS, spare=1, full=True)
 
@@ -89,3 +115,159 @@ CODEC = Codec(
     recode=recode,
     parameters=(lossless_segment_frames("57,000", MOST_ROWS),),
 )
+
+
+Words = NDArray[np.int32]
+Bytes = NDArray[np.uint8]
+
+AS_FAST, PREDICTED, ECHOED = range(3)  # method
+WORK, SPARE = 64, 1024  # references x rows that a byte pays for; bytes that are given
+
+
+@cache
+def kernels() -> tuple[ModuleType, ModuleType, ModuleType]:
+    """The compiled loops, imported on first use: of best, regressions, residuals of fast."""
+    from mcz.codecs.coding import regression
+    from mcz.codecs.coding.fast import residual_kernels
+    from mcz.codecs.lossless import best_kernels
+
+    return best_kernels, regression, residual_kernels
+
+
+def build_stream(ordinals: Ints, grids: tuple[Grid, ...], layout: Layout) -> bytes:
+    """Build the shortest stream; ``ordinals`` (rows, channels), ``grids`` in force."""
+    builder = StreamBuilder(layout.grids, layout.groups)
+    plan = builder.plan(ordinals, grids)
+    streams: list[bytes] = []
+    if len(plan.lanes.numbers):
+        own = kernels()[0]
+        leads = np.ascontiguousarray(plan.lanes.leads.T)
+        chosen = choose_references(leads, own.MOST_REFERENCES, own.MOST_IN_ALL)
+        echoes = _echoes_of(plan, leads)
+        for repeated in ([], echoes) if echoes else ([],):
+            stream = code_plan(plan, chosen, repeated)
+            if _work(chosen, len(leads)) <= WORK * (len(stream) + SPARE):
+                streams.append(stream)
+    # Last, because it changes the heads: it gives them parents.
+    streams.append(bytes((AS_FAST,)) + builder.write(plan)[0])
+    return min(streams, key=len)
+
+
+def _echoes_of(plan: Plan, leads: Words) -> list[Echo]:
+    """Find echoes in the lanes whose ordinals equal their leads and tails."""
+    _, tail, survey, *_ = fast_kernels()
+    numbers = plan.lanes.numbers
+    is_whole = plan.channels.plans[numbers, survey.LIMIT] < 0
+    is_usable = is_whole & (plan.lanes.lattices[:, tail.REST] < 0)
+    columns = plan.channels.numbers[numbers]
+    return find_echoes(plan.channels.ordinals[:, columns], leads, np.flatnonzero(is_usable))
+
+
+def _work(references: Sequence[Sequence[int]], n_rows: int) -> int:
+    return (len(references) + sum(map(len, references))) * n_rows
+
+
+def code_plan(plan: Plan, references: Sequence[Sequence[int]], echoes: Sequence[Echo]) -> bytes:
+    """The stream of method 1, or of method 2 where there are echoes, of at least one lane."""
+    own, _, residual = kernels()
+    head, tail, *_, write = fast_kernels()
+    coded, columns = plan.lanes, plan.channels.columns
+    n_lanes, n_rows = coded.leads.shape
+    table = echo_table(echoes, n_rows, n_lanes)
+    lanes = residual.predictors_of(n_lanes)
+    lanes.first[:], lanes.scales[:] = coded.leads[:, 0], coded.scales
+    taps = plan.channels.plans[coded.numbers, head.TAPS : head.TAPS + head.N_TAPS]
+    lanes.behind[:] = np.diff(taps, axis=1, prepend=0, append=0).T
+    leads = np.zeros((residual.BEHIND + n_rows, n_lanes), np.int32)
+    leads[residual.BEHIND :] = coded.leads.T
+    rests = own.Rests(np.zeros((n_rows, n_lanes), np.int32), coded.lattices[:, tail.REST].copy())
+    has_rests = rests.scales >= 0
+    rests.values[:, has_rests] = columns[coded.numbers[has_rests]].T
+    model = _Model(lanes, table, leads, rests)
+    for row, ones in zip(model.references, references, strict=True):
+        row[: 1 + len(ones)] = len(ones), *ones
+    bits = code(start_states("best")[0], 4 * leads.size + 1024, model.run, "best: a segment")
+    residuals = (build_echoes(echoes) if echoes else b"") + bits
+    room = np.empty(plan.most_bytes, np.uint8)
+    heads = room[: write.write_heads(plan.channels, 0, plan.fields, room)].tobytes()
+    tails = room[: own.write_tails(coded, columns, table, room)].tobytes()
+    method = bytes((ECHOED if echoes else PREDICTED,))
+    return b"".join((method, heads, varint(len(residuals)), residuals, tails))
+
+
+class _Model:
+    """The loops that a coder runs over a segment."""
+
+    def __init__(self, lanes: Predictors, echoes: Ints, leads: Words, rests: Rests) -> None:
+        self.lanes, self.echoes, self.leads, self.rests = lanes, echoes, leads, rests
+        n_lanes, most = leads.shape[1], kernels()[0].MOST_REFERENCES
+        self.references = np.zeros((n_lanes, 1 + most), np.int64)  # their number, then they
+        self.most_work: int | None = None  # of references x rows, for a decoder
+
+    def run(self, state: Ints, data: Bytes) -> bool:
+        """Code references, leads and rests in place; False where one of them has no code."""
+        own, _, residual = kernels()
+        total = own.code_references(state, data, self.references)
+        if total < 0:
+            return False
+        work = (len(self.references) + total) * (len(self.leads) - residual.BEHIND)
+        if self.most_work is not None and work > self.most_work:  # BEST-12
+            raise FormatError("best: more references than its bytes pay for")
+        args = state, data, self.lanes, self.references, self._regressions(), self.echoes
+        with np.errstate(all="ignore"):  # an estimate may be no number
+            return bool(own.code_leads(*args, self.leads, self.rests) < 0)
+
+    def _regressions(self) -> Regressions:
+        own, regression, _ = kernels()
+        sizes: list[int] = []
+        for n in self.references[:, 0].tolist():
+            sizes += own.n_linear(n), own.n_quadratic(n), own.N_BLENDED
+        result: Regressions = regression.regressions_of(sizes)
+        return result
+
+
+def read_stream(shape: Shape, stream: bytes, out: Ints) -> None:
+    """Fill ``out`` (rows, channels) with the ordinals of a segment; raises FormatError."""
+    if not stream or stream[0] > ECHOED:  # BEST-03
+        raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
+    decoder = SegmentDecoder(shape, (0,), lambda _: stream[1:], out)
+    if stream[0] == AS_FAST:
+        read_segments([decoder])
+        return
+    own, _, residual = kernels()
+    lanes = decoder.lanes
+    n_lanes = len(lanes.columns)
+    if n_lanes == 0:  # BEST-04
+        raise FormatError("best: no channel is coded, and yet the method is not 0")
+    if (lanes.predictors.parents >= 0).any():  # BEST-05
+        raise FormatError("best: a channel with a parent")
+    (start, stop), (tail, end) = lanes.residuals[0] // 8, lanes.tails[0]
+    bits = lanes.data[start:stop].tobytes()
+    rests = own.Rests(np.zeros((len(out), n_lanes), np.int32), lanes.lattices[:, own.REST].copy())
+    lanes.lattices[:, own.REST] = -1  # tails have none
+    echoes: list[Echo] = []
+    if stream[0] == ECHOED:
+        echoes, at = read_echoes(bits, len(out), (rests.scales < 0).tolist())
+        bits = bits[at:]
+    table = echo_table(echoes, len(out), n_lanes)
+    lanes.leads[:] = 0
+    model = _Model(lanes.predictors, table, lanes.leads, rests)
+    model.most_work = WORK * (len(stream) + SPARE)
+    start = start_states("best")[0]  # BEST-06
+    uncode(bits, start, model.run, "best: the residuals", whole=True)  # BEST-07
+    tails = own.Tails(lanes.data, np.array([tail]), np.array([end]), lanes.starts, lanes.columns)
+    leads = lanes.leads[residual.BEHIND :]
+    given = _exact_echoes(table, decoder)
+    fault = own.read_ordinals(tails, lanes.lattices, leads, given, decoder.rows)
+    if fault != -1:
+        raise fault_of("tails", "lane", fault)
+    for lane in np.flatnonzero(rests.scales >= 0).tolist():
+        decoder.rows[:, lanes.columns[lane]] = rests.values[:, lane]
+    decoder.finish()
+
+
+def _exact_echoes(table: Ints, decoder: SegmentDecoder) -> Ints:
+    """The places of ``table`` whose ordinals echoes give: in units an ordinal is its lead."""
+    head = fast_kernels()[0]
+    forms = decoder.heads.plans[decoder.lanes.columns, head.FORM]
+    return np.where(np.isin(forms, WITH_UNIT), 0, table)

@@ -13,7 +13,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.coding.fast.decoder import (
     MOST_ROWS,
@@ -36,9 +35,7 @@ from mcz.codecs.contract import (
     refuse_extras,
 )
 from mcz.codecs.segments import Sizing, lossless_segment_frames, segments_by_guess
-from mcz.model.types import Params
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints, Params
 
 USUAL_ROWS = 1024
 SIZING = Sizing(60_000, 63_000, value_bytes=1.5, most_rows=USUAL_ROWS, spare=1)

@@ -14,15 +14,13 @@ import numpy as np
 from construct import Int8ul
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import start_states
 from mcz.codecs.contract import Layout
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
 from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, Space, SpaceFields, space_of
 from mcz.errors import FormatError, LostFrameError, MotionError
 from mcz.model.schema import Record, field, one_of, parse
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats
 
 NAME = "online"
 N_KINDS = 2  # start tables of a coder: for LTRs that are intra coded, and others

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
     Codec,
@@ -40,15 +39,16 @@ from mcz.codecs.online.coder import (
     OnlineHeader,
     parse_header,
 )
-from mcz.codecs.online.options import (
+from mcz.codecs.online.rate_control import (
     CHANGEABLE,
     PARAMETERS,
     PRESET_IDS,
     choose_live_options,
     choose_options,
+    plan_of,
+    set_plan,
     settle_options,
 )
-from mcz.codecs.online.rate_control import plan_of, set_plan
 from mcz.codecs.online.units import Unit, build_units, parse_units
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import TARGET_BYTES
@@ -56,9 +56,7 @@ from mcz.codecs.space import SpaceFields, check, uses_of
 from mcz.codecs.space_choices import sample_of
 from mcz.errors import FormatError, OptionError
 from mcz.model.schema import build
-from mcz.model.types import Params, Settings
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Bools, Floats, Params, Settings
 
 SEGMENT_FRAMES = 1200  # at least, but for the last
 
@@ -221,7 +219,7 @@ class _LiveEncoder(LiveEncoder):
         self._writer = _Writer(self.header, resolved, chosen)
         self._rows = LiveRows(NAME, layout)
 
-    def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:
+    def push(self, values: Floats, valid: Bools | None = None) -> tuple[bytes, bool]:
         writer = self._writer
         unit = writer.code(self._rows.row(values, valid, writer.coder.at))
         self._rows.keep()
@@ -255,8 +253,8 @@ class _LiveDecoder:
         except FormatError:
             self._coder.skip(1)
             raise
-        values: Floats = self._coder.decode(unit)[0]
-        return values
+        result: Floats = self._coder.decode(unit)[0]
+        return result
 
     def skip(self, n_frames: int) -> None:
         self._coder.skip(n_frames)

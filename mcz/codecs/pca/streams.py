@@ -10,13 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.start_states import start_states
-from mcz.codecs.coding.streams import code, halves_of, scale_of, uncode
-from mcz.codecs.predictor_choice import choose_predictor
+from mcz.codecs.coding.streams import (
+    choose_predictor,
+    code,
+    halves_of,
+    scale_of,
+    start_states,
+    uncode,
+)
 from mcz.errors import FormatError, MotionError
 from mcz.model.schema import read_varint, varint
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints
 
 MAX_INDEX = 2**40
 MAX_SHIFT = 40

@@ -6,17 +6,17 @@ mcz/codecs/posewave/README.md describes it; a decoder needs none of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
+from mcz.codecs.parameters import code_of
 from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
 from mcz.codecs.posewave.contact_plan import ContactsFields
-from mcz.codecs.posewave.contact_tracker import ContactTracker
+from mcz.codecs.posewave.contacts import ContactTracker
 from mcz.codecs.posewave.exact_channels import partition
 from mcz.codecs.posewave.header import (
     MAX_FINE,
@@ -32,22 +32,18 @@ from mcz.codecs.posewave.header import (
     has_whole_turns,
     parse_header,
 )
-from mcz.codecs.posewave.order_choices import choose_orders
-from mcz.codecs.posewave.orders import N_NOTES, Orders
-from mcz.codecs.posewave.priors import number_of
+from mcz.codecs.posewave.model import number_of
+from mcz.codecs.posewave.orders import N_NOTES, N_ORDERS, Orders, columns_by_axis, own_sequence
 from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
-from mcz.codecs.step_codes import code_of
 from mcz.errors import MotionError, OptionError
 from mcz.hints import Hint
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
 from mcz.model.schema import parse
-from mcz.model.types import Params, Settings
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats, Params, Settings
 
 # What a preset promises: how far off a point may be in any frame, in cm.
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
@@ -347,3 +343,56 @@ def distortion(header: Header, skeleton: Skeleton, values: Floats, decoded: Floa
             mean = float(np.sqrt(np.sum(points * points, axis=0)).mean())
             away.append(mean * math.sqrt(header.weights[joint]))
     return float(np.mean(away)) if away else 0.0
+
+
+KEPT = 0  # among scores by code: the order of the source
+RUNS, RUN_FRAMES = 16, 128  # what is looked at of a long clip
+DUE = 0.985  # an order is taken where its score is less than this share of the source's
+STILL = 1e-4  # of a turn: a joint whose steps change by less keeps its order
+GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
+
+
+def choose_orders(source: SignalSource, exact: Container[int] = ()) -> dict[int, int]:
+    """Codes of orders by joint, of joints that are calmer in another than the source's.
+
+    Joints with ``exact`` channels keep that of the source.
+
+    Angles that jump or turn fast cost bytes: bits by the logarithms of their second differences,
+    of which roots are near enough.
+    """
+    skeleton = skeleton_of(NAME, source.layout)
+    joints = [
+        index
+        for index, joint in enumerate(skeleton.joints)
+        if own_sequence(joint, skeleton) is not None
+        and not any(channel in exact for channel in skeleton.columns(index))
+    ]
+    if not joints:
+        return {}
+    columns = np.array([columns_by_axis(skeleton, index) for index in joints])
+    scores, highest, n_rows = np.zeros((1 + N_ORDERS, len(joints))), np.zeros(len(joints)), 0
+    for values in _runs(source):
+        n_rows += len(values)
+        highest = np.maximum(highest, np.abs(values[:, columns]).max(axis=(0, 2), initial=0.0))
+        values = np.clip(values, -GREATEST, GREATEST)
+        for code in range(1 + N_ORDERS):
+            codes = dict.fromkeys(joints, code) if code != KEPT else {}
+            coded = Orders(codes, skeleton).to_coded_order(values)[:, columns]
+            scores[code] += np.sqrt(np.abs(np.diff(coded, 2, axis=0))).sum(axis=(0, 2))
+    full = Orders({}, skeleton).full
+    moves = (scores[KEPT] > np.sqrt(STILL * full) * n_rows) & (highest < GREATEST)
+    worth = moves & (scores.min(axis=0) < DUE * scores[KEPT])
+    best = np.where(worth, scores.argmin(axis=0), KEPT).tolist()
+    return {joint: code for joint, code in zip(joints, best, strict=True) if code != KEPT}
+
+
+def _runs(source: SignalSource) -> Iterator[Floats]:
+    """Runs of frames, evenly spread; the whole of a short clip."""
+    n_frames = source.layout.n_frames
+    starts, length = np.zeros(1, np.int64), n_frames
+    if n_frames > RUNS * RUN_FRAMES:
+        starts, length = np.linspace(0, n_frames - RUN_FRAMES, RUNS).astype(np.int64), RUN_FRAMES
+    for start in starts.tolist():
+        reader = FrameReader(NAME, source)
+        reader.at = start
+        yield reader.next(start + length)

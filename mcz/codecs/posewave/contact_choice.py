@@ -22,7 +22,7 @@ from mcz.codecs.posewave.contact_plan import (
     PointFields,
     path_of,
 )
-from mcz.codecs.posewave.contact_tracker import Piece
+from mcz.codecs.posewave.contacts import Piece
 from mcz.codecs.posewave.header import NAME
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import skeleton_of

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.posewave.apply_kernels import row_out_of
 from mcz.codecs.posewave.contact_plan import START_UNITS, HeldPoints
 from mcz.codecs.posewave.displacement_kernels import Track
-from mcz.codecs.posewave.metric_kernels import factor_rows
+from mcz.codecs.posewave.metric_kernels import factor_rows, row_out_of
 from mcz.codecs.posewave.pose_kernels import Lanes, place_joints
 from mcz.codecs.posewave.pose_kernels import lanes_of as lanes_of
 from mcz.codecs.posewave.skeleton_plan import Plan

@@ -10,7 +10,6 @@ from functools import cache
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.coding.fast.decoder import MOST_ROWS, MOST_VALUES, Shape, read_alone
 from mcz.codecs.coding.fast.encoder import StreamBuilder
@@ -21,9 +20,8 @@ from mcz.errors import FormatError, OptionError
 from mcz.kinematics.joint_groups import find_joints
 from mcz.model.motion import Skeleton
 from mcz.model.schema import parse
-from mcz.model.types import Params
+from mcz.model.types import Ints, Params
 
-Ints = NDArray[np.int64]
 Groups = tuple[tuple[int, ...], ...]
 Stream = Callable[[int, int, int], bytes]  # (segment, resolution, group)
 

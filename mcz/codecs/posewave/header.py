@@ -12,14 +12,12 @@ from typing import Any
 
 import numpy as np
 from construct import Float32l, Int8ul
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
+from mcz.codecs.parameters import code_of, ratio_of
 from mcz.codecs.posewave.contact_plan import Contacts, ContactsFields, parse_contacts
-from mcz.codecs.posewave.model import Start, start_tables
+from mcz.codecs.posewave.model import Prior, Start, priors, start_tables
 from mcz.codecs.posewave.orders import N_ORDERS, check_orders
-from mcz.codecs.posewave.priors import Prior, priors
-from mcz.codecs.step_codes import code_of, ratio_of
 from mcz.errors import FormatError
 from mcz.model.motion import (
     ANGLE_KINDS,
@@ -41,8 +39,7 @@ from mcz.model.schema import (
     parse,
 )
 from mcz.model.skeleton import first_columns
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Bools, Floats
 
 NAME = "posewave"
 MAX_LEVELS = 8
@@ -141,7 +138,7 @@ class Header:
     constant: Floats
     weights: Floats
     orders: Mapping[int, int]
-    exact: NDArray[np.bool_]
+    exact: Bools
     exact_groups: tuple[int, ...]
     contacts: Contacts | None = None
 
@@ -265,7 +262,7 @@ def _spread(octaves: int) -> float:
     return 2.0 ** (octaves - 10) if octaves else 0.0
 
 
-def _exact(groups: Sequence[int], layout: Layout) -> NDArray[np.bool_]:
+def _exact(groups: Sequence[int], layout: Layout) -> Bools:
     """Mask of the exact channels."""
     exact, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
     for before, group in pairwise([-1, *groups]):

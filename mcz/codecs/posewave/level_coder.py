@@ -1,4 +1,4 @@
-"""From rows in the metric to the values of a segment, level by level, coarse to fine.
+"""Levels of a segment: from rows in the metric to values, level by level, coarse to fine.
 
 SPEC.md, "Codec 3: posewave", is normative. Encoder and decoder go the same way: each level's rows
 are coded at the pose that a decoder has by then, so an encoder decodes what it has just coded.
@@ -13,17 +13,14 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.posewave.contact_plan import Contacts, HeldPoints, make_held_points
 from mcz.codecs.posewave.header import Header
-from mcz.codecs.posewave.metric import Metric
-from mcz.codecs.posewave.pyramid import Pyramid
+from mcz.codecs.posewave.skeleton_plan import bounded_regularization, make_plan
 from mcz.codecs.transforms import lifting
 from mcz.model.motion import Skeleton
+from mcz.model.types import Bools, Floats, Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Code = Callable[[int, Floats], Floats]  # (first row, rows wanted) -> rows as a decoder has them
 
 BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
@@ -31,16 +28,16 @@ BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
 
 @cache
 def kernels() -> ModuleType:
-    from mcz.codecs.posewave import course_kernels
+    from mcz.codecs.posewave import metric_kernels
 
-    return course_kernels
+    return metric_kernels
 
 
 def midpoints(approx: Floats, n_rows: int) -> Floats:
     """Midpoints of consecutive approximations: the poses of the details."""
     after = np.concatenate([approx[1:], approx[-1:]])
-    middle: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5  # PWAVE-22
-    return middle
+    result: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5  # PWAVE-22
+    return result
 
 
 class LevelCoder:
@@ -51,7 +48,7 @@ class LevelCoder:
         header: Header,
         skeleton: Skeleton,
         pyramid: Pyramid,
-        kept: NDArray[np.bool_],
+        kept: Bools,
         first: Floats,
     ) -> None:
         """``first`` (n_channels,) is the pose before the first; channels not ``kept`` keep it."""
@@ -130,8 +127,8 @@ class LevelCoder:
         if pyramid.depth(level) > pyramid.borrowing:  # PWAVE-22
             self.poses, self.level = midpoints(self.approx, n_rows), level
         self.metric = self._metric_of(level)
-        numbers: Ints = np.minimum(np.arange(n_rows) >> (level - self.level), len(self.poses) - 1)
-        return numbers
+        result: Ints = np.minimum(np.arange(n_rows) >> (level - self.level), len(self.poses) - 1)
+        return result
 
     def _add(self, level: int, which: Ints, rows: Floats, exponents: Ints) -> None:
         live = np.flatnonzero(rows.any(axis=1)) if rows.size else np.zeros(0, np.int64)
@@ -151,3 +148,98 @@ class LevelCoder:
                 self.metric.factors(self.poses[numbers]), rows[block], at.astype(np.int64)
             )
         return mapped
+
+
+ROOT_2 = 1.4142135623730951
+N_KINDS = 6  # of levels
+
+
+class Pyramid:
+    """Wavelet levels of a segment: level 0 are approximations, then details, finest last."""
+
+    def __init__(self, n_frames: int, levels: int, borrowing: int) -> None:
+        self.lengths = lifting.lengths(n_frames, levels)
+        self.n_details = len(self.lengths) - 1
+        self.borrowing = min(borrowing, max(self.n_details - 1, 0))
+
+    def depth(self, level: int) -> int:
+        """Number of halvings of a level: 1 for the finest details."""
+        return self.n_details if level == 0 else self.n_details + 1 - level
+
+    def kind(self, level: int) -> int:
+        """Kind of a level in the row model: 0 approximations, 5 the finest details."""
+        return 0 if level == 0 else max(1, N_KINDS - self.depth(level))
+
+    def rows(self, level: int) -> int:
+        lengths, depth = self.lengths, self.depth(level)
+        return lengths[-1] if level == 0 else lengths[depth - 1] // 2
+
+    def root(self, level: int) -> float:
+        """Root of the number of frames a coefficient affects, which weights all levels equally."""
+        octaves = self.depth(level) - (level > 0)
+        return float(2 ** (octaves // 2)) * (ROOT_2 if octaves % 2 else 1.0)
+
+    def exponents(self, level: int, refinement: Ints) -> Ints:
+        """The exponent of each row: the greatest that ``refinement`` asks of frames it bears on.
+
+        ``refinement`` (n_frames,).
+        """
+        reach = 1 << self.depth(level)
+        first = reach >> 1 if level else 0
+        padded = np.pad(refinement, reach)
+        greatest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+        result: Ints = greatest[first::reach][: self.rows(level)]
+        return result
+
+
+ALONE = np.zeros(1, np.int64)
+
+
+class Metric:
+    """Metric of the kept channels of a segment; its other channels are constant.
+
+    ``still`` (n_channels,) has their values.
+    """
+
+    def __init__(self, header: Header, skeleton: Skeleton, kept: Bools, still: Floats) -> None:
+        self.kept, self.still = np.flatnonzero(kept), still
+        ratios = header.step / header.greatest[kept]
+        self.regularization: Floats = ratios * ratios
+        self.plan = make_plan(
+            skeleton,
+            kept,
+            self.regularization,
+            radius=header.radius,
+            kappa=header.shell,
+            joint_weights=header.weights,
+            orders=header.orders,
+            whole=header.whole,
+        )._replace(spread=header.spread)
+
+    def with_stiffness(self, factor: float) -> Metric:
+        """Copy with ``factor`` times the diagonal terms of the greatest steps."""
+        clone = copy(self)
+        stiffer = bounded_regularization(self.regularization * factor)
+        clone.plan = self.plan._replace(regularization=stiffer)
+        return clone
+
+    def factors(self, poses: Floats) -> Floats:
+        """Factors of ``poses``, (n_poses, n_kept): (n_poses, n_entries)."""
+        values = np.repeat(self.still[None], len(poses), axis=0)
+        values[:, self.kept] = poses
+        result: Floats = kernels().factor(self.plan, values)
+        return result
+
+    def empty(self) -> Floats:
+        """Room for the factor of a single pose."""
+        return np.empty((1, self.plan.n_entries))
+
+    def to_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
+        """Differences of values, (n_rows, n_kept), in the metric, each at the pose ``which``."""
+        result: Floats = kernels().into_metric(self.plan, factors, rows, which)
+        return result
+
+    def from_metric(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
+        """The inverse of ``into``."""
+        result: Floats = kernels().out_of_metric(self.plan, factors, rows, which)
+        return result

@@ -5,17 +5,20 @@ channels above it in its block, and last 1 / root(D): G + regularization = L' D 
 values becomes y = root(D) L x, of which one step is one step of the points' mean squared error.
 
 Poses go through in batches of ``LANES``, see ``pose_kernels``. A single pose has a kernel of its
-own; both give the same bits. What a factor does to rows of values: ``apply_kernels``.
+own; both give the same bits. A course is the approximations of a segment, row after row, each at
+the pose of the one before.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from mcz.codecs.posewave.pose_kernels import Lanes, gather_inertia, lanes_of, place_joints
 from mcz.codecs.posewave.skeleton_plan import PLAIN, Plan
 from mcz.kernels import kernel
-from mcz.kernels.types import Floats, Floats2, Floats3
+from mcz.kernels.types import Floats, Floats2, Floats3, Ints
 
 LANES = 8
 GREATEST = 2.0**120  # of entries of the metric, whose products then stay finite
@@ -227,3 +230,138 @@ def inverse_root(value: float) -> float:
     for _ in (0, 1, 2, 3):
         estimate = estimate * (1.5 - 0.5 * value * estimate * estimate)
     return estimate * scale
+
+
+MEMORY = 0.97  # of what was learned, from row to row
+PRIOR, PRIOR_SHARE = 0.25, 0.5  # (PRIOR * greatest step)^2 times 4, and the share it stands for
+
+
+class Course(NamedTuple):
+    """Linear extrapolation state of the approximation rows.
+
+    ``pose`` (1, n_channels) is the last one, ``kept`` (n_kept,) are its columns that change. By
+    kept channel: ``expected`` is the next row, ``moved`` the last difference of rows, ``above`` and
+    ``below`` the products of neighboring differences and their squares. ``n_rows`` (1,).
+    """
+
+    pose: Floats2
+    kept: Ints
+    expected: Floats
+    moved: Floats
+    above: Floats
+    below: Floats
+    n_rows: Ints
+
+
+def course_of(still: Floats, kept: Ints, greatest: Floats) -> Course:
+    """Before the first row: ``still`` (n_channels,) is the pose, ``greatest`` (n_kept,) steps."""
+    scale = PRIOR * greatest
+    below = 4.0 * scale * scale
+    return Course(
+        pose=still[None].copy(),
+        kept=kept,
+        expected=still[kept],
+        moved=np.zeros(len(kept)),
+        above=PRIOR_SHARE * below,
+        below=below,
+        n_rows=np.zeros(1, np.int64),
+    )
+
+
+def continue_course(course: Course, difference: Floats) -> None:
+    """Advance by a row that is ``difference`` (n_kept,) away from the expected one."""
+    n_rows = course.n_rows[0]
+    for k in range(len(course.kept)):
+        c = course.kept[k]
+        value = course.expected[k] + difference[k]
+        moved = value - course.pose[0, c]
+        if n_rows >= 2:
+            course.above[k] = course.above[k] * MEMORY + moved * course.moved[k]
+            course.below[k] = course.below[k] * MEMORY + course.moved[k] * course.moved[k]
+        share = min(max(course.above[k] / course.below[k], 0.0), 1.0)
+        course.pose[0, c] = value  # PWAVE-21
+        course.expected[k] = value + (share * moved if n_rows >= 1 else 0.0)  # PWAVE-21
+        course.moved[k] = moved if n_rows >= 1 else 0.0
+    course.n_rows[0] = n_rows + 1
+
+
+@kernel
+def next_factor(plan: Plan, lanes: Lanes, course: Course, factor: Floats2) -> None:
+    """Fill ``factor`` (1, n_entries) at the last pose."""
+    factor_rows(plan, lanes, course.pose, factor, 1, 1)
+
+
+@kernel
+def take_row(plan: Plan, course: Course, factor: Floats2, row: Floats2) -> None:
+    """Go on by a row (1, n_kept) that is in the metric."""
+    difference = np.empty(len(course.kept))
+    row_out_of(plan, factor[0], row[0], difference)
+    continue_course(course, difference)
+
+
+@kernel
+def take_rows(plan: Plan, lanes: Lanes, course: Course, rows: Floats2, approx: Floats2) -> None:
+    """The approximations, (n_rows, n_kept), of rows in the metric."""
+    n_kept = len(course.kept)
+    factor, difference = np.empty((1, len(plan.path))), np.empty(n_kept)
+    for m in range(len(rows)):
+        factor_rows(plan, lanes, course.pose, factor, 1, 1)
+        row_out_of(plan, factor[0], rows[m], difference)
+        continue_course(course, difference)
+        for k in range(n_kept):
+            approx[m, k] = course.pose[0, course.kept[k]]
+
+
+GREATEST_VALUE = 2.0**100  # of what comes back
+
+
+def into_metric(plan: Plan, factors: Floats, rows: Floats, which: Ints) -> Floats:
+    """Rows of values, (n_rows, n_kept), in the metric: row n by the factor ``which[n]``."""
+    result = _room(plan, factors, rows)
+    rows_into(plan, factors, np.ascontiguousarray(rows), result, which)
+    return result
+
+
+def out_of_metric(plan: Plan, factors: Floats, rows: Floats, which: Ints) -> Floats:
+    """The inverse of ``into_metric``, which never comes to more than 2^100."""
+    result = _room(plan, factors, rows)
+    rows_out_of(plan, factors, np.ascontiguousarray(rows), result, which)
+    return result
+
+
+def _room(plan: Plan, factors: Floats, rows: Floats) -> Floats:
+    if rows.shape[1] != plan.n_kept or factors.shape[1] != plan.n_entries:
+        raise ValueError(f"rows of {rows.shape[1]} values for {plan.n_kept} channels")
+    return np.empty(rows.shape)
+
+
+@kernel
+def rows_into(plan: Plan, factors: Floats2, rows: Floats2, result: Floats2, which: Ints) -> None:
+    """Fill ``result`` (n_rows, n_kept): row n of ``rows`` in the metric of pose ``which[n]``.
+
+    ``factors`` (n_poses, n_entries).
+    """
+    for n in range(len(rows)):
+        factor, row = factors[which[n]], rows[n]
+        for c in range(len(plan.joints)):
+            last = plan.starts[c + 1] - 1
+            total = row[c]
+            for at in range(plan.starts[c], last):
+                total += factor[at] * row[plan.path[at]]
+            result[n, c] = total / factor[last]
+
+
+@kernel
+def rows_out_of(plan: Plan, factors: Floats2, rows: Floats2, result: Floats2, which: Ints) -> None:
+    """The inverse of ``rows_into``."""
+    for n in range(len(rows)):
+        row_out_of(plan, factors[which[n]], rows[n], result[n])
+
+
+def row_out_of(plan: Plan, factor: Floats, row: Floats, result: Floats) -> None:
+    for c in range(len(plan.joints)):
+        last = plan.starts[c + 1] - 1
+        total = row[c] * factor[last]
+        for at in range(plan.starts[c], last):
+            total -= factor[at] * result[plan.path[at]]
+        result[c] = min(max(total, -GREATEST_VALUE), GREATEST_VALUE)

@@ -1,6 +1,7 @@
-"""The model with which the levels of a clip are coded, as it starts.
+"""The model with which the levels of a clip are coded, as it starts, and its priors.
 
-SPEC.md, "Rows in the metric" and its annex, are normative.
+SPEC.md, "Rows in the metric" and its annexes, are normative. Priors tell how channels of well-known
+skeletons move together; ``tools/train_priors.py`` made them.
 """
 
 from __future__ import annotations
@@ -30,10 +31,9 @@ from mcz.codecs.posewave.model_state import (
     USUAL,
     Model,
 )
-from mcz.codecs.posewave.priors import SEEN, Prior
-from mcz.kernels.types import Floats, Ints
-from mcz.model.annexes import annex_bytes
-from mcz.model.types import Params
+from mcz.model.extras import annex_bytes
+from mcz.model.motion import Skeleton
+from mcz.model.types import Floats, Ints, JsonObject, Params
 
 N_SECOND = 33
 START_ENERGY = 500.0
@@ -104,8 +104,7 @@ def _bytes(lines: list[str]) -> Ints:
 
 def _digits(lines: list[str]) -> Ints:
     text = np.frombuffer("".join(lines).encode(), "u1").astype(np.int64)
-    digits: Ints = np.where(text < ord("a"), text - ord("0"), text - ord("a") + 10)
-    return digits
+    return np.where(text < ord("a"), text - ord("0"), text - ord("a") + 10)
 
 
 def wide_of(n_channels: int) -> int:
@@ -212,3 +211,59 @@ def cost_table() -> Ints:
     """4096 times the bits that an event of probability (k + 1/2) / 4096 takes: for encoders."""
     bits = [round(-4096 * math.log2((k + 0.5) / 4096)) for k in range(4096)]
     return np.array([*bits, 0], np.int64)
+
+
+SEEN = 25.0  # rows that a prior counts for
+UNITS = 64  # of a number of L
+VARIANCE_UNITS = 16
+
+
+class Prior(NamedTuple):
+    """L D L' of the rows of a skeleton.
+
+    ``lower`` (n, n) is L, of which what lies on and above the diagonal is 0; ``variances`` (n,).
+    """
+
+    lower: Floats
+    variances: Floats
+
+    def of(self, kept: Ints) -> Prior:
+        """Restrict it to some channels, ascending."""
+        return Prior(self.lower[np.ix_(kept, kept)], self.variances[kept])
+
+
+@cache
+def priors() -> tuple[Prior, ...]:
+    """The priors of the annex, read-only."""
+    return tuple(
+        _read("".join(table["lower"]), table["variances"]) for table in _document()["priors"]
+    )
+
+
+def number_of(skeleton: Skeleton) -> int:
+    """The number, from 1, of the prior that was trained on skeletons like this one; else 0."""
+    layout = layout_of(skeleton)
+    for number, table in enumerate(_document()["priors"], 1):
+        if layout == (table["parents"], table["channels"]):
+            return number
+    return 0
+
+
+def layout_of(skeleton: Skeleton) -> tuple[list[int], list[str]]:
+    """The parents and the kinds of channels of joints, by which a prior is chosen."""
+    joints = skeleton.joints
+    kinds = [" ".join(channel.kind for channel in joint.channels) for joint in joints]
+    return [joint.parent for joint in joints], kinds
+
+
+@cache
+def _document() -> JsonObject:
+    result: JsonObject = json.loads(annex_bytes("posewave_priors.json"))
+    return result
+
+
+def _read(digits: str, variances: list[int]) -> Prior:
+    n = len(variances)
+    lower = np.zeros((n, n))
+    lower[np.tril_indices(n, -1)] = np.frombuffer(bytes.fromhex(digits), np.int8) / UNITS
+    return Prior(lower, np.array(variances) / VARIANCE_UNITS)

@@ -48,21 +48,19 @@ from mcz.codecs.posewave.model_state import (
     Model,
 )
 from mcz.codecs.posewave.prediction_kernels import (
-    MEMORY,
-    learn_in_time,
-    predict_in_time,
-    spread,
-    take_in,
-)
-from mcz.codecs.posewave.size_kernels import (
     FOUND,
     LEAST_SIZE,
+    MEMORY,
     MOST_SIZE,
     ONE,
     TWO,
     gather_magnitudes,
+    learn_in_time,
     learn_sizes,
     log_of,
+    predict_in_time,
+    spread,
+    take_in,
 )
 from mcz.kernels import kernel
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2

@@ -13,16 +13,14 @@ from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.posewave.trigonometry import BEYOND, RULES
 from mcz.errors import FormatError, MotionError
 from mcz.kinematics.angles import FULL_TURN
 from mcz.model.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Joint, Skeleton
 from mcz.model.schema import read_varint, varint
+from mcz.model.types import Floats, Ints
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 AxisSequence = tuple[int, int, int]  # axes as their rotations are multiplied from the left
 
 SEQUENCES: tuple[AxisSequence, ...] = (

@@ -10,7 +10,6 @@ from functools import cache
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.model import (
@@ -22,9 +21,7 @@ from mcz.codecs.posewave.model import (
 )
 from mcz.codecs.posewave.model_state import N_SMALL
 from mcz.errors import FormatError, MotionError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Bools, Floats, Ints
 
 MOST_WANTED = 2.0**29
 CARRIED = 40.0  # rows at most that the coarser levels count for
@@ -97,7 +94,7 @@ class RowCoder:
         self,
         header: Header,
         classes: Ints,
-        kept: NDArray[np.bool_],
+        kept: Bools,
         coder: Ints,
         where: str,
     ) -> None:

@@ -1,30 +1,27 @@
 """Segments of ``posewave``: streams from frames, and back.
 
-SPEC.md, "Codec 3: posewave", is normative; ``level_coder.py`` goes from level to level.
+SPEC.md, "Codec 3: posewave", is normative; ``level_coder.py`` goes from level to level. Segments
+without levels may continue the state of the one before: "Segments that go on".
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.codecs.posewave.contact_tracker import ContactTracker
-from mcz.codecs.posewave.contacts import decode_contacts, room_of_contacts
+from mcz.codecs.posewave.contacts import ContactTracker, decode_contacts, room_of_contacts
 from mcz.codecs.posewave.header import NAME, Header
-from mcz.codecs.posewave.level_coder import LevelCoder
+from mcz.codecs.posewave.level_coder import LevelCoder, Pyramid
 from mcz.codecs.posewave.orders import Orders
-from mcz.codecs.posewave.pyramid import Pyramid
 from mcz.codecs.posewave.row_coder import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.transforms import lifting
 from mcz.errors import FormatError, MotionError
 from mcz.model.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Bools, Floats, Ints
 
 MOST_STILL = 4.0  # steps of constants: a channel that leaves its middle no farther is one
 MAX_NUMBER = 2.0**40  # of a first value
@@ -45,10 +42,10 @@ class Weights:
 class Head:
     """Changing channels of a segment, and the first value of every channel, in steps."""
 
-    moving: NDArray[np.bool_]
+    moving: Bools
     numbers: Ints
 
-    def kept(self, header: Header) -> NDArray[np.bool_]:
+    def kept(self, header: Header) -> Bools:
         """The channels that are coded in rows."""
         return self.moving & ~header.exact  # PWAVE-38
 
@@ -125,7 +122,7 @@ def encode_coded(
     return (streams[0], *empty, *streams[1:]), decoded
 
 
-def room_of(pyramid: Pyramid, level: int, kept: NDArray[np.bool_]) -> int:
+def room_of(pyramid: Pyramid, level: int, kept: Bools) -> int:
     """Buffer size in bytes for the stream of a level."""
     return 8 * len(kept) + pyramid.rows(level) * (8 * int(kept.sum()) + 1) + 1024
 
@@ -195,13 +192,13 @@ def classes_of(skeleton: Skeleton, whole: bool = False) -> Ints:
     return np.array(classes, np.int64)
 
 
-def choose_kept(header: Header, values: Floats) -> NDArray[np.bool_]:
+def choose_kept(header: Header, values: Floats) -> Bools:
     """All channels but exact ones and those that hardly leave their middle."""
-    moved: NDArray[np.bool_] = np.ptp(values, axis=0) > MOST_STILL * header.constant
+    moved: Bools = np.ptp(values, axis=0) > MOST_STILL * header.constant
     return moved & ~header.exact
 
 
-def choose_head(header: Header, values: Floats, kept: NDArray[np.bool_], approx: Floats) -> Head:
+def choose_head(header: Header, values: Floats, kept: Bools, approx: Floats) -> Head:
     """Kept channels begin near their first approximation, others stay in their middle.
 
     Exact ones, which the pose alone needs, do so in coarse steps.
@@ -213,3 +210,78 @@ def choose_head(header: Header, values: Floats, kept: NDArray[np.bool_], approx:
     if not (np.abs(numbers) < MAX_NUMBER).all():
         raise MotionError(f"{NAME}: a value exceeds 2^40 steps of {header.first.max():g}")
     return Head(moving, np.rint(numbers).astype(np.int64))
+
+
+class SegmentChain:
+    """State carried from segment to segment; after a refused one only a fresh one decodes."""
+
+    def __init__(self, header: Header, skeleton: Skeleton) -> None:
+        self.header, self.skeleton = header, skeleton
+        self._classes = classes_of(skeleton, header.whole)
+        self._kinds = kinds_of(skeleton, header.whole)
+        self._level_coder: LevelCoder | None = None  # None: nothing can go on
+        self._rows: RowCoder | None = None
+
+    def copy(self) -> SegmentChain:
+        """Return an independent copy."""
+        clone = copy(self)
+        if self._level_coder is not None and self._rows is not None:
+            clone._level_coder, clone._rows = self._level_coder.copy(), self._rows.copy()
+        return clone
+
+    def decode(self, stream: bytes, n_frames: int, where: str, *, fresh: bool) -> Floats:
+        """The values of a segment, (n_frames, n_channels); raises FormatError for bad bytes."""
+        if fresh:
+            coding = Stream(fresh_coder(self.header.start), 0, stream)
+            kept, numbers = np.zeros((2, len(self._classes)), np.int64)
+            code_head(coding, self._kinds, kept, numbers, where)
+            level_coder, rows = self._begin(Head(kept == 1, numbers), n_frames, coding)
+        else:
+            level_coder, rows = self._continued_state(where)
+            rows.go_on(n_frames, Stream(rows.model.coder, 0, stream))  # PWAVE-29
+        self._level_coder = None
+        rows.where = where
+        level_coder.take_coarsest(0, rows.decode(), rows.exponents)
+        self._level_coder, self._rows = level_coder, rows
+        return level_coder.values()
+
+    def encode(
+        self, values: Floats, weight: float, exponent: int, *, fresh: bool
+    ) -> tuple[bytes, Floats]:
+        """Encode a segment of unwrapped ``values``; return its stream and the decoded values.
+
+        Both are (n_frames, n_channels). A bit costs ``weight`` squared steps; the step is
+        2^-``exponent`` of the usual one. Raises MotionError for values that are too large.
+        """
+        n_frames = len(values)
+        if fresh:
+            head = choose_head(self.header, values, np.ones(values.shape[1], np.bool_), values)
+            coder = fresh_coder(self.header.start)
+            coding = Stream(coder, room_of(Pyramid(n_frames, 0, 0), 0, head.moving), None)
+            code_head(coding, self._kinds, head.moving.astype(np.int64), head.numbers.copy(), NAME)
+            level_coder, rows = self._begin(head, n_frames, coding)
+        else:
+            level_coder, rows = self._continued_state(NAME)
+            room = n_frames * (8 * rows.n_kept + 1) + 1024
+            rows.go_on(n_frames, Stream(rows.model.coder, room, None))
+        rows.exponents[:] = exponent
+
+        def code(first: int, wanted: Floats) -> Floats:
+            return rows.encode(weight, first, wanted)
+
+        level_coder.code_coarsest(0, code, values[:, level_coder.kept], rows.exponents)
+        self._level_coder, self._rows = level_coder, rows
+        return rows.stream.finish(), level_coder.values()
+
+    def _continued_state(self, where: str) -> tuple[LevelCoder, RowCoder]:
+        if self._level_coder is None or self._rows is None:  # DATA-11
+            raise FormatError("goes on from a segment that is not there", where=where)
+        return self._level_coder, self._rows
+
+    def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[LevelCoder, RowCoder]:
+        header = self.header
+        pyramid = Pyramid(n_frames, 0, 0)
+        level_coder = LevelCoder(header, self.skeleton, pyramid, head.moving, head.values(header))
+        rows = RowCoder(header, self._classes, head.moving, coding.coder, NAME)
+        rows.begin(0, pyramid.kind(0), n_frames, coding)
+        return level_coder, rows

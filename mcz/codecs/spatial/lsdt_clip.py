@@ -11,23 +11,10 @@ states). A window decodes by itself; its length is the delay.
 
 from __future__ import annotations
 
+from mcz.codecs import space_choices
 from mcz.codecs.contract import Encoded, SignalSource
 from mcz.codecs.parameters import preset_parameter, preset_values
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
-from mcz.codecs.space_choices import (
-    BASIS,
-    CODER,
-    DOMAIN,
-    STEP,
-    THRESHOLD,
-    THRESHOLD_PARAMETER,
-    VIRTUAL_MARKERS,
-    WINDOW,
-    choose_space,
-    cosines,
-    default_step,
-    sample_of,
-)
 from mcz.codecs.spatial import windows
 from mcz.codecs.spatial.windows import Plan
 from mcz.model.types import Params, Settings
@@ -35,7 +22,7 @@ from mcz.model.types import Params, Settings
 NAME = "lsdt-clip"
 
 PRESETS: dict[str, Settings] = {
-    "default": {"window": 240, "threshold": THRESHOLD, "coder": "mixed"},
+    "default": {"window": 240, "threshold": space_choices.THRESHOLD, "coder": "mixed"},
     "hou2016": {"window": 240, "threshold": 0.5, "coder": "prefix"},
 }
 
@@ -46,9 +33,9 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     Raises MotionError for a value that is not finite, or is too large.
     """
     chosen = preset_values(PRESETS, params)
-    sample = sample_of(NAME, source)
-    step = params["step"] or default_step(sample)
-    space = choose_space(NAME, sample, step, params["basis"], cosines)
+    sample = space_choices.sample_of(NAME, source)
+    step = params["step"] or space_choices.default_step(sample)
+    space = space_choices.choose_space(NAME, sample, step, params["basis"], space_choices.cosines)
     plan = Plan(
         chosen["window"],
         chosen["window"],
@@ -68,13 +55,13 @@ CODEC = windows.BITSTREAM(
     encode=encode,
     parameters=(
         preset_parameter(PRESETS),
-        STEP,
-        WINDOW,
-        THRESHOLD_PARAMETER,
-        BASIS,
-        CODER,
-        DOMAIN,
-        VIRTUAL_MARKERS,
+        space_choices.STEP,
+        space_choices.WINDOW,
+        space_choices.THRESHOLD_PARAMETER,
+        space_choices.BASIS,
+        space_choices.CODER,
+        space_choices.DOMAIN,
+        space_choices.VIRTUAL_MARKERS,
         SEGMENT_FRAMES_PARAMETER,
     ),
 )

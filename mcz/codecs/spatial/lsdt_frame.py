@@ -18,8 +18,8 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.start_states import start_states
-from mcz.codecs.coding.streams import code, uncode
+from mcz.codecs import space_choices
+from mcz.codecs.coding.streams import code, start_states, uncode
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -41,20 +41,6 @@ from mcz.codecs.segments import (
     segments_by_halving,
 )
 from mcz.codecs.space import COURSES, MEAN, SpaceFields, check, space_of, uses_of
-from mcz.codecs.space_choices import (
-    BASIS,
-    CODER,
-    DOMAIN,
-    STEP,
-    THRESHOLD,
-    THRESHOLD_PARAMETER,
-    VIRTUAL_MARKERS,
-    choose_space,
-    default_step,
-    frame_differences,
-    live_choice,
-    sample_of,
-)
 from mcz.codecs.spatial.prefix_streams import (
     NO_CODES,
     CodeFields,
@@ -65,10 +51,7 @@ from mcz.codecs.spatial.prefix_streams import (
 )
 from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
 from mcz.model.schema import Record, build, field, parse
-from mcz.model.types import Params, Settings
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Bools, Floats, Ints, Params, Settings
 
 NAME = "lsdt-frame"
 BLOCK_FRAMES = 512  # coded at a time
@@ -83,7 +66,7 @@ class FrameHeader(Record):
 
 
 PRESETS: dict[str, Settings] = {
-    "default": {"threshold": THRESHOLD, "coder": "mixed"},
+    "default": {"threshold": space_choices.THRESHOLD, "coder": "mixed"},
     "hou2016": {"threshold": 0.5, "coder": "prefix"},
 }
 
@@ -94,9 +77,11 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     Raises MotionError for a value that is not finite, or is too large.
     """
     chosen = preset_values(PRESETS, params)
-    sample = sample_of(NAME, source)
-    step = params["step"] or default_step(sample)
-    choice = choose_space(NAME, sample, step, params["basis"], frame_differences)
+    sample = space_choices.sample_of(NAME, source)
+    step = params["step"] or space_choices.default_step(sample)
+    choice = space_choices.choose_space(
+        NAME, sample, step, params["basis"], space_choices.frame_differences
+    )
     layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
     fields = FrameHeader(space=choice.fields, code=NO_CODES)
     published = params["preset"] == "hou2016"
@@ -182,9 +167,9 @@ def uses(header: bytes) -> tuple[bytes, ...]:
 
 @cache
 def _kernels() -> ModuleType:
-    from mcz.codecs.spatial import lsdt_frame_kernels
+    from mcz.codecs.spatial import kernels
 
-    return lsdt_frame_kernels
+    return kernels
 
 
 class _Coder:
@@ -193,7 +178,9 @@ class _Coder:
     Raises FormatError for a bad header.
     """
 
-    def __init__(self, header: bytes, layout: Layout, threshold: float = THRESHOLD) -> None:
+    def __init__(
+        self, header: bytes, layout: Layout, threshold: float = space_choices.THRESHOLD
+    ) -> None:
         fields = _header(header)
         self.header, self.threshold = header, threshold
         self.space = space_of(NAME, fields.space, layout)
@@ -281,7 +268,7 @@ class _LiveEncoder(LiveEncoder):
 
     def __init__(self, layout: Layout, options: Params) -> None:
         chosen = preset_values(PRESETS, options)
-        choice = live_choice(NAME, layout, options["step"], options["basis"])
+        choice = space_choices.live_choice(NAME, layout, options["step"], options["basis"])
         if chosen["coder"] == "prefix":
             raise OptionError(f"{NAME}: prefix codes need all frames, coder mixed does not")
         fields = FrameHeader(space=choice.fields, code=NO_CODES)
@@ -293,7 +280,7 @@ class _LiveEncoder(LiveEncoder):
         self._at = 0
         self._rows = LiveRows(NAME, layout)
 
-    def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:
+    def push(self, values: Floats, valid: Bools | None = None) -> tuple[bytes, bool]:
         row = self._rows.row(values, valid, self._at)
         fresh = self._at % self._every == 0
         if fresh:
@@ -344,12 +331,12 @@ CODEC = Codec(
     dial=Dial("step", 2.0**-60, 2.0**60),
     parameters=(
         preset_parameter(PRESETS),
-        STEP,
-        THRESHOLD_PARAMETER,
-        BASIS,
-        CODER,
-        DOMAIN,
-        VIRTUAL_MARKERS,
+        space_choices.STEP,
+        space_choices.THRESHOLD_PARAMETER,
+        space_choices.BASIS,
+        space_choices.CODER,
+        space_choices.DOMAIN,
+        space_choices.VIRTUAL_MARKERS,
         SEGMENT_FRAMES_PARAMETER,
     ),
 )

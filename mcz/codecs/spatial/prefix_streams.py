@@ -12,13 +12,11 @@ from types import ModuleType
 
 import numpy as np
 from construct import If, Int8ul, this
-from numpy.typing import NDArray
 
 from mcz.codecs.coding.huffman import DIRECT, MAX_LENGTH, N_CLASSES, code_lengths, codes_of
 from mcz.errors import FormatError
 from mcz.model.schema import Checked, Record, counted, field, one_of
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints
 
 ADAPTIVE, PREFIX = 0, 1  # coder
 _LENGTHS = counted(Checked(Int8ul, lambda n: n <= MAX_LENGTH), N_CLASSES)
@@ -73,8 +71,7 @@ def _classes(numbers: Ints) -> Ints:
     """The class of each integer."""
     n = np.frexp(numbers.astype(np.float64))[1].astype(np.int64)  # of 0 to 2^41, exact
     wide = DIRECT + 2 * (n - 5) + (numbers >> np.maximum(n - 2, 0) & 1)
-    classes: Ints = np.where(numbers < DIRECT, numbers, wide)
-    return classes
+    return np.where(numbers < DIRECT, numbers, wide)
 
 
 def codes_from(fields: CodeFields, where: str) -> Codes | None:

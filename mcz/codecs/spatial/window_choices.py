@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.basis_models import (
     MAX_ENTRIES,
@@ -25,7 +24,7 @@ from mcz.codecs.basis_models import (
 )
 from mcz.codecs.contract import Model, SignalSource, model_id
 from mcz.codecs.gaps import FrameReader
-from mcz.codecs.parameters import Parameter, Presets, integer, number, preset_parameter
+from mcz.codecs.parameters import Parameter, Presets, integer, number, preset_parameter, ratio_of
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
 from mcz.codecs.space import (
     APART,
@@ -39,13 +38,9 @@ from mcz.codecs.space import (
 )
 from mcz.codecs.space_choices import CODER, DOMAIN, STEP, VIRTUAL_MARKERS, Sample
 from mcz.codecs.spatial.windows import MAX_WINDOW, Plan
-from mcz.codecs.step_codes import ratio_of
 from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import MotionError
-from mcz.model.types import Params
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats, Ints, Params
 
 LARGEST = 2.0**60  # steps: a window with such a value has a coefficient beyond 2^40 steps
 BIT = math.log(2) / 4  # squared steps that a bit is worth: of fine steps log(2) / 6 would be
@@ -320,8 +315,8 @@ def _counts(
 def _cost(basis: Basis) -> Floats:
     """Squared steps that the bits of the first vectors are worth, (n_vectors,)."""
     bits = (ENTRY + ENTRY_OCTAVE * np.log2(1.0 + np.abs(basis.entries))).sum(axis=1)
-    cost: Floats = BIT * (bits + 8).cumsum()
-    return cost
+    result: Floats = BIT * (bits + 8).cumsum()
+    return result
 
 
 def parameters_of(presets: Presets, window: int) -> tuple[Parameter, ...]:

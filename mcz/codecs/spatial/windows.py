@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
+from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcz.codecs.coding.streams import code, start_states, uncode
 from mcz.codecs.contract import (
     Codec,
     Encoded,
@@ -28,14 +29,29 @@ from mcz.codecs.gaps import FrameReader
 from mcz.codecs.parameters import Dial
 from mcz.codecs.segments import SEGMENT_FRAMES, TARGET_BYTES
 from mcz.codecs.space import Space, SpaceFields, check, space_of, uses_of
-from mcz.codecs.spatial.prefix_streams import NO_CODES, CodeFields, Codes, codes_from, fields_of
-from mcz.codecs.spatial.window_streams import MAX_INDEX, build_window, parse_window, windows_of
+from mcz.codecs.spatial.prefix_streams import (
+    NO_CODES,
+    CodeFields,
+    Codes,
+    build_vectors,
+    codes_from,
+    fields_of,
+    parse_vectors,
+)
 from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import FormatError, MotionError
-from mcz.model.schema import UVARINT, CheckedBeside, Record, bounded, build, field, parse
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.schema import (
+    UVARINT,
+    CheckedBeside,
+    Record,
+    bounded,
+    build,
+    field,
+    parse,
+    read_varint,
+    varint,
+)
+from mcz.model.types import Floats, Ints
 
 NAME = "lsdt-clip"
 MAX_WINDOW = 2048  # WIND-05
@@ -194,7 +210,7 @@ def uses(header: bytes) -> tuple[bytes, ...]:
 
 def space_of_windows(fields: WindowsHeader, layout: Layout) -> Space:
     """Space of a header, with courses over a whole window."""
-    from mcz.codecs.spatial.window_kernels import synthesize_courses
+    from mcz.codecs.spatial.kernels import synthesize_courses
 
     space = space_of(NAME, fields.space, layout)
     if space.courses is None:
@@ -222,7 +238,7 @@ def _segment(
     out: Floats,
 ) -> None:
     """Write the windows of a segment that the request meets."""
-    from mcz.codecs.spatial.window_kernels import synthesize
+    from mcz.codecs.spatial.kernels import synthesize
 
     n_windows = -(-span.n_frames // fields.window)
     where = f"{NAME}: segment at {span.first}"
@@ -266,3 +282,78 @@ BITSTREAM = partial(
     uses=uses,
     dial=Dial("step", 2.0**-60, 2.0**60),
 )
+
+
+MAX_INDEX = 2**40
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Coefficients of a window, (n_rows, n_frequencies), and up to where each row has any."""
+
+    rows: Ints
+    lengths: Ints
+
+
+@cache
+def _kernels() -> ModuleType:
+    from mcz.codecs.spatial import kernels
+
+    return kernels
+
+
+def build_window(rows: Ints, starts: Ints, codes: Codes | None) -> bytes:
+    """The bytes of a window's coefficients, (n_rows, n_frequencies), none beyond MAX_INDEX."""
+    coded = _adaptive(rows, starts) if codes is None else build_vectors(rows, _one(rows), codes)
+    return varint(len(coded)) + coded
+
+
+def _one(rows: Ints) -> Ints:
+    """Every row is one vector."""
+    return np.array([0, rows.shape[1]])
+
+
+def _adaptive(rows: Ints, starts: Ints) -> bytes:
+    lengths = np.zeros(len(rows), np.int64)
+    return code(
+        start_states("window")[0],
+        rows.size + 256,
+        lambda state, data: _kernels().code_window(state, data, rows, starts, lengths) < 0,
+        "a coefficient",
+    )
+
+
+def parse_window(
+    data: bytes, starts: Ints, n_frequencies: int, codes: Codes | None, where: str
+) -> Window:
+    """The coefficients of a window; raises FormatError on bad bytes."""
+    rows = np.zeros((int(starts[-1]), n_frequencies), np.int64)
+    lengths = np.zeros(len(rows), np.int64)
+    if codes is not None:
+        # WIND-09
+        parse_vectors(data, rows, _one(rows), codes, f"{where}: a coefficient", whole=True)
+        lengths = n_frequencies - np.argmax(rows[:, ::-1] != 0, axis=1)
+        lengths[~rows.any(axis=1)] = 0
+    else:
+        uncode(
+            data,
+            start_states("window")[0],  # WIND-10
+            # WIND-10
+            lambda state, data: _kernels().code_window(state, data, rows, starts, lengths) < 0,
+            f"{where}: a coefficient",
+            whole=True,  # WIND-08
+        )
+    return Window(rows, lengths)
+
+
+def windows_of(stream: bytes, n_windows: int, where: str) -> Iterator[bytes]:
+    """The bytes of each window; raises FormatError on bad bytes."""
+    at = 0
+    for _ in range(n_windows):
+        size, at = read_varint(stream, at)
+        if size > len(stream) - at:  # WIND-07
+            raise FormatError(f"a window of {size} bytes at {at} of {len(stream)}", where=where)
+        yield stream[at : at + size]
+        at += size
+    if at != len(stream):  # WIND-07
+        raise FormatError(f"{len(stream) - at} bytes after the last window", where=where)

@@ -9,9 +9,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats
 
 HALF_PI = 1.5707963267948966
 NEWTON_STEPS = 40  # of a square root; half of them would do
@@ -45,8 +44,7 @@ def _quarter(n: int) -> Floats:
     for i in range(9, 0, -1):
         cosine = 1.0 - square * cosine / ((2 * i - 1) * (2 * i))
         sine = 1.0 - square * sine / ((2 * i) * (2 * i + 1))
-    root: Floats = np.where(2 * m <= n, cosine, x * sine)  # COS-01
-    return root
+    return np.where(2 * m <= n, cosine, x * sine)  # COS-01
 
 
 def _root(value: float) -> float:

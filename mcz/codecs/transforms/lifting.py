@@ -10,16 +10,15 @@ from functools import cache
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats
 
 
 @cache
 def _kernels() -> ModuleType:
-    from mcz.codecs.transforms import lifting_kernels
+    from mcz.codecs.transforms import wavelet_kernels
 
-    return lifting_kernels
+    return wavelet_kernels
 
 
 def lengths(n_rows: int, levels: int) -> list[int]:

@@ -20,12 +20,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.transforms.dct import dct_matrix
 from mcz.errors import OptionError
+from mcz.model.types import Floats
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]  # iterations done, iterations at most
 
 SPARSITY = 8  # coefficients kept of each frame of 31 points; the paper's best, Fig. 4

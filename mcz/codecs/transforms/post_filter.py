@@ -13,11 +13,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats, Ints
 
 DELAY = 12  # rows on each side of the one that is filtered: 25 taps
 CUTOFFS = (1.0, 3.0, 5.0)  # Hz
@@ -59,8 +57,8 @@ class PostFilter:
             self._n_held += 1
             return None
         window = self._rows[self._next - 2 * DELAY - 1 : self._next]
-        filtered: Floats = _filter_middle(window, self._past, *self._settings)[0]
-        return filtered
+        result: Floats = _filter_middle(window, self._past, *self._settings)[0]
+        return result
 
     def finish(self) -> Floats:
         """The rest, at most 12 rows, (n, n_channels); afterwards the filter is as new."""
@@ -106,7 +104,7 @@ def _settings(rate: float, unit_cm: float) -> tuple[Floats, float, float]:
 
 
 @lru_cache(maxsize=64)
-def filter_taps(rate: float) -> NDArray[np.int64]:
+def filter_taps(rate: float) -> Ints:
     """The filters at ``rate`` rows a second, (3, 13) integers in units of 2^-30, read-only.
 
     A row for each cutoff; column k is the tap of the rows k before and k after the middle one. The

@@ -14,15 +14,19 @@ resolution of one segment. An encoder needs the whole clip in memory.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.channel_weights import SAMPLED_FRAMES, weights_of
 from mcz.codecs.contract import Encoded, SignalSource
 from mcz.codecs.parameters import (
+    MIDDLE_CODE,
     Dial,
     Parameter,
     choice,
+    code_of,
     integer,
     number,
     preset_parameter,
@@ -30,19 +34,20 @@ from mcz.codecs.parameters import (
 )
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
 from mcz.codecs.wavelet import wavelet
-from mcz.codecs.wavelet.awt_choices import choose, coefficients_of, quantizer_of
+from mcz.codecs.wavelet.quantizer import DEAD_ZONE, LEAST_UNIT, Quantizer
 from mcz.codecs.wavelet.reencode import recoder
 from mcz.codecs.wavelet.wavelet import (
     BITSTREAM,
     WAVELET,
+    Frames,
     N,
     Plan,
     Q,
+    Transform,
     transform_of,
 )
-from mcz.model.types import Params, Settings
-
-Floats = NDArray[np.float64]
+from mcz.errors import MotionError
+from mcz.model.types import Bools, Floats, Ints, Params, Settings
 
 FRAMES_A_COEFFICIENT = 8  # where a_w is not given
 DISTORTIONS = ("positions", "channels")
@@ -127,3 +132,141 @@ CODEC = BITSTREAM(
         SEGMENT_FRAMES_PARAMETER,
     ),
 )
+
+
+Masks = list[Bools]
+
+LARGEST = 2.0**90
+BLOCK_FRAMES = 4096  # analyzed at a time
+MOVES = 4000  # of the annealing, for each channel
+FINEST = 2.0**-24  # of the greatest coefficient of a channel: no step is finer
+FEWEST_MOVES, MOST_MOVES = 100_000, 20_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The allocation that annealing has found.
+
+    ``kept`` are masks band by band, the coarsest first. Of each channel: ``counts``, how many were
+    chosen; ``smallest``, the least magnitude of one that was, and ``smallest_detail``, infinite
+    where there is none; ``dropped``, the greatest of those that were not, 0 where all were;
+    ``greatest`` of all. The distortion ``before`` and ``after`` annealing is relative to the
+    greatest coefficient.
+    """
+
+    kept: Masks
+    counts: Ints
+    smallest: Floats
+    smallest_detail: Floats
+    dropped: Floats
+    greatest: Floats
+    before: float
+    after: float
+
+
+def coefficients_of(name: str, source: SignalSource, transform: Transform) -> list[Floats]:
+    """The bands of a whole clip, the coarsest first, (coefficients, channels)."""
+    frames = Frames(name, source, transform.wavelet, transform.levels)
+    unit, n_frames = 1 << transform.levels, source.layout.n_frames
+    length = -(-BLOCK_FRAMES // unit) * unit
+    parts = []
+    for first in range(0, n_frames, length):
+        stop = min(first + length, n_frames)
+        parts.append(frames.coefficients(first, stop))
+        frames.keep(first, stop)
+    if not parts:
+        return [np.zeros((0, source.layout.n_channels))] * (transform.levels + 1)
+    return [np.concatenate(band) for band in zip(*parts, strict=True)]
+
+
+def choose(
+    bands: Sequence[Floats],
+    weights: Floats,
+    average: float,
+    *,
+    whole_approximation: bool,
+    iterations: int | None,
+    seed: int,
+) -> Choice:
+    """Keep ``average`` coefficients a channel, those that lower the distortion most.
+
+    An error counts in units of its channel's ``weights`` (n_channels,). With
+    ``whole_approximation`` approximations that were not chosen are kept, too: they cost little, and
+    are as good as zero where steps are as large as they. Raises MotionError where a coefficient is
+    too large.
+    """
+    from mcz.codecs.wavelet import kernels
+
+    n_bands = [len(band) for band in bands]
+    sizes = np.abs(np.concatenate(bands)).T
+    if not (sizes <= LARGEST).all():  # phrased so that NaN fails too: sums have overflowed
+        raise MotionError("awt: a coefficient exceeds 2^90")
+    n_channels, n_each = sizes.shape
+    order = np.argsort(-sizes, axis=1, kind="stable")
+    ranked = np.take_along_axis(sizes, order, axis=1)
+    scale = float(np.max(ranked, initial=0.0)) or 1.0
+    tails = np.zeros((n_channels, n_each + 1))
+    tails[:, :-1] = np.cumsum((ranked / scale / weights[:, None])[:, ::-1] ** 2, axis=1)[:, ::-1]
+    worth = np.count_nonzero(ranked, axis=1)  # a zero needs no keeping
+    counts = equal_counts(worth, average)
+    before = float(tails[np.arange(n_channels), counts].sum())
+    if iterations is None:
+        iterations = min(max(FEWEST_MOVES, MOVES * n_channels), MOST_MOVES)
+    starts = np.arange(n_channels) * (n_each + 1)
+    after = kernels.anneal(counts, worth, starts, tails.ravel(), iterations, seed)
+    kept = np.zeros((n_channels, n_each), np.bool_)
+    np.put_along_axis(kept, order, np.arange(n_each) < counts[:, None], axis=1)
+    shown = np.where(kept, sizes, np.inf)
+    dropped = np.max(np.where(kept, 0.0, sizes), axis=1, initial=0.0)
+    if whole_approximation:
+        kept[:, : n_bands[0]] = True
+    return Choice(
+        np.split(kept.T, np.cumsum(n_bands)[:-1]),
+        counts,
+        np.min(shown, axis=1, initial=np.inf),
+        np.min(shown[:, n_bands[0] :], axis=1, initial=np.inf),
+        dropped,
+        np.max(sizes, axis=1, initial=0.0),
+        before,
+        float(after),
+    )
+
+
+def quantizer_of(choice: Choice, weights: Floats, decimals: int | None) -> Quantizer:
+    """Quantizer that separates kept from dropped coefficients.
+
+    Without ``decimals`` thresholds are as nearly proportional to ``weights`` as they can be.
+    """
+    if decimals is not None:
+        some = np.isfinite(choice.smallest_detail)
+        below = np.nextafter(choice.smallest_detail, 0.0)
+        thresholds = np.where(some, below, np.max(below[some], initial=0.0))
+        return Quantizer(thresholds, decimals, 1.0, (MIDDLE_CODE,) * len(weights))
+    some = np.isfinite(choice.smallest)
+    floor = FINEST * choice.greatest
+    left_out = choice.dropped / weights
+    typical = float(np.median(left_out[some]) if some.any() else np.max(left_out, initial=0.0))
+    typical = max(typical, float(np.max(floor / weights, initial=0.0)), LEAST_UNIT)
+    thresholds = np.clip(typical * weights, choice.dropped, choice.smallest)
+    thresholds = np.maximum(thresholds, floor)
+    codes = tuple(code_of(float(ratio)) for ratio in thresholds / typical)
+    return Quantizer(thresholds, None, typical / DEAD_ZONE, codes)
+
+
+def equal_counts(most: Ints, average: float) -> Ints:
+    """Counts per channel, each at most ``most``, as equal as possible.
+
+    Their sum is ``average`` a channel, or all there are.
+    """
+    wanted = round(min(average * len(most), 2.0**52))
+    low, high = 0, int(most.max(initial=0))
+    while low < high:  # the greatest common count that is within what is wanted
+        middle = (low + high + 1) // 2
+        if int(np.minimum(middle, most).sum()) <= wanted:
+            low = middle
+        else:
+            high = middle - 1
+    counts = np.minimum(low, most)
+    more = np.flatnonzero(counts < most)
+    counts[more[: max(0, wanted - int(counts.sum()))]] += 1
+    return np.asarray(counts, np.int64)

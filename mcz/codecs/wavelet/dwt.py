@@ -14,7 +14,6 @@ resolution of one segment.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.channel_weights import weights_of
 from mcz.codecs.contract import Encoded, Layout, SignalSource
@@ -31,9 +30,7 @@ from mcz.codecs.wavelet.wavelet import (
     Q,
     transform_of,
 )
-from mcz.model.types import Params, Settings
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats, Params, Settings
 
 PRESETS: dict[str, Settings] = {
     # As published: t_w in the units of the source for positions too, the whole clip at once, and

@@ -1,14 +1,19 @@
 """Compiled: wavelet coefficients of one channel and one band, coded as residuals.
 
 SPEC.md, "Codec 16: wavelet", is normative and has the steps below in the same order. One function
-serves encoder and decoder. Imported on first use only.
+serves encoder and decoder. The simulated annealing of ``awt`` binds no decoder. Imported on first
+use only.
 """
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from mcz.codecs.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.kernels import kernel
-from mcz.kernels.types import Bytes, IntColumns, Ints
+from mcz.kernels.types import Bytes, Floats, IntColumns, Ints
 
 MAX_INDEX = 1 << 40  # of a coefficient: sums of neighbors then stay far below 2^53
 OWN = 0, 0  # a stream has contexts and mixers of its own
@@ -94,3 +99,65 @@ def code_details(
         side_2, side_1 = side_1, side_of(found)
         values[at] = 0 if found == 0 else found + least - 1 if found > 0 else found - least + 1
     return -1
+
+
+MASK = (1 << 31) - 1  # a Lehmer generator: the same numbers on every machine
+
+
+def following(seed: int) -> int:
+    return seed * 48271 % MASK
+
+
+@kernel
+def anneal(
+    counts: Ints, most: Ints, starts: Ints, tails: Floats, iterations: int, seed: int
+) -> float:
+    """Move coefficients between channels, ``counts`` in place, and return the distortion.
+
+    ``tails[starts[c] + k]`` is the distortion of channel c that keeps its k largest coefficients,
+    ``k <= most[c]``. A move takes some from one channel and gives them to another; one
+    that adds to the distortion is accepted the less often the later it comes. The last tenth of
+    the moves accepts only what lowers it. The best allocation that was found is kept.
+    """
+    n_channels = len(counts)
+    total = 0.0
+    for c in range(n_channels):
+        total += tails[starts[c] + counts[c]]
+    if n_channels < 2 or total <= 0:
+        return total
+    best, best_counts = total, np.empty(n_channels, np.int64)
+    best_counts[:] = counts
+    hot, cold = total / n_channels / 8, total / n_channels * 1e-7
+    cooling = math.exp(math.log(cold / hot) / max(1, iterations))
+    heat = hot
+    state = 1 + seed % (MASK - 1)
+    for _ in range(16):  # small seeds differ from the first move on
+        state = following(state)
+    greatest = 1
+    for c in range(n_channels):
+        greatest = max(greatest, counts[c])
+    for step in range(iterations):
+        state = following(state)
+        giver = state % n_channels
+        state = following(state)
+        taker = state % n_channels
+        state = following(state)
+        left = iterations - step
+        widest = 1 + greatest * left // (4 * iterations)
+        moved = min(1 + state % widest, counts[giver], most[taker] - counts[taker])
+        state = following(state)
+        heat *= cooling
+        if giver == taker or moved <= 0:
+            continue
+        g, t = starts[giver] + counts[giver], starts[taker] + counts[taker]
+        change = (tails[g - moved] - tails[g]) + (tails[t + moved] - tails[t])
+        if change > 0 and (10 * left <= iterations or state >= MASK * math.exp(-change / heat)):
+            continue
+        counts[giver] -= moved
+        counts[taker] += moved
+        total += change
+        if total < best:
+            best = total
+            best_counts[:] = counts
+    counts[:] = best_counts
+    return best

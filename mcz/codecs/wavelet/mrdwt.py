@@ -12,9 +12,6 @@ that SPEC.md states). A stream holds one channel at one resolution of one segmen
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mcz.codecs.channel_weights import RULES, SAMPLED_FRAMES, weights_of
 from mcz.codecs.contract import Encoded, SignalSource
 from mcz.codecs.parameters import Dial, Parameter, choice, number, preset_parameter, preset_values
@@ -30,9 +27,7 @@ from mcz.codecs.wavelet.wavelet import (
     Q,
     transform_of,
 )
-from mcz.model.types import Params, Settings
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats, Params, Settings
 
 PRESETS: dict[str, Settings] = {
     # Exactly as published: T_g in the units of the source for positions too, the whole clip at

@@ -9,13 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.codecs.step_codes import code_of, ratio_of
+from mcz.codecs.parameters import code_of, ratio_of
 from mcz.errors import OptionError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats, Ints
 
 DEAD_ZONE = 0.8  # of a step: what is smaller becomes 0, where the step follows the threshold
 LEAST_UNIT = 2.0**-100

@@ -6,19 +6,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import Recode, RecodeRequest, SignalSource
-from mcz.codecs.step_codes import code_of
+from mcz.codecs.parameters import code_of
 from mcz.codecs.subset_source import SubsetSource
 from mcz.codecs.transforms.wavelets import INLINE, Wavelet, by_id
 from mcz.codecs.wavelet.quantizer import DEAD_ZONE, Quantizer
-from mcz.codecs.wavelet.wavelet import NAME, Plan, Transform, WaveletHeader, segment_streams
-from mcz.codecs.wavelet.windows import Frames
+from mcz.codecs.wavelet.wavelet import NAME, Frames, Plan, Transform, WaveletHeader, segment_streams
 from mcz.model.schema import parse
-from mcz.model.types import Params
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats, Ints, Params
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +27,7 @@ class _FixedQuantizer(Quantizer):
     def least(self) -> int:
         return self.held
 
-    def indices(self, coefficients: Floats, channel: int, *, detail: bool) -> NDArray[np.int64]:
+    def indices(self, coefficients: Floats, channel: int, *, detail: bool) -> Ints:
         indices = Quantizer.indices(self, coefficients, channel, detail=detail)
         return np.where(np.abs(indices) < self.held, 0, indices) if detail else indices
 

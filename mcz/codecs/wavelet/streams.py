@@ -11,15 +11,11 @@ from functools import cache
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.codecs.coding.start_states import start_states
-from mcz.codecs.coding.streams import code, scale_of, uncode
-from mcz.codecs.predictor_choice import choose_predictor
+from mcz.codecs.coding.streams import choose_predictor, code, scale_of, start_states, uncode
 from mcz.errors import FormatError, MotionError
 from mcz.model.schema import read_varint, varint
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Ints
 
 MAX_INDEX = 2**40
 N_SETS = 5  # start tables: the approximation, then the details from the coarsest on

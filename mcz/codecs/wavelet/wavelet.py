@@ -13,21 +13,25 @@ from typing import Any
 
 import numpy as np
 from construct import Float64l, If, Int8ul, this
-from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
-from mcz.codecs.parameters import MAX_DECIMALS, SCALED, Parameter, decimals_parameter, integer
+from mcz.codecs.gaps import FrameReader
+from mcz.codecs.parameters import (
+    MAX_DECIMALS,
+    SCALED,
+    Parameter,
+    decimals_parameter,
+    integer,
+    ratio_of,
+)
 from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, segments_by_halving
-from mcz.codecs.step_codes import ratio_of
-from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms import wavelets
 from mcz.codecs.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
 from mcz.codecs.wavelet.quantizer import Quantizer
 from mcz.codecs.wavelet.streams import Coding, build_streams, parse_streams
-from mcz.codecs.wavelet.windows import Frames
 from mcz.errors import FormatError
 from mcz.model.schema import UVARINT, Checked, Record, bounded, build, counted, field, parse
-
-Floats = NDArray[np.float64]
+from mcz.model.types import Bools, Floats, Ints
 
 NAME = "wavelet"
 LEAST_FRAMES = 256  # of a segment: in fewer, hundreds of channels would cost more than they save
@@ -85,7 +89,7 @@ class Plan:
     transform: Transform
     quantizer: Quantizer
     segment_frames: int  # 0: the size decides
-    kept: Sequence[NDArray[np.bool_]] | None = None
+    kept: Sequence[Bools] | None = None
 
     @property
     def wavelet(self) -> Wavelet:
@@ -161,7 +165,7 @@ def segment_streams(frames: Frames, plan: Plan, first: int, stop: int) -> tuple[
     bands = frames.coefficients(first, stop)
     if plan.kept is not None:
         levels = [plan.levels, *range(plan.levels, 0, -1)]
-        owns = [dwt.own_range(first, stop, level, frames.lengths) for level in levels]
+        owns = [wavelets.own_range(first, stop, level, frames.lengths) for level in levels]
         masks = [kept[own[0] : own[1]] for kept, own in zip(plan.kept, owns, strict=True)]
         bands = [np.where(mask, band, 0.0) for mask, band in zip(masks, bands, strict=True)]
     by_channel = []
@@ -229,7 +233,7 @@ class _Decoder:
     def read(self, request: Request, fetch: Fetch) -> Floats:
         levels = self.fields.levels
         n_bands = self.layout.n_resolutions - request.resolution  # MRDWT-04
-        ranges = dwt.needed_ranges(request.start, request.stop, levels, self.wavelet.n_taps)
+        ranges = wavelets.needed_ranges(request.start, request.stop, levels, self.wavelet.n_taps)
         # Band 0 is the approximation, band b > 0 the details of level levels + 1 - b.
         wanted = [ranges[levels], *(ranges[levels + 1 - band] for band in range(1, n_bands))]
         bands = [np.zeros((stop - start, len(request.groups))) for start, stop in wanted]
@@ -242,7 +246,7 @@ class _Decoder:
             if span.first >= high or (span.stop <= low and span.stop != self.lengths[0]):
                 continue
             owns = [
-                dwt.own_range(span.first, span.stop, self._level(band), self.lengths)
+                wavelets.own_range(span.first, span.stop, self._level(band), self.lengths)
                 for band in range(n_bands)
             ]
             pairs = zip(owns, wanted, strict=True)
@@ -262,7 +266,9 @@ class _Decoder:
         absent = np.zeros((0, len(request.groups)))
         bands += [absent] * (levels + 1 - n_bands)
         firsts = [start for start, _ in ranges[1:]]
-        return dwt.synthesize(bands, firsts, request.start, request.stop, self.wavelet)  # MRDWT-35
+        return wavelets.synthesize(
+            bands, firsts, request.start, request.stop, self.wavelet
+        )  # MRDWT-35
 
     def _level(self, band: int) -> int:
         return int(self.fields.levels + 1 - band if band else self.fields.levels)
@@ -287,7 +293,7 @@ class _Decoder:
             values = self._values(found[start - own[0] :], code, detail=band > 0)
             bands[band][start - need[0] : start - need[0] + len(values), column] = values
 
-    def _values(self, indices: NDArray[np.int64], code: int, *, detail: bool) -> Floats:
+    def _values(self, indices: Ints, code: int, *, detail: bool) -> Floats:
         """Coefficients from integers."""
         values = indices.astype(np.float64)
         if not self.coding.scaled:
@@ -318,3 +324,32 @@ BITSTREAM = partial(
     cut=cut,
     grouping="channel",
 )
+
+
+class Frames:
+    """The signal as it is transformed, unwrapped and without gaps, a window at a time."""
+
+    def __init__(self, name: str, source: SignalSource, wavelet: Wavelet, levels: int) -> None:
+        self.reader, self.wavelet, self.levels = FrameReader(name, source), wavelet, levels
+        layout = source.layout
+        self.history = np.zeros((0, layout.n_channels))  # frames before the segment
+        self.block = np.zeros((0, layout.n_channels))  # from the segment's first frame on
+        self.lengths = wavelet.lengths(layout.n_frames, levels)
+
+    def coefficients(self, first: int, stop: int) -> list[Floats]:
+        """The bands of the segment first <= frame < stop, the coarsest first."""
+        unit, mirrored = 1 << self.levels, self.wavelet.mirrored(self.levels)
+        end = min(max(stop, -(-mirrored // unit) * unit), self.lengths[0])
+        if end > self.reader.at:
+            self.block = np.concatenate([self.block, self.reader.next(end)])
+        window = np.concatenate([self.history, self.block[: end - first]])
+        at = first - len(self.history)
+        return wavelets.analyze(window, at, first, stop, self.lengths, self.wavelet)
+
+    def keep(self, first: int, stop: int) -> None:
+        """Go on to the segment that begins at ``stop``."""
+        unit = 1 << self.levels
+        n_kept = -(-self.wavelet.lead(self.levels) // unit) * unit
+        all_ = np.concatenate([self.history, self.block[: stop - first]])
+        self.history = all_[max(0, len(all_) - n_kept) :]
+        self.block = self.block[stop - first :]

@@ -13,9 +13,13 @@ from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.frames import FramePoses
 from mcz.kinematics.poses.conversions import from_matrices
-from mcz.kinematics.poses.derivatives import accelerations_of, velocities_of
 from mcz.kinematics.poses.motion_like import joint_numbers, scale_to
-from mcz.kinematics.poses.trajectories import chosen_points, point_names
+from mcz.kinematics.poses.trajectories import (
+    accelerations_of,
+    chosen_points,
+    point_names,
+    velocities_of,
+)
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, joint_columns
 from mcz.model.text_format import nearest

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mcz.errors import OptionError
 from mcz.exchange.datasets.sources import Member
 from mcz.files.reading.clip import Clip
-from mcz.model.arguments import integer
+from mcz.model.checks import integer
 
 SEED, EPOCH = integer("seed", 0, 2**128 - 1), integer("epoch", 0, 2**63 - 1)
 SIZE = integer("size", 1, 2**63 - 1)

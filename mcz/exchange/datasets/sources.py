@@ -18,9 +18,9 @@ from mcz.exchange.datasets.fields import Field, Rows, Subject, features_of, subj
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.kinematics.chain import Floats
+from mcz.kinematics.poses.conversions import scalar_quaternions
 from mcz.kinematics.poses.motion_like import values_of
 from mcz.kinematics.poses.resampling import frames_within, resample_rows, times_at, turn_scalars
-from mcz.kinematics.poses.scalar_quaternions import scalar_quaternions
 from mcz.model.clock import Timeline, known_timeline
 from mcz.model.skeleton import Joints
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.channel_size import channel_bytes
+from mcz.codecs.coding.fast.encoder import channel_bytes
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError
 from mcz.kinematics.metrics.comparison import named_signals, signal_errors

@@ -7,9 +7,10 @@ import numpy as np
 from mcz.errors import MczError, MotionError
 from mcz.hints import Hint, Remark
 from mcz.kinematics import point_names, point_set, positions_of
-from mcz.kinematics.metrics.sums import Number, Values
+from mcz.kinematics.metrics.sums import Number
 from mcz.kinematics.rest_pose import NO_LENGTHS, has_no_lengths
 from mcz.model.motion import POSITION_KINDS, Motion, Signal, Skeleton
+from mcz.model.types import Floats
 
 
 def frames_text(signal: Signal) -> str:
@@ -118,6 +119,6 @@ def has_markers_of(a: Skeleton, b: Skeleton) -> bool:
     return b.n_joints == len(point_names(a)) + 3 * a.n_joints
 
 
-def rows_of(signal: Signal, start: int, stop: int) -> Values:
+def rows_of(signal: Signal, start: int, stop: int) -> Floats:
     """Frames start <= f < stop as binary64, NaN where invalid."""
     return signal.cut(start, stop).masked().astype(np.float64, copy=False)

@@ -10,7 +10,6 @@ import math
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.kinematics import origins_of
@@ -20,8 +19,6 @@ from mcz.model.text_format import brief
 from mcz.model.types import JsonObject
 
 BLOCK = 2**20  # coordinates that are looked at in one go
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

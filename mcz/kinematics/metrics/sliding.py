@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcz.kinematics.contacts import Contact, Contacts, FootTracks
-from mcz.kinematics.metrics.sums import Number, Values, mean_of
+from mcz.kinematics.metrics.sums import Number, mean_of
 from mcz.model.text_format import brief
+from mcz.model.types import Floats
 
 MM = 10.0  # of a cm
 
@@ -70,7 +71,7 @@ class _ContactDistances:
     """Distances of a contact after its first frame, NaN where unknown, and both path lengths."""
 
     run: Contact
-    apart: Values
+    apart: Floats
     path: float
     path_original: float
     steps: int  # of the paths
@@ -141,8 +142,8 @@ def _worst_frame(measured: list[_ContactDistances]) -> tuple[int, str] | None:
     return min(worst, key=lambda one: one[:2])[1:] if worst else None
 
 
-def _lengths(vectors: Values) -> Values:
+def _lengths(vectors: Floats) -> Floats:
     """(n,) of vectors (n, 3)."""
     x, y, z = vectors.T
-    lengths: Values = np.sqrt(x * x + y * y + z * z)
-    return lengths
+    result: Floats = np.sqrt(x * x + y * y + z * z)
+    return result

@@ -6,14 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.kinematics.angles import without_turns
+from mcz.kinematics.angles import without_turns, without_whole_turns
 from mcz.model.motion import Channel, Signal, Skeleton
-from mcz.model.whole_turns import without_whole_turns
+from mcz.model.types import Bools, Floats
 
-Values = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Number = float | None
 
 
@@ -28,18 +25,18 @@ def times(value: Number, factor: Number) -> Number:
     return mean_of(value * factor, 1)
 
 
-def channel_errors(skeleton: Skeleton, signal: Signal, left: Values, right: Values) -> Values:
+def channel_errors(skeleton: Skeleton, signal: Signal, left: Floats, right: Floats) -> Floats:
     """Absolute differences of the channels of ``signal``, less whole turns."""
     return np.abs(_less_turns(left - right, left, right, skeleton, signal.channels))
 
 
 def _less_turns(
-    difference: Values,
-    left: Values,
-    right: Values,
+    difference: Floats,
+    left: Floats,
+    right: Floats,
     skeleton: Skeleton,
     channels: tuple[Channel, ...] | None,
-) -> Values:
+) -> Floats:
     """``difference`` of two sides without whole turns; ``channels``: a signal's own, or None."""
     wrapped = without_turns(difference, skeleton, channels)
     if channels is None:
@@ -56,7 +53,7 @@ class ChannelErrors:
         self._squares, self._raw, self._sum = 0.0, 0.0, 0.0
         self._greatest = -1.0
 
-    def add(self, left: Values, right: Values) -> None:
+    def add(self, left: Floats, right: Floats) -> None:
         valid = np.isfinite(left) & np.isfinite(right)
         raw = np.where(valid, left - right, 0.0)
         difference = _less_turns(raw, left, right, self._skeleton, self._channels)
@@ -94,7 +91,7 @@ class Distances:
         self.greatest_by_column = np.full(n, -1.0)
         self.rows = np.zeros(n, np.int64)  # of the greatest, the first of equals
 
-    def add(self, start: int, distances: Values, valid: Flags) -> None:
+    def add(self, start: int, distances: Floats, valid: Bools) -> None:
         """Distances of shape (n_rows, n) from row ``start`` on, 0 where they are not ``valid``."""
         if not len(distances):
             return
@@ -146,7 +143,7 @@ class PointErrors(Distances):
         self.mismatched = 0
         self._squares, self._power = 0.0, 0.0
 
-    def add_points(self, start: int, left: Values, right: Values) -> None:
+    def add_points(self, start: int, left: Floats, right: Floats) -> None:
         """Points of shape (n_rows, n, 3) from row ``start`` on, NaN where unknown."""
         left_known, right_known = known_points(left), known_points(right)
         valid = left_known & right_known
@@ -173,7 +170,7 @@ class PointErrors(Distances):
 class ShellErrors(Distances):
     """Greatest distance of each joint's three shell points, in length units."""
 
-    def add_shell(self, start: int, left: Values, right: Values) -> None:
+    def add_shell(self, start: int, left: Floats, right: Floats) -> None:
         """Points of shape (n_rows, 3 n, 3), three a joint, from row ``start`` on."""
         valid = known_points(left) & known_points(right)
         whole = valid[:, 0::3] & valid[:, 1::3] & valid[:, 2::3]
@@ -192,7 +189,7 @@ class ChangeErrors:
         self.velocity, self.acceleration = Distances(n), Distances(n)
         self._off, self._valid = np.zeros((0, n, 3)), np.zeros((0, n), np.bool_)
 
-    def add_points(self, start: int, left: Values, right: Values) -> None:
+    def add_points(self, start: int, left: Floats, right: Floats) -> None:
         """Points of shape (n_rows, n, 3) from row ``start`` on, NaN where unknown."""
         n_before = len(self._off)
         known = known_points(left) & known_points(right)
@@ -209,15 +206,15 @@ class ChangeErrors:
         self._off, self._valid = off[-2:], valid[-2:]
 
 
-def known_points(points: Values) -> Flags:
+def known_points(points: Floats) -> Bools:
     """Mask of the points of (n_rows, n, 3) with three finite coordinates."""
     x, y, z = np.isfinite(np.moveaxis(points, 2, 0))  # much faster than along a short axis
-    known: Flags = x & y & z
-    return known
+    result: Bools = x & y & z
+    return result
 
 
-def squared_norms(vectors: Values) -> Values:
+def squared_norms(vectors: Floats) -> Floats:
     """(n_rows, n) of vectors (n_rows, n, 3)."""
     x, y, z = np.moveaxis(vectors, 2, 0)
-    squares: Values = x * x + y * y + z * z
-    return squares
+    result: Floats = x * x + y * y + z * z
+    return result

@@ -7,7 +7,7 @@ identity. Everything takes a Motion or a Clip, of which only what is needed is d
 
 from __future__ import annotations
 
-from mcz.kinematics.poses.joint_rotations import rotations
+from mcz.kinematics.poses.conversions import rotations
 from mcz.kinematics.poses.motion_like import times
 from mcz.kinematics.poses.resampling import resample
 from mcz.kinematics.poses.trajectories import (

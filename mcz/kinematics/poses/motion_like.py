@@ -7,14 +7,13 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
 from mcz.errors import OptionError
-from mcz.kinematics.chain import Floats
 from mcz.model.clock import Timeline, known_timeline
 from mcz.model.motion import Motion, Skeleton, check_poses
 from mcz.model.skeleton import Joints, joint_columns, joint_list
-from mcz.model.types import Reals, Values
+from mcz.model.types import Floats, Reals, Values
 from mcz.model.units import unit_cm_of
 
 if TYPE_CHECKING:
@@ -110,9 +109,7 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     return skeleton.unit_cm / wanted
 
 
-def times(
-    moving: MotionLike, frames: Frames = None, *, signal: int | str = 0
-) -> NDArray[np.float64]:
+def times(moving: MotionLike, frames: Frames = None, *, signal: int | str = 0) -> Floats:
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 
     Those of a signal of times; else, by frame numbers and rate, from ``first_time`` on or, without

@@ -8,22 +8,25 @@ from fractions import Fraction
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.chain import IDENTITY, Chain, Floats, Link, chain_of
-from mcz.kinematics.euler import ORDERS, euler_angles
-from mcz.kinematics.poses.conversions import from_matrices, slerp
-from mcz.kinematics.poses.scalar_quaternions import (
+from mcz.kinematics.chain import IDENTITY, Chain, Link, chain_of
+from mcz.kinematics.poses.conversions import (
     Quaternion,
+    from_matrices,
     scalar_quaternions,
+    slerp,
     slerp_quaternions,
 )
-from mcz.kinematics.rotation_vectors import matrices_of_vectors, nearest_vector
+from mcz.kinematics.rotations import (
+    ORDERS,
+    euler_angles,
+    matrices_of_vectors,
+    nearest_vector,
+)
 from mcz.model.clock import TIMES, Timeline, known_timeline
 from mcz.model.motion import Motion, Signal, Skeleton, frame_rate_of
-
-Ints = NDArray[np.int64]
+from mcz.model.types import Floats, Ints
 
 ALIGNED = 1e-6  # of a frame: a new frame so near to an old one falls upon it
 MOST_VALUES = 2**31  # of what is made: a rate of 1e9 would be a mistake, not a wish
@@ -39,13 +42,13 @@ class Times:
     to the frame after, None: of frames at equal distances, 1/2.
     """
 
-    before: NDArray[np.int64]
+    before: Ints
     share: Floats
-    runs: NDArray[np.int64] | None = None
+    runs: Ints | None = None
     weights: Floats | None = None
 
     @property
-    def after(self) -> NDArray[np.int64]:
+    def after(self) -> Ints:
         return self.before + (self.share > 0)
 
 

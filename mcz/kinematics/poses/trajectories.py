@@ -1,4 +1,8 @@
-"""Positions, velocities and accelerations of points, and the root."""
+"""Positions of points and the root, and their derivatives, from known positions only.
+
+``places`` is (n_frames, n, 3), NaN where unknown; ``steps`` are the seconds from each frame to the
+next, (n_frames - 1,), NaN across a gap.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,7 @@ from numpy.typing import DTypeLike
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import first_points
 from mcz.kinematics import point_names as names_of_points
-from mcz.kinematics.chain import Floats
 from mcz.kinematics.poses.conversions import from_matrices
-from mcz.kinematics.poses.derivatives import accelerations_of, velocities_of
 from mcz.kinematics.poses.motion_like import (
     Frames,
     MotionLike,
@@ -27,7 +29,7 @@ from mcz.model.clock import known_timeline
 from mcz.model.motion import Skeleton
 from mcz.model.skeleton import Joints, column_of, joint_list, signs_of
 from mcz.model.text_format import among, brief
-from mcz.model.types import Reals
+from mcz.model.types import Floats, Reals
 
 
 def point_names(moving: MotionLike | Skeleton, joints: Joints = None) -> tuple[str, ...]:
@@ -213,3 +215,41 @@ def root(
         as_type(turns[:, 0], dtype),
         skeleton.up_axis,
     )
+
+
+def velocities_of(places: Floats, steps: Floats) -> Floats:
+    """The slope of the parabola through three frames, at an end or beside a gap that to the next.
+
+    NaN where a frame or both of its neighbors are unknown.
+    """
+    before, after, first, last = _one_sided_slopes(places, steps)
+    with np.errstate(invalid="ignore"):
+        velocities: Floats = (before * last + after * first) / (first + last)
+    velocities = np.where(np.isnan(velocities), before, velocities)
+    return np.where(np.isnan(velocities), after, velocities)
+
+
+def accelerations_of(places: Floats, steps: Floats) -> Floats:
+    """Second derivative of that parabola; at an end or beside a gap that of the next frame.
+
+    NaN where a frame is unknown or stands in a run of fewer than three.
+    """
+    before, after, first, last = _one_sided_slopes(places, steps)
+    with np.errstate(invalid="ignore"):
+        inner: Floats = 2.0 * (after - before) / (first + last)
+    accelerations = inner.copy()
+    missing = np.isnan(accelerations[:-1]) & ~np.isnan(after[:-1])  # the next frame is a neighbor
+    accelerations[:-1][missing] = inner[1:][missing]
+    missing = np.isnan(accelerations[1:]) & ~np.isnan(before[1:])
+    accelerations[1:][missing] = inner[:-1][missing]
+    return accelerations
+
+
+def _one_sided_slopes(places: Floats, steps: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """The slopes from the frame before and to the next, and the seconds between; NaN: none."""
+    seconds = np.full((len(places) + 1, 1, 1), np.nan)
+    seconds[1:-1, 0, 0] = steps
+    slopes = np.full((len(places) + 1, *places.shape[1:]), np.nan)
+    with np.errstate(invalid="ignore", over="ignore"):
+        slopes[1:-1] = np.diff(places, axis=0) / seconds[1:-1]
+    return slopes[:-1], slopes[1:], seconds[:-1], seconds[1:]

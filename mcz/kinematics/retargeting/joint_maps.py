@@ -1,9 +1,16 @@
-"""Maps of joints between usual skeletons."""
+"""Maps of joints between usual skeletons, by the part of the body that each joint turns.
+
+Parts are called as SMPL calls its joints. Joints of one part turn alike: rotations of clips that
+are there as AMC and as BVH were compared. ``lwrist``, which CMU's BVH files call LeftHand, turns
+what ``left_wrist`` does; ``abdomen`` of the Daz-friendly files turns with ``upperback``.
+
+``{s}``, ``{S}``, ``{side}`` and ``{Side}`` stand for a side: l, L, left, Left and their likes. Of
+several names, divided by a bar, files have one or the other.
+"""
 
 from __future__ import annotations
 
 from mcz.errors import OptionError
-from mcz.kinematics.retargeting.joint_names import SKELETONS, SMPL_BODY
 from mcz.model.motion import Skeleton
 from mcz.model.text_format import nearest
 
@@ -71,3 +78,134 @@ def limbs_of(skeleton: Skeleton) -> set[str]:
 
 def _in(names: tuple[str, ...], held: set[str]) -> list[str]:
     return [name for name in names if name in held]
+
+
+SMPL_BODY = (
+    *("pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2"),
+    *("left_ankle", "right_ankle", "spine3", "left_foot", "right_foot", "neck"),
+    *("left_collar", "right_collar", "head", "left_shoulder", "right_shoulder"),
+    *("left_elbow", "right_elbow", "left_wrist", "right_wrist"),
+)
+SMPL_HANDS = ("left_hand", "right_hand")
+SMPLH_FINGERS = tuple(
+    f"{side}_{finger}{number}"
+    for side in ("left", "right")
+    for finger in ("index", "middle", "pinky", "ring", "thumb")
+    for number in (1, 2, 3)
+)
+
+CMU_AMC = {
+    "pelvis": "root",
+    "spine1": "lowerback",
+    "spine2": "upperback",
+    "spine3": "thorax",
+    "neck": "lowerneck",
+    "upper_neck": "upperneck",
+    "head": "head",
+    "{side}_hip_joint": "{s}hipjoint",
+    "{side}_hip": "{s}femur",
+    "{side}_knee": "{s}tibia",
+    "{side}_ankle": "{s}foot",
+    "{side}_foot": "{s}toes",
+    "{side}_collar": "{s}clavicle",
+    "{side}_shoulder": "{s}humerus",
+    "{side}_elbow": "{s}radius",
+    "{side}_wrist": "{s}wrist",
+    "{side}_hand": "{s}hand",
+    "{side}_fingers": "{s}fingers",
+    "{side}_thumb1": "{s}thumb",
+}
+CMU_BVH = {
+    "pelvis": "Hips",
+    "spine1": "LowerBack",
+    "spine2": "Spine",
+    "spine3": "Spine1",
+    "neck": "Neck",
+    "upper_neck": "Neck1",
+    "head": "Head",
+    "{side}_hip_joint": "{S}HipJoint",
+    "{side}_hip": "{Side}UpLeg",
+    "{side}_knee": "{Side}Leg",
+    "{side}_ankle": "{Side}Foot",
+    "{side}_foot": "{Side}ToeBase",
+    "{side}_collar": "{Side}Shoulder",
+    "{side}_shoulder": "{Side}Arm",
+    "{side}_elbow": "{Side}ForeArm",
+    "{side}_wrist": "{Side}Hand",
+    "{side}_hand": "{Side}FingerBase",
+    "{side}_fingers": "{Side}HandIndex1|{S}Fingers",
+    "{side}_thumb1": "{S}Thumb",
+}
+CMU_BVH_3DSMAX = {
+    "pelvis": "Hips",
+    "spine1": "lowerback",
+    "spine2": "Chest",
+    "spine3": "Chest2",
+    "neck": "lowerneck",
+    "upper_neck": "Neck",
+    "head": "Head",
+    "{side}_hip_joint": "{S}HipJoint",
+    "{side}_hip": "{Side}Hip",
+    "{side}_knee": "{Side}Knee",
+    "{side}_ankle": "{Side}Ankle",
+    "{side}_foot": "{Side}Toe",
+    "{side}_collar": "{Side}Collar",
+    "{side}_shoulder": "{Side}Shoulder",
+    "{side}_elbow": "{Side}Elbow",
+    "{side}_wrist": "{Side}Wrist",
+    "{side}_hand": "{s}hand",
+    "{side}_fingers": "{S}Fingers",
+    "{side}_thumb1": "{S}Thumb",
+}
+CMU_BVH_DAZ = {
+    "pelvis": "hip",
+    "spine2": "abdomen",
+    "spine3": "chest",
+    "neck": "neck",
+    "head": "head",
+    "{side}_eye": "{side}Eye",
+    "{side}_hip_joint": "{s}Buttock",
+    "{side}_hip": "{s}Thigh",
+    "{side}_knee": "{s}Shin",
+    "{side}_ankle": "{s}Foot",
+    "{side}_collar": "{s}Collar",
+    "{side}_shoulder": "{s}Shldr",
+    "{side}_elbow": "{s}ForeArm",
+    "{side}_wrist": "{s}Hand",
+    "{side}_thumb1": "{s}Thumb1",
+    "{side}_thumb2": "{s}Thumb2",
+    "{side}_index1": "{s}Index1",
+    "{side}_index2": "{s}Index2",
+    "{side}_middle1": "{s}Mid1",
+    "{side}_middle2": "{s}Mid2",
+    "{side}_ring1": "{s}Ring1",
+    "{side}_ring2": "{s}Ring2",
+    "{side}_pinky1": "{s}Pinky1",
+    "{side}_pinky2": "{s}Pinky2",
+}
+
+
+def _both_sides(rows: dict[str, str]) -> dict[str, tuple[str, ...]]:
+    """The rows with a row for each side where they speak of one."""
+    made: dict[str, tuple[str, ...]] = {}
+    for side in ("left", "right"):
+        words = {"side": side, "Side": side.title(), "s": side[0], "S": side[0].upper()}
+        for part, names in rows.items():
+            made[part.format(**words)] = tuple(names.format(**words).split("|"))
+    return made
+
+
+def _themselves(*parts: str) -> dict[str, tuple[str, ...]]:
+    return {part: (part,) for part in parts}
+
+
+# Of each skeleton its joints by part; of several names the most usual first.
+SKELETONS = {
+    "cmu-amc": _both_sides(CMU_AMC),
+    "cmu-bvh": _both_sides(CMU_BVH),
+    "cmu-bvh-3dsmax": _both_sides(CMU_BVH_3DSMAX),
+    "cmu-bvh-daz": _both_sides(CMU_BVH_DAZ),
+    "humanml3d-22": _themselves(*SMPL_BODY),
+    "smpl-24": _themselves(*SMPL_BODY, *SMPL_HANDS),
+    "smplh-52": _themselves(*SMPL_BODY, *SMPLH_FINGERS),
+}

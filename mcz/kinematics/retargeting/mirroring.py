@@ -11,10 +11,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.retargeting.channels import check_channels, edited
+from mcz.kinematics.retargeting.matching import check_channels, edited
 from mcz.kinematics.retargeting.sides import counterparts
 from mcz.model.motion import (
     POSITION_KINDS,
@@ -27,6 +26,7 @@ from mcz.model.motion import (
     Vector,
     joint_columns,
 )
+from mcz.model.types import Bools
 
 AXES = ("x", "y", "z")
 
@@ -134,7 +134,7 @@ def _flips(kind: str, axis: str) -> bool:
     return kind in TURNING_KINDS and kind != "qw" and kind[1] != axis
 
 
-def _without(exceptions: Exceptions, flipped: NDArray[np.bool_]) -> Exceptions:
+def _without(exceptions: Exceptions, flipped: Bools) -> Exceptions:
     """The texts of those numbers that are as they were."""
     at = np.arange(len(flipped))
     at[flipped] = -1

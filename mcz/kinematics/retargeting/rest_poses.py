@@ -9,12 +9,13 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from mcz.errors import OptionError, SkeletonWarning
-from mcz.kinematics.chain import IDENTITY, Floats
+from mcz.kinematics.chain import IDENTITY
 from mcz.kinematics.rest_pose import rest_positions
 from mcz.kinematics.retargeting.joint_maps import limbs_of
 from mcz.kinematics.retargeting.matching import nearest_above
 from mcz.model.motion import Skeleton
 from mcz.model.text_format import among
+from mcz.model.types import Floats
 
 SHORT = 1e-9  # of the longest bone: no direction
 UNLIKE = 10.0  # degrees between bones at rest: more than people differ

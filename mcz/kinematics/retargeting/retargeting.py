@@ -8,22 +8,29 @@ as they can, and joints below make up for it.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics import origins_of, point_set
-from mcz.kinematics.chain import IDENTITY, Chain, Floats, multiply_matrices
-from mcz.kinematics.retargeting.channels import check_channels, computed, edited
-from mcz.kinematics.retargeting.matching import matched, nearest_above
+from mcz.kinematics import origins_of, point_set, reach
+from mcz.kinematics.chain import IDENTITY, Chain, multiply_matrices, to_world
+from mcz.kinematics.joint_groups import is_foot
+from mcz.kinematics.rest_pose import rest_positions
+from mcz.kinematics.retargeting.matching import (
+    check_channels,
+    computed,
+    edited,
+    matched,
+    moves,
+    nearest_above,
+)
 from mcz.kinematics.retargeting.rest_poses import rest_turns, usual_alike
-from mcz.kinematics.retargeting.sizes import size_ratio
-from mcz.kinematics.retargeting.travel import Travel
 from mcz.kinematics.retargeting.turns import back, finite, local_turns, relative, set_local_turns
 from mcz.kinematics.targets import Targets
-from mcz.model.motion import Motion, Skeleton
+from mcz.model.motion import POSITION_KINDS, Motion, Skeleton
+from mcz.model.types import Floats
 
 AUTO = "auto"
 
@@ -131,3 +138,166 @@ def _known(turn: Floats) -> Floats:
     """The same, the identity where it is not known: joints below are known by themselves."""
     known = finite(turn)
     return turn if known.all() else np.where(known, turn, IDENTITY)
+
+
+def size_ratio(ours: Skeleton, theirs: Skeleton, pairs: Mapping[int, int]) -> float:
+    """Our size for each unit of theirs, each in its own length units.
+
+    ``pairs`` has joints of theirs by joints of ours. Heights are from the feet up to the joint
+    where the legs part, as ``_height`` says; a foot is the first joint of a leg that is a part of
+    a foot by its name, in either skeleton. Where there is none, or it has no height, the length of
+    all bones between joints of ``pairs`` counts; 1 where there is none of these, too.
+    """
+    feet = {
+        one: other
+        for one, other in pairs.items()
+        if is_foot(ours.joints[one].name) or is_foot(theirs.joints[other].name)
+    }
+    first = [one for one in feet if not feet.keys() & set(_line(ours, one)[:-1])]
+    heights = _height(ours, first), _height(theirs, [feet[one] for one in first])
+    if min(heights) <= 0:
+        heights = _bones(ours, pairs), _bones(theirs, pairs.values())
+    return heights[0] / heights[1] if all(heights) else 1.0
+
+
+def _height(skeleton: Skeleton, feet: list[int]) -> float:
+    """The height of the joint where the legs part above the feet, with legs straight.
+
+    Up is away from the feet in the rest pose; one leg alone parts at its root. A leg begins below
+    the first bone that has a length; of that bone counts how far it leads down. The mean of all
+    legs; 0 where there is none.
+    """
+    if not feet:
+        return 0.0
+    lines = [_line(skeleton, foot) for foot in feet]
+    shared = [joint for joint in lines[0] if all(joint in line for line in lines[1:])]
+    fork = shared[-1] if shared and len(lines) > 1 else lines[0][0]
+    rest, lengths = rest_positions(skeleton), _lengths(skeleton)
+    down = np.sum([rest[foot] - rest[fork] for foot in feet], axis=0)
+    down /= np.linalg.norm(down) or 1.0
+    heights = []
+    for line in lines:
+        bones = [joint for joint in line[line.index(fork) + 1 :] if lengths[joint] > 0]
+        leg = sum(float(lengths[joint]) for joint in bones[1:])
+        heights.append(leg + float((rest[bones[0]] - rest[fork]) @ down) if bones else 0.0)
+    return sum(heights) / len(heights)
+
+
+def _bones(skeleton: Skeleton, joints: Iterable[int]) -> float:
+    """The length of all bones on the lines between these joints."""
+    chosen = set(joints)
+    lengths, total = _lengths(skeleton), 0.0
+    for joint in chosen:
+        *above, _ = _line(skeleton, joint)
+        begun = [number for number, other in enumerate(above) if other in chosen]
+        if begun:
+            total += float(lengths[[*above[begun[-1] + 1 :], joint]].sum())
+    return total
+
+
+def _line(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joints from a root down to ``joint``."""
+    line = [joint]
+    while (parent := skeleton.joints[line[-1]].parent) >= 0:
+        line.append(parent)
+    return line[::-1]
+
+
+def _lengths(skeleton: Skeleton) -> Floats:
+    """Length of every joint's offset, (n_joints,)."""
+    return np.asarray(np.sqrt((skeleton.offsets**2).sum(axis=1)))
+
+
+ROUNDING = 1e-9  # of the skeleton's reach: no way at all
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """``values`` (n_frames, n_channels) of ``source`` and ``origins`` of its joints, for a target.
+
+    ``pairs`` has joints of the source by joints of the target, ``scale`` is in length units of the
+    target per length unit of the source.
+    """
+
+    source: Skeleton
+    target: Skeleton
+    pairs: Mapping[int, int]
+    scale: float
+    values: Floats
+    origins: Floats
+
+    def set(self, columns: Floats, rest: Mapping[int, Floats]) -> None:
+        """Write all position channels of the target into ``columns``, (n_channels, F).
+
+        ``rest`` has, of each joint of ``pairs`` and of -1, what its rest pose is turned by.
+        """
+        ways: dict[int, Floats] = {}  # of joints, from where they are at rest on their parent
+        for joint, other in self.pairs.items():
+            above = nearest_above(self.target, joint, self.pairs)
+            if above < 0:
+                carrier = self._carrier(joint, other)
+                if carrier >= 0 and carrier not in ways:
+                    ways[carrier] = self._way(joint, other)
+            elif moves(self.target.joints[joint].channels):
+                step = self.scale * self._step(other)
+                ways[joint] = to_world(back(rest[above]), step)
+        for joint, way in ways.items():
+            self._check(joint, way)
+        for joint in range(self.target.n_joints):
+            self._write(joint, ways.get(joint), columns)
+
+    def _carrier(self, joint: int, other: int) -> int:
+        """The joint whose position channels carry ``joint``: itself or the nearest above it.
+
+        -1 where none has any, and nothing has to be carried. Raises OptionError.
+        """
+        carrier = joint
+        while carrier >= 0 and not moves(self.target.joints[carrier].channels):
+            carrier = self.target.joints[carrier].parent
+        place = self.origins[:, other]
+        known = place[np.isfinite(place).all(axis=1)]
+        if carrier < 0 and len(known) and (known != known[0]).any():
+            raise OptionError(
+                f"retarget: joint {self.source.joint_names[other]!r} moves about, and of the "
+                f"skeleton neither {self.target.joint_names[joint]!r} nor a joint above it has "
+                "position channels"
+            )
+        return carrier
+
+    def _check(self, joint: int, way: Floats) -> None:
+        """Raise OptionError where a joint has to go where no position channel leads."""
+        kinds = {channel.kind for channel in self.target.joints[joint].channels}
+        least = ROUNDING * reach(self.target)
+        for kind, track in zip(POSITION_KINDS, way, strict=True):
+            if kind not in kinds and (np.abs(track) > least).any():
+                raise OptionError(
+                    f"retarget: joint {self.target.joint_names[joint]!r} of the skeleton has no "
+                    f"channel {kind}, along which the motion moves it"
+                )
+
+    def _way(self, joint: int, other: int) -> Floats:
+        """Shift of ``joint`` from its rest, (3, F): all above it is at rest."""
+        rest = rest_positions(self.target)[joint]
+        result: Floats = self.scale * self.origins[:, other].T - rest[:, None]
+        return result
+
+    def _step(self, other: int) -> Floats:
+        """Shift that position channels of the source's joint add to its offset, (3, F)."""
+        joint = self.source.joints[other]
+        step = np.zeros((3, len(self.values)))
+        for channel, column in zip(joint.channels, self.source.columns(other), strict=True):
+            if channel.kind in POSITION_KINDS:
+                component = POSITION_KINDS.index(channel.kind)
+                step[component] = self.values[:, column]
+                if not joint.adds_to_offset:
+                    step[component] -= joint.offset[component]
+        return step
+
+    def _write(self, index: int, way: Floats | None, columns: Floats) -> None:
+        joint = self.target.joints[index]
+        for channel, column in zip(joint.channels, self.target.columns(index), strict=True):
+            if channel.kind in POSITION_KINDS:
+                component = POSITION_KINDS.index(channel.kind)
+                columns[column] = 0.0 if way is None else way[component]
+                if not joint.adds_to_offset:
+                    columns[column] += joint.offset[component]

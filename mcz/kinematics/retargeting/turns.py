@@ -7,12 +7,11 @@ With C, the matrix of the joint's ``axis``, and M, the product of its channels, 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.kinematics.chain import IDENTITY, Chain, Floats, Pose, multiply_matrices
-from mcz.kinematics.euler import ORDERS
-from mcz.kinematics.rotation_fit import set_turns
-from mcz.kinematics.rotation_refinement import polish_turns
+from mcz.kinematics.chain import IDENTITY, Chain, Pose, multiply_matrices
+from mcz.kinematics.rotation_fit import polish_turns, set_turns
+from mcz.kinematics.rotations import ORDERS
+from mcz.model.types import Bools, Floats
 
 
 def local_turns(chain: Chain, joint: int, columns: Floats) -> Floats:
@@ -49,13 +48,13 @@ def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -
     return made
 
 
-def finite(matrices: Floats) -> NDArray[np.bool_]:
+def finite(matrices: Floats) -> Bools:
     """Flags of the frames of matrices (3, 3, F) that are finite, (F,)."""
-    known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(matrices), axis=(0, 1))
-    return known
+    result: Bools = np.logical_and.reduce(np.isfinite(matrices), axis=(0, 1))
+    return result
 
 
-def held(matrices: Floats, known: NDArray[np.bool_]) -> Floats:
+def held(matrices: Floats, known: Bools) -> Floats:
     """Matrices (3, 3, F), those not known as the last known one before, or the first one after."""
     if known.all():
         return matrices
@@ -63,8 +62,7 @@ def held(matrices: Floats, known: NDArray[np.bool_]) -> Floats:
         return np.broadcast_to(IDENTITY, matrices.shape)
     frames = np.where(known, np.arange(len(known)), -1)
     last = np.maximum.accumulate(frames)
-    filled: Floats = matrices[:, :, np.where(last < 0, known.argmax(), last)]
-    return filled
+    return matrices[:, :, np.where(last < 0, known.argmax(), last)]
 
 
 def back(turn: Floats) -> Floats:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from construct import If, Int8ul, this
@@ -21,10 +23,10 @@ from mcz.model.numbers.magnitudes import (
     vax_values,
 )
 from mcz.model.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
-from mcz.model.numbers.tokens import NAN, TENS, Bools, Floats, Ints, Texts, Tokens, nearest
+from mcz.model.numbers.tokens import NAN, TENS, Texts, Tokens, nearest
 from mcz.model.schema import FINITE, Adapted, Record
 from mcz.model.schema import field as record_field
-from mcz.model.types import Items, Values
+from mcz.model.types import Bools, Floats, Ints, Items, Values
 
 MAX = np.finfo(np.float64).max
 _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
@@ -291,3 +293,18 @@ def _beyond(chosen: Bools, values: Floats) -> Bools:
     beyond = np.zeros(len(chosen), np.bool_)
     beyond[chosen] = ~np.isfinite(values)
     return beyond
+
+
+def grid_blocks(
+    n_rows: int, grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
+) -> Iterator[tuple[slice, list[int], Grid]]:
+    """Blocks (rows, columns, grid) that cover ``n_rows``; see ``Signal.grid_changes``."""
+    cuts = sorted({0, n_rows, *(row for row, _, _ in changes)})
+    current = list(grids)
+    ordered = sorted(changes, key=lambda change: change[0])
+    for start, stop in pairwise(cuts):
+        for row, channel, grid in ordered:
+            if row == start:
+                current[channel] = grid
+        for grid in dict.fromkeys(current):
+            yield slice(start, stop), [c for c, g in enumerate(current) if g == grid], grid

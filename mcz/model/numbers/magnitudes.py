@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.model.numbers.rules import MAX_POWER, MIN_POWER
-from mcz.model.numbers.tokens import EXACT_POWER, NAN, TENS, Floats, Ints
+from mcz.model.numbers.tokens import EXACT_POWER, NAN, TENS
+from mcz.model.types import Floats, Ints
 
 FIRST_NAN32 = 0x7F800001
 FIRST_NAN64 = 0x7FF0000000000001

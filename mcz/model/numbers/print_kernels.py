@@ -7,8 +7,16 @@ import numpy as np
 from mcz.kernels import kernel, truncated
 from mcz.kernels.types import Bytes, Floats, Floats2, Ints2
 from mcz.model.numbers.kernels import length, put
-from mcz.model.numbers.ordinal_kernels import GREATEST_POWER, LEAST_POWER, decimal
-from mcz.model.numbers.value_kernels import DIGITS, FIXED, LIMIT, OTHER, POWER
+from mcz.model.numbers.value_kernels import (
+    DIGITS,
+    FIXED,
+    GREATEST_POWER,
+    LEAST_POWER,
+    LIMIT,
+    OTHER,
+    POWER,
+    decimal,
+)
 
 # Further columns of ``rules``: how ``kernels.put`` prints, and the last power of ten.
 TRIM, LOW, HIGH, FLAGS, GUESS = range(3, 8)

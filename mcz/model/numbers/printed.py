@@ -29,17 +29,8 @@ from mcz.model.numbers.rules import (
     SIGNIFICANT,
     GridFlag,
 )
-from mcz.model.numbers.tokens import (
-    TENS,
-    Bools,
-    Floats,
-    Ints,
-    Texts,
-    Tokens,
-    kernels,
-    nearest,
-    scan_texts,
-)
+from mcz.model.numbers.tokens import TENS, Texts, Tokens, kernels, nearest, scan_texts
+from mcz.model.types import Bools, Floats, Ints
 
 ROUND_TRIP = 17  # significant digits that tell every binary64 from all others
 DECIMAL_TRIP = 16  # and those that do so of numbers up to 2^51 on a decimal grid
@@ -53,8 +44,8 @@ def base_values(digits: int, magnitudes: Ints) -> Floats:
         return magnitudes.view(np.float64)
     if digits > BASE_GENERAL:
         return nearest(*general_split(magnitudes, digits - BASE_GENERAL))
-    values: Floats = np.divide(magnitudes, TENS[digits])
-    return values
+    result: Floats = np.divide(magnitudes, TENS[digits])
+    return result
 
 
 def magnitudes_of(digits: int, values: Floats) -> Ints:

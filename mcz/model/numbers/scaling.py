@@ -1,17 +1,16 @@
-"""Scaling of a signal's stored numbers to its unit: an offset and a factor per channel."""
+"""Scaling of a signal's stored numbers to its unit, and tokens that its grids do not print."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import MotionError
-from mcz.model.checks import Rule, array_of, check_fields
-from mcz.model.types import Values
+from mcz.model import text_format
+from mcz.model.checks import DATA_ITEMS, Rule, array_of, check_fields
+from mcz.model.types import Floats, Ints, Values
 
-Floats = NDArray[np.float64]
 MAX_INTEGER = 2.0**53  # what a binary64 holds exactly
 
 
@@ -71,3 +70,36 @@ class Scaling:
         if numbers.dtype == np.int64:
             new = np.clip(np.rint(np.nan_to_num(new)), -MAX_INTEGER, MAX_INTEGER)
         return np.where(same, numbers, new.astype(numbers.dtype))
+
+
+_NUMBERS = array_of("i8", 1, "int64 of one dimension")
+EXCEPTIONS = {"rows": _NUMBERS, "channels": _NUMBERS, "texts": DATA_ITEMS}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exceptions:
+    """Tokens of a text source that their grid does not print, sorted by row, then channel."""
+
+    rows: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    channels: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    texts: tuple[bytes, ...] = ()
+
+    __repr__ = text_format.exceptions_text
+
+    def __post_init__(self) -> None:
+        check_fields(self, EXCEPTIONS)
+        if not len(self.rows) == len(self.channels) == len(self.texts):
+            raise MotionError("exceptions: rows, channels and texts differ in number")
+
+    def __len__(self) -> int:
+        return len(self.texts)
+
+    def moved(self, columns: Ints) -> Exceptions:
+        """The same where channel k has become ``columns[k]``; those of -1 are left out."""
+        if not len(self):
+            return self
+        channels = columns[self.channels]
+        order = np.lexsort((channels, self.rows))
+        order = order[channels[order] >= 0]
+        texts = tuple(self.texts[k] for k in order.tolist())
+        return Exceptions(self.rows[order], channels[order], texts)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.kernels import SPARE
 from mcz.model.numbers.magnitudes import binary32_magnitudes, general_split
 from mcz.model.numbers.rules import FIXED_TEXT, GridKind, limit
-from mcz.model.numbers.tokens import Bools, Floats, Ints, Texts, Tokens, kernels, scan_texts
+from mcz.model.numbers.tokens import Texts, Tokens, kernels, scan_texts
+from mcz.model.types import Bools, Floats, Ints
 
 _UNLIMITED = 1_000_000  # more decimals, and a larger exponent, than any number has
 WIDEST = 48  # bytes of a number from ``write``; the longest has 17 digits after "-0.00000"
@@ -69,8 +69,8 @@ def uncertain(tokens: Tokens, kind: GridKind, digits: int, printed: Bools) -> Bo
 def long(tokens: Tokens) -> Bools:
     """Mask of the numbers with more digits than a match examines."""
     loops = kernels()
-    found: Bools = tokens.fields[:, 2] & (loops.LONG | loops.BAD | loops.SPECIAL) == loops.LONG
-    return found
+    result: Bools = tokens.fields[:, 2] & (loops.LONG | loops.BAD | loops.SPECIAL) == loops.LONG
+    return result
 
 
 def token_ordinals32(tokens: Tokens) -> Ints:
@@ -120,7 +120,7 @@ def text32_values(magnitudes: Ints) -> Floats:
     return values[inverse].reshape(magnitudes.shape)
 
 
-def _joined(values: NDArray[np.float64], negative: Bools, decimals: int) -> Texts:
+def _joined(values: Floats, negative: Bools, decimals: int) -> Texts:
     pairs = zip(values.tolist(), negative.tolist(), strict=True)
     lines = [f"-{x:.{decimals}f}" if minus else f"{x:.{decimals}f}" for x, minus in pairs]
     offsets = np.concatenate(([0], np.cumsum([len(line) for line in lines], dtype=np.int64)))

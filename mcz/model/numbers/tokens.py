@@ -17,10 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mcz.model.types import Bools, Floats, Ints
 
 NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the one NaN that values hold
 EXACT_POWER = 22  # 10^22 is the last power of ten that a binary64 holds exactly
@@ -110,8 +107,8 @@ class Tokens:
 
     def bad(self) -> Bools:
         """Mask of the tokens that are no numbers; nan and inf are numbers here."""
-        bad: Bools = (self.fields[:, 2] & kernels().BAD) != 0
-        return bad
+        result: Bools = (self.fields[:, 2] & kernels().BAD) != 0
+        return result
 
     def values(self) -> Floats:
         """The nearest binary64 of each token; SourceError names the first that is no number."""

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from mcz.kernels import SPARE, lacks_compiled_kernels
 from mcz.model.numbers import textgrids
-from mcz.model.numbers.blocks import grid_blocks
-from mcz.model.numbers.grid import Grid
+from mcz.model.numbers.grid import Grid, grid_blocks
 from mcz.model.numbers.magnitudes import POWERS
 from mcz.model.numbers.rules import DECIMAL_KINDS, MIN_POWER, GridKind
-from mcz.model.numbers.tokens import TENS, Bools, Floats, Ints
-from mcz.model.types import Values
+from mcz.model.numbers.tokens import TENS
+from mcz.model.types import Bools, Floats, Ints, Values
 
 Bytes = NDArray[np.uint8]
 
@@ -37,7 +36,7 @@ def values_of(
         left = np.ones(len(grids), np.int64)
         if not lacks_compiled_kernels():
             left[:] = 0
-            _kernels("value").fill(ordinals, _rules(tuple(grids)), TENS, values, left)
+            _kernels("value").fill_values(ordinals, _rules(tuple(grids)), TENS, values, left)
         for grid, columns in _left(left, grids):
             values[:, columns] = grid.values(ordinals[:, columns])
         return values
@@ -54,7 +53,9 @@ def ordinals_of(values: Values, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
     values = np.ascontiguousarray(values, np.float64)
     ordinals, exact = np.empty(values.shape, np.int64), np.empty(values.shape, np.uint8)
     left = np.zeros(len(grids), np.int64)
-    _kernels("ordinal").fill(values, _rules(tuple(grids)), TENS, POWERS, ordinals, exact, left)
+    _kernels("value").fill_ordinals(
+        values, _rules(tuple(grids)), TENS, POWERS, ordinals, exact, left
+    )
     for grid, columns in _left(left, grids):
         ordinals[:, columns], exact[:, columns] = grid.ordinals(values[:, columns])
     return ordinals, exact.view(np.bool_)

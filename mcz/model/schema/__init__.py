@@ -1,16 +1,13 @@
 """The layer of structures: records over construct, and the types that the format adds.
 
-``records`` declares, parses and builds them, ``types`` has what construct lacks; ``varints`` and
-``deflating`` serve bulk data too. SPEC.md, "Conventions", is normative.
+``records`` declares, parses and builds them, ``types`` has what construct lacks, varints and raw
+deflate. SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations
 
 from mcz.model.schema.columns import Table as Table
 from mcz.model.schema.columns import columns as columns
-from mcz.model.schema.deflating import MAX_RATIO as MAX_RATIO
-from mcz.model.schema.deflating import deflate as deflate
-from mcz.model.schema.deflating import inflate as inflate
 from mcz.model.schema.records import Record as Record
 from mcz.model.schema.records import build as build
 from mcz.model.schema.records import field as field
@@ -20,6 +17,8 @@ from mcz.model.schema.records import parse_until as parse_until
 from mcz.model.schema.types import EXTENDED as EXTENDED
 from mcz.model.schema.types import EXTENSION as EXTENSION
 from mcz.model.schema.types import FINITE as FINITE
+from mcz.model.schema.types import MAX_COUNT as MAX_COUNT
+from mcz.model.schema.types import MAX_RATIO as MAX_RATIO
 from mcz.model.schema.types import POSITIVE as POSITIVE
 from mcz.model.schema.types import SIZED as SIZED
 from mcz.model.schema.types import SIZED_EXTENSION as SIZED_EXTENSION
@@ -32,11 +31,12 @@ from mcz.model.schema.types import CheckedBeside as CheckedBeside
 from mcz.model.schema.types import Exactly as Exactly
 from mcz.model.schema.types import bounded as bounded
 from mcz.model.schema.types import counted as counted
+from mcz.model.schema.types import deflate as deflate
 from mcz.model.schema.types import flags as flags
+from mcz.model.schema.types import inflate as inflate
 from mcz.model.schema.types import one_of as one_of
 from mcz.model.schema.types import only_if as only_if
 from mcz.model.schema.types import optional as optional
-from mcz.model.schema.varints import MAX_COUNT as MAX_COUNT
-from mcz.model.schema.varints import read_varint as read_varint
-from mcz.model.schema.varints import take_varint as take_varint
-from mcz.model.schema.varints import varint as varint
+from mcz.model.schema.types import read_varint as read_varint
+from mcz.model.schema.types import take_varint as take_varint
+from mcz.model.schema.types import varint as varint

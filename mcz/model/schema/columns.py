@@ -12,15 +12,24 @@ from typing import BinaryIO, Generic, TypeAlias, TypeVar, cast, overload
 import construct
 import numpy as np
 from construct import Container
-from numpy.typing import NDArray
 
 from mcz.errors import FormatError, TruncatedError
 from mcz.model.schema.records import Record, RecordType
-from mcz.model.schema.types import UVARINT, Checked, Exactly, Sized, Text, as_construct
-from mcz.model.schema.varints import MAX_COUNT, read_varint, varint
+from mcz.model.schema.types import (
+    MAX_COUNT,
+    UVARINT,
+    Checked,
+    Exactly,
+    Sized,
+    Text,
+    as_construct,
+    read_varint,
+    varint,
+)
+from mcz.model.types import Ints
 
 R = TypeVar("R", bound=Record)
-Numbers: TypeAlias = NDArray[np.int64]
+Numbers: TypeAlias = Ints
 Column: TypeAlias = Numbers | list[bytes] | list[str]
 Item: TypeAlias = int | bytes | str
 Row: TypeAlias = tuple[Item, ...]

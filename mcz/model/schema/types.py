@@ -1,13 +1,14 @@
 """Types of fields that the format has and construct lacks, as classes of construct.
 
-Numbers, arrays, ``If`` and ``this`` are construct's own. Not used are
-those of its types that accept malformed bytes: ``GreedyRange``, ``Enum``, ``Flag``, ``Padding``,
-``VarInt``, ``Compressed``. SPEC.md, "Conventions", is normative.
+Numbers, arrays, ``If`` and ``this`` are construct's own. Its types that accept malformed bytes are
+not used: ``GreedyRange``, ``Enum``, ``Flag``, ``Padding``, ``VarInt``, ``Compressed``. Varints and
+raw deflate serve bulk data too. SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+import zlib
+from collections.abc import Callable, Collection, Iterable, Sequence
 from itertools import chain
 from typing import Any, BinaryIO, TypeAlias
 
@@ -15,8 +16,52 @@ import construct
 from construct import Construct, Container, Float64l, GreedyBytes, Subconstruct
 from construct.core import CodeGen, stream_read, stream_write
 
-from mcz.errors import FormatError, LimitError
-from mcz.model.schema.varints import MAX_COUNT, take_varint, varint
+from mcz.errors import FormatError, LimitError, TruncatedError
+
+MAX_COUNT = 2**53 - 1  # every count, size and offset; JavaScript's largest exact integer (CONV-01)
+ONE_BYTE = [bytes((value,)) for value in range(0x80)]
+
+
+def varint(value: int) -> bytes:
+    """The bytes of ``value``, 0 <= value <= 2^53 - 1."""
+    if not 0 <= value <= MAX_COUNT:
+        raise LimitError(f"{value} is not between 0 and 2^53 - 1")
+    if value < 0x80:
+        return ONE_BYTE[value]
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def take_varint(source: Iterable[int], where: str) -> int:
+    """The varint that the bytes of ``source`` begin with; no more of them are taken."""
+    value = shift = 0
+    for byte in source:
+        value |= (byte & 0x7F) << shift
+        if value > MAX_COUNT or shift > 49:  # 8 bytes hold 56 bits (CONV-03)
+            raise FormatError("varint beyond 2^53 - 1", where=where)
+        if byte < 0x80:
+            if byte == 0 and shift:  # CONV-02
+                raise FormatError(f"varint {value} is not in its shortest form", where=where)
+            return value
+        shift += 7  # CONV-04
+    raise TruncatedError("a varint runs past the end", where=where)
+
+
+def read_varint(data: bytes | bytearray | memoryview, at: int) -> tuple[int, int]:
+    """The varint at offset ``at`` of ``data`` and the offset after it."""
+    if at + 1 < len(data):  # most have one byte or two
+        low, high = data[at], data[at + 1]
+        if low < 0x80:
+            return low, at + 1
+        if 0 < high < 0x80:
+            return low & 0x7F | high << 7, at + 2
+    value = take_varint(data[at : at + 9], f"offset {at}")
+    return value, at + max(1, -(-value.bit_length() // 7))  # its form is the shortest
+
 
 Kind: TypeAlias = "Construct | type"  # a type of construct, or a record
 
@@ -253,3 +298,30 @@ EXTENDED = 0x80  # in the flags of a structure: it has an extension, which is si
 SIZED_EXTENSION = construct.If(construct.this.flags & EXTENDED, SIZED)
 FINITE = Checked(Float64l, lambda value: value - value == 0)  # SKEL-08
 POSITIVE = Checked(UVARINT, lambda value: value >= 1)
+
+
+MAX_RATIO = 1032  # raw deflate never inflates to more than this times its size
+
+
+def inflate(data: bytes, size: int, where: str, *, words: bytes = b"") -> bytes:
+    """The ``size`` bytes whose raw deflate is ``data``; never more memory than ``size`` + 1.
+
+    ``words``: bytes that distances may reach back to, as if they came before.
+    """
+    if size > MAX_RATIO * (len(data) + 1):  # LIMIT-14
+        raise LimitError(f"{size} bytes cannot come of {len(data)}", where=where)
+    inflater = zlib.decompressobj(-15, words)  # CONV-19
+    try:
+        out = inflater.decompress(data, size + 1)
+    except zlib.error as error:
+        raise FormatError(str(error), where=where) from None
+    if len(out) != size or not inflater.eof or inflater.unused_data:  # CONV-08, CONV-09
+        message = f"deflate of {len(data)} bytes does not give {size} bytes"
+        raise FormatError(message, where=where)
+    return out
+
+
+def deflate(data: bytes, *, words: bytes = b"") -> bytes:
+    """The raw deflate of ``data``, which may refer to ``words``."""
+    deflater = zlib.compressobj(9, zlib.DEFLATED, -15, 9, zlib.Z_DEFAULT_STRATEGY, words)
+    return deflater.compress(data) + deflater.flush()

@@ -19,7 +19,7 @@ from mcz.files.reading.sizes import models_used
 from mcz.files.writing.atomic import replacing
 from mcz.hints import Hint, with_hint
 from mcz.kinematics.metrics.diff_document import diff_document
-from mcz.model.annexes import annex_bytes
+from mcz.model.extras import annex_bytes
 from mcz.model.text_format import brief
 from mcz.model.types import JsonObject, Params, Target
 from mcz.show.viewing.file_registry import FACTS, Shelf, Shelved

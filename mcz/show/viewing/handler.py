@@ -16,7 +16,7 @@ from http.server import BaseHTTPRequestHandler
 from typing import Any, cast
 
 from mcz.errors import MczError
-from mcz.model.annexes import annex_bytes, annex_names
+from mcz.model.extras import annex_bytes, annex_names
 from mcz.model.types import JsonObject
 from mcz.show.viewing.requests import (
     LONGEST_JSON,

@@ -231,13 +231,12 @@ def lossy_codecs() -> list[JsonObject]:
     first.
     """
     from mcz.codecs import CODECS, codec_by_name
-    from mcz.codecs.listing import codec_document
 
     lossy = sorted(
         (codec for codec in CODECS.values() if not codec.lossless),
         key=lambda codec: codec is not codec_by_name("lossy"),
     )
-    return [codec_document(codec) | {"dial": dial_of(codec.dial)} for codec in lossy]
+    return [codec.document() | {"dial": dial_of(codec.dial)} for codec in lossy]
 
 
 def dial_of(dial: Dial | None) -> JsonObject | None:

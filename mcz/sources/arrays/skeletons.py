@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.model.annexes import annex_bytes
+from mcz.model.extras import annex_bytes
 from mcz.model.motion import (
     ORIGIN,
     POSITION_KINDS,

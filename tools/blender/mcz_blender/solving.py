@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 
 import mcz
-from mcz.kinematics.euler import euler_angles, euler_order
+from mcz.kinematics.rotations import euler_angles, euler_order
 from mcz.model.numbers import Grid, GridKind
 
 from .spaces import TO_Z_UP, Floats

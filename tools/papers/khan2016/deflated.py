@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from mcz.bench.cases import Case, Variant, load
 from mcz.codecs import codec_by_name
-from mcz.codecs.transforms.dwt import own_range
-from mcz.codecs.transforms.wavelets import by_id
+from mcz.codecs.transforms.wavelets import by_id, own_range
 from mcz.codecs.wavelet import wavelet as wavelet_codec
 from mcz.codecs.wavelet.streams import Coding, parse_streams
 from mcz.files.writing.signal_source import MemorySource

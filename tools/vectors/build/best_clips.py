@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs.coding.fast.encoder import StreamBuilder
-from mcz.codecs.lossless.best_streams import AS_FAST, code_plan
+from mcz.codecs.lossless.best import AS_FAST, code_plan
 from mcz.codecs.lossless.echoes import Echo
 from mcz.model.numbers import Grid
 

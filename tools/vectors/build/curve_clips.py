@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs import raw
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.curves import qbc, streams
 from mcz.codecs.parameters import SCALED

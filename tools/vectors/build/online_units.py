@@ -16,7 +16,7 @@ import numpy as np
 from mcz.codecs.basis_models import Basis
 from mcz.codecs.coding import mixing
 from mcz.codecs.coding.residuals import N_CONTEXTS, N_MIXERS, code_residual
-from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import start_states
 from mcz.codecs.contract import Segment
 from mcz.codecs.online.units import Unit, build_units
 from tools.vectors.build import spatial_clips

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs import raw
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.start_states import start_states
-from mcz.codecs.coding.streams import scale_of
+from mcz.codecs.coding.streams import scale_of, start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.pca import kernels, pca
 from mcz.codecs.table_kernels import code_table

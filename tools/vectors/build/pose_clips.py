@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.posewave import posewave
-from mcz.codecs.posewave.contact_tracker import ContactTracker, Piece
+from mcz.codecs.posewave.contacts import ContactTracker, Piece
 from mcz.codecs.posewave.exact_channels import build_exact, groups_of
 from mcz.codecs.posewave.header import Header, PosewaveHeader, parse_header
-from mcz.codecs.posewave.segment import Weights, encode_segment
-from mcz.codecs.posewave.segment_chain import SegmentChain
+from mcz.codecs.posewave.segment import SegmentChain, Weights, encode_segment
 from mcz.model.motion import Joint, Skeleton
 from mcz.model.numbers import Grid
 from tools.records import build_record

@@ -28,7 +28,7 @@ from mcz.codecs.contract import (
     model_id,
 )
 from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
-from mcz.codecs.spatial import lsdt_frame, window_streams
+from mcz.codecs.spatial import lsdt_frame, windows
 from mcz.codecs.spatial.prefix_streams import codes_from, fields_of
 from mcz.codecs.spatial.windows import WindowsHeader
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
@@ -214,7 +214,7 @@ def _frame_streams(plan: Plan, fresh: Sequence[bool]) -> Iterator[bytes]:
 def _window_streams_of(plan: Plan) -> Iterator[bytes]:
     codes = codes_from(parse(WindowsHeader, header(plan), plan.codec).code, plan.codec)
     for segment in tables(plan):
-        yield b"".join(window_streams.build_window(t, plan.starts, codes) for t in segment)
+        yield b"".join(windows.build_window(t, plan.starts, codes) for t in segment)
 
 
 # Files

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from mcz.codecs import raw
 from mcz.codecs.coding import mixing
-from mcz.codecs.coding.start_states import start_states
+from mcz.codecs.coding.streams import start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.parameters import SCALED
-from mcz.codecs.transforms import dwt
+from mcz.codecs.transforms import wavelets
 from mcz.codecs.transforms.wavelets import Wavelet, by_id
 from mcz.codecs.wavelet import mrdwt, streams
 from mcz.model.motion import Motion
@@ -144,7 +144,7 @@ def _segments(plan: Plan, channels: Sequence[Wave]) -> list[Segment]:
     first = 0
     for stop in (*plan.ends, *([plan.n_frames] if plan.n_frames else [])):
         own = [
-            slice(*dwt.own_range(first, stop, plan.level(band), plan.lengths))
+            slice(*wavelets.own_range(first, stop, plan.level(band), plan.lengths))
             for band in range(plan.resolutions)
         ]
         by_channel = []

@@ -11,16 +11,14 @@ from functools import cache
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.codecs.coding.fast.lanes import Lanes, read_lanes
+from mcz.codecs.coding.fast.lanes import Lanes, read_all
 from mcz.codecs.coding.forms.ids import WITH_UNIT, form_of_grid
 from mcz.codecs.coding.forms.units import parse_mapping
 from mcz.errors import FormatError
-from mcz.kernels import lacks_compiled_kernels
 from mcz.model.numbers import Grid
+from mcz.model.types import Ints
 
-Ints = NDArray[np.int64]
 Fetch = Callable[[int], bytes]  # a group -> its stream
 
 MOST_ROWS, MOST_VALUES = 4096, 2**23  # of a segment
@@ -47,16 +45,10 @@ FAULTS = (
 
 @cache
 def kernels() -> tuple[ModuleType, ...]:
-    """The compiled loops, imported on first use: of heads, columns, lanes, residuals and tails."""
-    from mcz.codecs.coding.fast import (
-        column_kernels,
-        head_kernels,
-        lane_kernels,
-        residual_kernels,
-        tail_kernels,
-    )
+    """The compiled loops, imported on first use: of heads, lanes, residuals and tails."""
+    from mcz.codecs.coding.fast import head_kernels, lane_kernels, residual_kernels, tail_kernels
 
-    return head_kernels, column_kernels, lane_kernels, residual_kernels, tail_kernels
+    return head_kernels, lane_kernels, residual_kernels, tail_kernels
 
 
 class Shape:
@@ -177,7 +169,7 @@ class SegmentDecoder:
 
     def __init__(self, shape: Shape, wanted: tuple[int, ...], fetch: Fetch, out: Ints) -> None:
         """``out``: (rows, channels of the groups ``wanted``). Raises FormatError."""
-        lane = kernels()[2]
+        lane = kernels()[1]
         heads, n_whole = read_heads_of(shape, wanted, fetch, len(out))
         columns = heads.columns
         channel, fault = lane.link(
@@ -201,7 +193,7 @@ class SegmentDecoder:
 
     def _map_units(self) -> None:
         """Turn the leads of lanes with units into ordinals."""
-        own, _, _, residual, _ = kernels()
+        own, _, residual, _ = kernels()
         plans = self.heads.plans
         n_whole = len(self.lanes.tails)
         columns = self.lanes.columns[: self.lanes.starts[n_whole]]
@@ -218,7 +210,7 @@ class SegmentDecoder:
 
 
 def _lanes_of(heads: Heads, n_whole: int, out: Ints) -> Lanes:
-    own, _, lane, residual, tail = kernels()
+    own, lane, residual, tail = kernels()
     n_lanes = int(np.sum(heads.plans[:, own.KIND] == own.CODED))
     starts, columns = np.empty(len(heads.groups) + 1, np.int64), np.empty(n_lanes, np.int64)
     lattices = np.zeros((n_lanes, tail.LATTICE_SIZE), np.int64)
@@ -234,13 +226,7 @@ def _lanes_of(heads: Heads, n_whole: int, out: Ints) -> Lanes:
 
 def read_segments(segments: Sequence[SegmentDecoder]) -> None:
     """Fill the rows of segments, several at a time; raises FormatError for bad bytes."""
-    if lacks_compiled_kernels():
-        from mcz.codecs.coding.fast.numpy_decoder import read_all  # where it is needed alone
-
-        read_all([segment.lanes for segment in segments])
-    else:
-        for segment in segments:
-            read_lanes(segment.lanes)
+    read_all([segment.lanes for segment in segments])
     for segment in segments:
         segment.finish()
 

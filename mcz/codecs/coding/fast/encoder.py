@@ -14,17 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.forms.count_test import may_be_counts
+from mcz.codecs.coding.forms.counts import may_be_counts
 from mcz.codecs.coding.forms.ids import BINARY32, form_of_grid, has_binary32, unit_grid
 from mcz.codecs.coding.forms.products import tiny_limit
 from mcz.codecs.coding.forms.units import find_units
 from mcz.model.numbers import Grid, GridKind
+from mcz.model.types import Bools, Ints
 
 if TYPE_CHECKING:
     from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
 
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 
 FEWEST_ROWS = 32  # for which parents are looked for
 VALUE_BYTES = 20  # of a residual and a tail, of a run or of an exception, at most
@@ -129,8 +128,8 @@ class StreamBuilder:
         numbers, firsts, groups = self.numbers, self.firsts, self.groups
         forms = self.forms, self.clip_forms
         given = ordinals, numbers, firsts, groups, *forms
-        channels: Channels = survey.Channels(*given, columns, plans)
-        return channels
+        result: Channels = survey.Channels(*given, columns, plans)
+        return result
 
     def _find_units(self, channels: Channels) -> tuple[dict[int, Ints], bytes]:
         """Code channels in units where they can be; their rests, and the fields of all units."""
@@ -198,3 +197,13 @@ def _unit_limit(grid: Grid, clip_grid: Grid) -> int:
     if has_binary32(grid):
         return ANY if unit_grid(clip_grid) == BINARY32 else 0
     return tiny_limit(grid) if grid == clip_grid else 0
+
+
+BLOCK_ROWS = 1024
+
+
+def channel_bytes(ordinals: Ints, grid: Grid) -> int:
+    """Size in bytes of the streams of one channel, (n_rows,), coded alone."""
+    builder, starts = StreamBuilder([grid], [[0]]), range(0, len(ordinals), BLOCK_ROWS)
+    blocks = (ordinals[start : start + BLOCK_ROWS, None] for start in starts)
+    return sum(len(builder.build(block, (grid,))[0]) for block in blocks)

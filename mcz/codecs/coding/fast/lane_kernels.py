@@ -1,4 +1,4 @@
-"""Compiled: parents and sources of channels, and the arrays that lanes are decoded with.
+"""Compiled: parents and sources of channels, arrays of lanes, and channels that are not coded.
 
 SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
 """
@@ -7,38 +7,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.coding.fast.head_kernels import (
-    BAD_LINK,
-    BAD_PARENT,
-    BAD_SOURCE,
-    BASE,
-    CODED,
-    COPY,
-    FAR_PARENTS,
-    FIRST,
-    GROUP,
-    KIND,
-    LINK,
-    PLACE,
-    SCALE,
-    TAPS,
-    WEIGHT,
-)
+from mcz.codecs.coding.fast import head_kernels as head
 from mcz.codecs.coding.fast.residual_kernels import Predictors
 from mcz.kernels import kernel, wrapped
-from mcz.kernels.types import Ints, Ints2
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 
 def link_channel(plans: Ints2, firsts: Ints, n: int, at: int) -> int:
     """Note the parent or the source of channel ``n``, whose group is ``at``; returns the fault."""
-    place = plans[n, PLACE]
+    place = plans[n, head.PLACE]
     if at < 0 or place >= firsts[at + 1] - firsts[at]:
-        return BAD_LINK
+        return head.BAD_LINK
     linked = firsts[at] + place
-    plans[n, LINK] = linked
-    if plans[n, KIND] == COPY:
-        return BAD_SOURCE if plans[linked, KIND] == COPY else -1  # FAST-27
-    return BAD_PARENT if linked == n or plans[linked, KIND] != CODED else -1  # FAST-34
+    plans[n, head.LINK] = linked
+    if plans[n, head.KIND] == head.COPY:
+        return head.BAD_SOURCE if plans[linked, head.KIND] == head.COPY else -1  # FAST-27
+    return (
+        head.BAD_PARENT if linked == n or plans[linked, head.KIND] != head.CODED else -1
+    )  # FAST-34
 
 
 @kernel
@@ -53,20 +39,20 @@ def link(
     for n_group in range(len(groups)):
         one = two = -1
         for n in range(firsts[n_group], firsts[n_group + 1]):
-            plans[n, LINK] = -1
-            group = plans[n, GROUP]
+            plans[n, head.LINK] = -1
+            group = plans[n, head.GROUP]
             if group < 0:
                 continue
-            if plans[n, KIND] == CODED and group != groups[n_group]:
+            if plans[n, head.KIND] == head.CODED and group != groups[n_group]:
                 if one < 0 or one == group:
                     one = group
                 elif two < 0 or two == group:
                     two = group
                 else:  # FAST-36
-                    return n, FAR_PARENTS
+                    return n, head.FAR_PARENTS
             if group >= len(places):  # FAST-27, FAST-34
-                return n, BAD_LINK
-            if n_group < (n_wanted if plans[n, KIND] == COPY else n_whole):
+                return n, head.BAD_LINK
+            if n_group < (n_wanted if plans[n, head.KIND] == head.COPY else n_whole):
                 fault = link_channel(plans, firsts, n, places[group])
                 if fault >= 0:
                     return n, fault
@@ -86,20 +72,80 @@ def fill_lanes(
     for group in range(len(firsts) - 1):
         starts[group] = n_lanes
         for n in range(firsts[group], firsts[group + 1]):
-            if plans[n, KIND] == CODED:
+            if plans[n, head.KIND] == head.CODED:
                 columns[n_lanes] = n
                 lane_of[n] = n_lanes
                 n_lanes += 1
     starts[len(firsts) - 1] = n_lanes
     for lane in range(n_lanes):
         plan = plans[columns[lane]]
-        lanes.first[lane] = wrapped(plan[FIRST])
-        lanes.scales[lane] = wrapped(plan[SCALE])
-        lanes.weights[lane] = wrapped(plan[WEIGHT])
-        lanes.parents[lane] = lane_of[plan[LINK]] if plan[LINK] >= 0 else -1
-        lanes.behind[0, lane] = wrapped(plan[TAPS])
-        lanes.behind[4, lane] = wrapped(-plan[TAPS + 3])
+        lanes.first[lane] = wrapped(plan[head.FIRST])
+        lanes.scales[lane] = wrapped(plan[head.SCALE])
+        lanes.weights[lane] = wrapped(plan[head.WEIGHT])
+        lanes.parents[lane] = lane_of[plan[head.LINK]] if plan[head.LINK] >= 0 else -1
+        lanes.behind[0, lane] = wrapped(plan[head.TAPS])
+        lanes.behind[4, lane] = wrapped(-plan[head.TAPS + 3])
         for tap in range(1, 4):
-            lanes.behind[tap, lane] = wrapped(plan[TAPS + tap] - plan[TAPS + tap - 1])
+            lanes.behind[tap, lane] = wrapped(plan[head.TAPS + tap] - plan[head.TAPS + tap - 1])
         for field in range(6):
-            lattices[lane, field] = plan[BASE + field]
+            lattices[lane, field] = plan[head.BASE + field]
+
+
+SIGN = 1 << 63
+
+
+def short_ordinal(data: Bytes, at: int, size: int) -> int:
+    folded = 0
+    for place in range(size):
+        folded |= int(data[at + place]) << 8 * place
+    return (folded >> 1 & SIGN - 1) ^ -(folded & 1)
+
+
+def fill_rows(rows: Ints2, n: int, start: int, stop: int, ordinal: int) -> None:
+    for row in range(start, stop):
+        rows[row, n] = ordinal
+
+
+def fill_steps(data: Bytes, at: int, rows: Ints2, n: int) -> None:
+    """Fill a channel with the ordinals of runs."""
+    n_runs, at = head.varint(data, at, len(data))
+    row = 0
+    for _ in range(n_runs):
+        n_rows, at = head.varint(data, at, len(data))
+        size = int(data[at])
+        fill_rows(rows, n, row, row + n_rows, short_ordinal(data, at + 1, size))  # FAST-24
+        row += n_rows
+        at += 1 + size
+
+
+def put_exceptions(data: Bytes, at: int, rows: Ints2, n: int) -> None:
+    n_exceptions, at = head.varint(data, at, len(data))
+    row = -1
+    for _ in range(n_exceptions):
+        gap, at = head.varint(data, at, len(data))
+        row += gap + 1
+        size = int(data[at])
+        rows[row, n] = short_ordinal(data, at + 1, size)  # FAST-38
+        at += 1 + size
+
+
+@kernel
+def fill_columns(data: Bytes, plans: Ints2, n_wanted: int, rows: Ints2) -> None:
+    """Fill ``rows`` (rows, channels) but for what is coded; copies in the first ``n_wanted``.
+
+    What the heads say was checked.
+    """
+    n_rows, n_channels = rows.shape
+    for n in range(n_channels):
+        at = plans[n, head.FIELDS]
+        if plans[n, head.KIND] == head.CONSTANT:
+            size = int(data[at - 1]) >> 2
+            fill_rows(rows, n, 0, n_rows, short_ordinal(data, at, size))  # FAST-23
+        elif plans[n, head.KIND] == head.STEPS:
+            fill_steps(data, at, rows, n)
+        elif plans[n, head.EXCEPTIONS] >= 0:
+            put_exceptions(data, plans[n, head.EXCEPTIONS], rows, n)
+    for n in range(n_wanted):
+        if plans[n, head.KIND] == head.COPY:
+            for row in range(n_rows):
+                rows[row, n] = rows[row, plans[n, head.LINK]]  # FAST-26

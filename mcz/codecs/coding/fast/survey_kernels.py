@@ -9,21 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcz.codecs.coding.fast.head_kernels import (
-    BASE,
-    CODED,
-    CONSTANT,
-    COPY,
-    DIGITS,
-    DROP,
-    KIND,
-    LINK,
-    REST,
-    STEPS,
-    TOP,
-    most_classes,
-    set_form,
-)
+from mcz.codecs.coding.fast import head_kernels as head
 from mcz.codecs.coding.fast.head_kernels import PLAN_SIZE as READ_SIZE
 from mcz.codecs.coding.fast.tail_kernels import POWERS
 from mcz.kernels import bit_length, kernel, trailing_zeros
@@ -118,24 +104,24 @@ def find_source(columns: Ints2, n: int, table: Ints) -> int:
 
 def per_class(plan: Ints) -> int:
     """The numbers of a class."""
-    digits = int(plan[DIGITS])
-    return 9 * POWERS[digits - 1] if plan[BASE] == 10 else 1 << (digits - 1)
+    digits = int(plan[head.DIGITS])
+    return 9 * POWERS[digits - 1] if plan[head.BASE] == 10 else 1 << (digits - 1)
 
 
 def class_of(magnitude: int, plan: Ints) -> int:
     """The class of a magnitude, that of the least ones 0; without a base its bits."""
-    if plan[BASE] == 0:
+    if plan[head.BASE] == 0:
         return bit_length(magnitude)
-    first = 1 if plan[BASE] == 10 else 0
-    return int(max((magnitude >> plan[DROP]) - first, 0) // per_class(plan))
+    first = 1 if plan[head.BASE] == 10 else 0
+    return int(max((magnitude >> plan[head.DROP]) - first, 0) // per_class(plan))
 
 
 def least_of(number: int, plan: Ints) -> int:
     """The least magnitude of class ``number`` > 0."""
-    if plan[BASE] == 0:
+    if plan[head.BASE] == 0:
         return 1 << (number - 1)
-    first = 1 if plan[BASE] == 10 else 0
-    return int(number * per_class(plan) + first << plan[DROP])
+    first = 1 if plan[head.BASE] == 10 else 0
+    return int(number * per_class(plan) + first << plan[head.DROP])
 
 
 def count_from(column: Ints, least: int) -> int:
@@ -177,19 +163,19 @@ def most_within(column: Ints, plan: Ints) -> int:
 
 def choose_form(column: Ints, form: int, used: int, plan: Ints) -> None:
     """Note form, greatest class and limit for a column whose magnitudes have the bits ``used``."""
-    plan[REST], plan[TOP] = -1, 0
-    set_form(plan, form, 0)
-    if plan[BASE] == 2 and used:
-        set_form(plan, form, min(trailing_zeros(used), plan[DIGITS] - 2))
-    if plan[BASE]:
-        set_limit(column, plan, min(plan[DIGITS], 9 if plan[BASE] == 10 else 30) >> 1)
-        plan[TOP] = class_of(most_within(column, plan), plan)
-        if plan[TOP] <= most_classes(form):
+    plan[head.REST], plan[head.TOP] = -1, 0
+    head.set_form(plan, form, 0)
+    if plan[head.BASE] == 2 and used:
+        head.set_form(plan, form, min(trailing_zeros(used), plan[head.DIGITS] - 2))
+    if plan[head.BASE]:
+        set_limit(column, plan, min(plan[head.DIGITS], 9 if plan[head.BASE] == 10 else 30) >> 1)
+        plan[head.TOP] = class_of(most_within(column, plan), plan)
+        if plan[head.TOP] <= head.most_classes(form):
             return
-        set_form(plan, 0, 0)
-        plan[TOP] = 0
+        head.set_form(plan, 0, 0)
+        plan[head.TOP] = 0
     set_limit(column, plan, PLAIN_MARGIN)
-    plan[DROP] = max(0, bit_length(most_within(column, plan)) - LEAD_BITS)
+    plan[head.DROP] = max(0, bit_length(most_within(column, plan)) - LEAD_BITS)
 
 
 def repeat_before(column: Ints, limit: int) -> None:
@@ -217,17 +203,17 @@ def survey(channels: Channels) -> None:
         table[slot] = -1
     for n in range(len(plans)):
         used = take_column(channels, n)
-        plans[n, KIND], plans[n, LINK], plans[n, LIMIT] = CODED, -1, -1
+        plans[n, head.KIND], plans[n, head.LINK], plans[n, LIMIT] = head.CODED, -1, -1
         if plans[n, CHANGES] == 0:
-            plans[n, KIND] = CONSTANT
+            plans[n, head.KIND] = head.CONSTANT
             continue
-        plans[n, LINK] = find_source(columns, n, table)
-        if plans[n, LINK] >= 0:
-            plans[n, KIND] = COPY
+        plans[n, head.LINK] = find_source(columns, n, table)
+        if plans[n, head.LINK] >= 0:
+            plans[n, head.KIND] = head.COPY
         else:
             choose_form(columns[n], channels.forms[n], used, plans[n])
     for n in range(len(plans)):  # not before, as copies are of all rows
-        if plans[n, KIND] == CODED and plans[n, LIMIT] >= 0:
+        if plans[n, head.KIND] == head.CODED and plans[n, LIMIT] >= 0:
             repeat_before(columns[n], plans[n, LIMIT])
 
 
@@ -267,5 +253,5 @@ def are_steps(channels: Channels, n: int) -> bool:
 def choose_steps(channels: Channels) -> None:
     """Note which coded channels are steps, after units were found."""
     for n in range(len(channels.plans)):
-        if channels.plans[n, KIND] == CODED and are_steps(channels, n):
-            channels.plans[n, KIND] = STEPS
+        if channels.plans[n, head.KIND] == head.CODED and are_steps(channels, n):
+            channels.plans[n, head.KIND] = head.STEPS

@@ -5,10 +5,18 @@ SPEC.md, "Codec 1: fast", is normative. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.codecs.coding.fast.head_write_kernels import put_head, put_varint
+from mcz.codecs.coding.fast import head_kernels as head
 from mcz.codecs.coding.fast.plan_kernels import grown
 from mcz.codecs.coding.fast.residual_kernels import PLAIN
-from mcz.codecs.coding.fast.survey_kernels import Channels, CodedLanes
+from mcz.codecs.coding.fast.survey_kernels import (
+    CHANGES,
+    FIELDS_END,
+    LIMIT,
+    PREDICTOR,
+    Channels,
+    CodedLanes,
+    short_size,
+)
 from mcz.codecs.coding.fast.tail_kernels import (
     BASE,
     DIGITS,
@@ -221,3 +229,118 @@ def write_streams(
             at = append(out, at, residuals, sizes[0])
             at = append(out, at, tails, sizes[1])
         ends[group] = at
+
+
+def put_varint(out: Bytes, at: int, value: int) -> int:
+    """Write a varint; returns the offset behind it, as all of these do."""
+    while value >= 128:
+        out[at] = value & 127 | 128
+        value >>= 7
+        at += 1
+    out[at] = value
+    return at + 1
+
+
+def put_zigzag(out: Bytes, at: int, value: int) -> int:
+    return put_varint(out, at, value << 1 ^ value >> 63)
+
+
+def put_short(out: Bytes, at: int, ordinal: int) -> int:
+    """Write a short ordinal, without its size."""
+    folded = ordinal << 1 ^ ordinal >> 63
+    size = short_size(ordinal)
+    for place in range(size):
+        out[at + place] = folded >> 8 * place & 255
+    return at + size
+
+
+def put_sized(out: Bytes, at: int, ordinal: int) -> int:
+    """Write the size of a short ordinal, and the ordinal."""
+    out[at] = short_size(ordinal)
+    return put_short(out, at + 1, ordinal)
+
+
+def put_steps(channels: Channels, n: int, out: Bytes, at: int) -> int:
+    """Write the runs of steps."""
+    ordinals, number = channels.ordinals, channels.numbers[n]
+    at = put_varint(out, at, channels.plans[n, CHANGES] + 1)
+    start = 0
+    for row in range(1, len(ordinals) + 1):
+        if row == len(ordinals) or ordinals[row, number] != ordinals[row - 1, number]:
+            at = put_varint(out, at, row - start)
+            at = put_sized(out, at, ordinals[start, number])
+            start = row
+    return at
+
+
+def put_exceptions(channels: Channels, n: int, out: Bytes, at: int) -> int:
+    """Write the rows whose magnitudes reach the limit."""
+    ordinals, number, limit = channels.ordinals, channels.numbers[n], channels.plans[n, LIMIT]
+    count = 0
+    for row in range(len(ordinals)):
+        count += 1 if ordinals[row, number] ^ (ordinals[row, number] >> 63) >= limit else 0
+    at = put_varint(out, at, count)
+    before = -1
+    for row in range(len(ordinals)):
+        ordinal = ordinals[row, number]
+        if ordinal ^ (ordinal >> 63) >= limit:
+            at = put_varint(out, at, row - before - 1)
+            at = put_sized(out, at, ordinal)
+            before = row
+    return at
+
+
+def put_form(plan: Ints, is_own: bool, fields: Bytes, out: Bytes, at: int) -> int:
+    """Write form, the fields of a unit, and the greatest class."""
+    if is_own:
+        out[at], out[at + 1] = plan[head.FORM], plan[head.DROP]
+        at += 2
+    for place in range(plan[head.FIELDS], plan[FIELDS_END]):
+        out[at] = fields[place]
+        at += 1
+    return put_varint(out, at, plan[head.TOP]) if plan[head.BASE] else at
+
+
+def put_coded(channels: Channels, n: int, fields: Bytes, out: Bytes, at: int) -> int:
+    """Write the head of a coded channel."""
+    plan = channels.plans[n]
+    is_own = plan[head.DROP] > 0 or plan[head.FORM] != channels.clip_forms[n]
+    kind = head.CODED | plan[PREDICTOR] << 2 | (head.OWN_FORM if is_own else 0)
+    kind |= (head.TINY_BIT if plan[head.TINY] else 0) | (
+        head.PARENT_BIT if plan[head.LINK] >= 0 else 0
+    )
+    out[at] = kind | (head.EXCEPTIONS_BIT if plan[LIMIT] >= 0 else 0)
+    at = put_form(plan, is_own, fields, out, at + 1)
+    at = put_zigzag(out, at, plan[head.FIRST])
+    out[at] = plan[head.SCALE]
+    at += 1
+    if plan[PREDICTOR] == head.FITTED:
+        for tap in range(head.N_TAPS):
+            out[at + tap] = plan[head.TAPS + tap] & 255
+        at += head.N_TAPS
+    if plan[head.LINK] >= 0:
+        at = put_link(channels, plan[head.LINK], out, at)
+        at = put_zigzag(out, at, plan[head.WEIGHT])
+    return put_exceptions(channels, n, out, at) if plan[LIMIT] >= 0 else at
+
+
+def put_link(channels: Channels, linked: int, out: Bytes, at: int) -> int:
+    """Write the group and the place of a channel."""
+    group = channels.groups[linked]
+    at = put_varint(out, at, group)
+    return put_varint(out, at, linked - channels.firsts[group])
+
+
+def put_head(channels: Channels, n: int, fields: Bytes, out: Bytes, at: int) -> int:
+    """Write the head of a channel; ``fields``: those of all units."""
+    plan = channels.plans[n]
+    if plan[head.KIND] == head.CODED:
+        return put_coded(channels, n, fields, out, at)
+    out[at] = plan[head.KIND]
+    if plan[head.KIND] == head.COPY:
+        return put_link(channels, plan[head.LINK], out, at + 1)
+    if plan[head.KIND] == head.STEPS:
+        return put_steps(channels, n, out, at + 1)
+    ordinal = channels.ordinals[0, channels.numbers[n]]
+    out[at] = head.CONSTANT | short_size(ordinal) << 2
+    return put_short(out, at + 1, ordinal)

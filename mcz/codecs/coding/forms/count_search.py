@@ -9,15 +9,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.codecs.coding.forms.counts import MOST, Law
+from mcz.codecs.coding.forms.counts import MOST, Law, bounds, spacing
 from mcz.codecs.coding.forms.ids import BINARY32
-from mcz.codecs.coding.forms.rounding import bounds, spacing
 from mcz.model.numbers import Grid, GridKind, values_of
+from mcz.model.types import Floats, Ints
 
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 Line = tuple[float, float]  # what a count is, and what 0 is
 
 LEAST_UNIT, MOST_COUNT = 2.0**-200, 2.0**40

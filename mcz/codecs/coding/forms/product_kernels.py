@@ -9,7 +9,7 @@ import numpy as np
 
 from mcz.kernels import kernel, trailing_zeros, truncated
 from mcz.kernels.types import Floats, Ints
-from mcz.model.numbers.ordinal_kernels import decimal, magnitude_of
+from mcz.model.numbers.value_kernels import decimal, magnitude_of
 
 EXACT = 1 << 53  # up to which quotients of floats are right
 MOST = float(1 << 24)  # units in a value, for which one is looked for

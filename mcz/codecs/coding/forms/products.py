@@ -8,15 +8,12 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.kernels import lacks_compiled_kernels
 from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.numbers.magnitudes import POWERS
 from mcz.model.numbers.tokens import TENS
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats, Ints
 
 DEGREE = 180 / np.pi  # in a radian
 LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance

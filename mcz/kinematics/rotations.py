@@ -1,4 +1,4 @@
-"""Rotation vectors, an axis times an angle: the exponential map, quaternions, and the way back.
+"""Rotations as matrices, vectors (an axis times an angle), quaternions and Euler angles.
 
 Vectors are (3, F) in radians, quaternions (w, x, y, z), (4, F), matrices (3, 3, F), active, for
 column vectors.
@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mcz.model.types import Floats
 
 NEAR = 0.1  # radians below which a difference of near numbers is summed as a series
 SERIES = (1 / 6, -1 / 120, 1 / 5040, -1 / 362880)  # of (t - sin t) / t^3, in t^2
@@ -42,8 +41,8 @@ def spins_of_vectors(vectors: Floats) -> Floats:
 
 def _length(vectors: Floats) -> Floats:
     """|v|, also where its square would be 0 or infinite."""
-    length: Floats = np.hypot(np.hypot(vectors[0], vectors[1]), vectors[2])
-    return length
+    result: Floats = np.hypot(np.hypot(vectors[0], vectors[1]), vectors[2])
+    return result
 
 
 def _combine_vectors(vectors: Floats, first: Floats, second: Floats, angle: Floats) -> Floats:
@@ -109,8 +108,7 @@ def vectors_of_quaternions(quaternions: Floats) -> Floats:
     angle = 2 * np.arctan2(sine, np.abs(w))
     small = sine == 0
     ratio = np.where(small, 2.0, angle / np.where(small, 1.0, sine))
-    vectors: Floats = parts * np.where(w < 0, -ratio, ratio)
-    return vectors
+    return parts * np.where(w < 0, -ratio, ratio)
 
 
 def continuous(vectors: Floats, start: Floats | None = None) -> Floats:
@@ -138,3 +136,79 @@ def nearest_vector(vector: Floats, wanted: Floats) -> Floats:
         return vector
     turns = np.rint((float(wanted @ axis) - length) / FULL_TURN)
     return vector if turns == 0 else axis * (length + FULL_TURN * turns)
+
+
+# The most common order of BVH files first.
+ORDERS = ("zyx", "zxy", "yxz", "xyz", "xzy", "yzx")
+STEEP = np.sin(np.deg2rad(80))  # beyond it the outer axes nearly fall together: try other orders
+LOCKED = 1e-14  # cosine below which they do; to choose an angle then costs as much, in radians
+
+
+def euler_order(turns: Floats) -> str:
+    """The order, first to last about turned axes, that keeps well away from gimbal lock.
+
+    "zyx" wherever its second angle stays below 80 degrees, else the order whose second angle stays
+    smallest. ``turns`` are rotation matrices, (3, 3, n_frames).
+    """
+    steepest = {o: np.abs(_entry(turns, o, 0, 2)).max(initial=0.0) for o in ORDERS}
+    return ORDERS[0] if steepest[ORDERS[0]] < STEEP else min(ORDERS, key=steepest.__getitem__)
+
+
+def euler_angles(turns: Floats, order: str) -> Floats:
+    """Angles in radians, (n_frames, 3), about the turned axes of ``order``, that make ``turns``.
+
+    Of the two solutions of each frame, and of full turns, those nearest to the frame before are
+    taken. The first and second angle are solved after the third, so that the three of them make
+    the matrix to rounding even in gimbal lock, where the third is that of the frame before.
+    """
+    i, j, k = ("xyz".index(letter) for letter in order)
+    sign = _sign(order)
+    third = np.arctan2(-sign * turns[i, j], turns[i, i])
+    third = _hold_last(third, np.hypot(turns[i, i], turns[i, j]) > LOCKED)
+    rest = rotate_axes(turns, k, -third)
+    first = np.arctan2(sign * rest[k, j], rest[j, j])
+    second = np.arctan2(sign * rest[i, k], rest[i, i])
+    return np.unwrap(nearest_solutions(np.stack([first, second, third], axis=1)), axis=0)
+
+
+def _sign(order: str) -> float:
+    return 1.0 if order in "xyzxy" else -1.0
+
+
+def _entry(turns: Floats, order: str, row: int, column: int) -> Floats:
+    result: Floats = turns["xyz".index(order[row]), "xyz".index(order[column])]
+    return result
+
+
+def _hold_last(angles: Floats, known: Floats) -> Floats:
+    """Replace ``angles`` that are not ``known`` by the last known ones, 0 before the first."""
+    last = np.maximum.accumulate(np.where(known, np.arange(len(angles)), -1))
+    return np.where(last >= 0, angles[last], 0.0)
+
+
+def nearest_solutions(angles: Floats) -> Floats:
+    """Choose (a, b, c) or (a + pi, pi - b, c + pi) per frame, the one nearer to the frame before.
+
+    Which of them is nearer does not depend on which of them the frame before took, as both change
+    alike; so changes can be found for all frames at once.
+    """
+    other = angles * [1, -1, 1] + np.pi
+    stays, changes = (
+        np.abs(np.angle(np.exp(1j * (now[1:] - angles[:-1])))).sum(axis=1)
+        for now in (angles, other)
+    )
+    is_other = np.concatenate([[False], np.cumsum(changes < stays) % 2 == 1])[: len(angles)]
+    return np.where(is_other[:, None], other, angles)
+
+
+def rotate_axes(axes: Floats, axis: int, angle: Floats) -> Floats:
+    """``axes`` R, R the rotation by ``angle`` in radians, (F,), about axis 0, 1 or 2."""
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    cosine, sine = np.cos(angle), np.sin(angle)
+    result = np.empty((3, 3, len(angle) if axes.shape[2] == 1 else axes.shape[2]))
+    result[:, axis] = axes[:, axis]
+    np.multiply(axes[:, j], cosine, out=result[:, j])
+    result[:, j] += axes[:, k] * sine
+    np.multiply(axes[:, k], cosine, out=result[:, k])
+    result[:, k] -= axes[:, j] * sine
+    return result
