@@ -78,7 +78,6 @@ def decode(
 
 
 def _parse(stream: bytes, n_rows: int, n_channels: int) -> Ints:
-    """The ordinals of one stream, (n_rows, n_channels)."""
     columns, at = [], 0
     for channel in range(n_channels):
         head = stream[at : at + HEAD_SIZE]

@@ -318,7 +318,6 @@ def _components(
 
 
 def _to_local(back: Floats | None, vector: Floats) -> Floats:
-    """``vector`` along the local axes, (3,)."""
     return vector if back is None else back @ vector
 
 

@@ -73,7 +73,6 @@ def encode(source: SignalSource, params: Params) -> Encoded:
 
 
 def _prepare(source: SignalSource, start: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
-    """The making of the streams of a segment."""
     layout, grids, ordinals = source.layout, source.grids(start), source.ordinals(start, stop)
     return lambda: tuple(build_stream(ordinals, grids, layout) for _ in layout.groups)
 

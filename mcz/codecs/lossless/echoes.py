@@ -143,7 +143,6 @@ def find_echoes(numbers: Ints, leads: Words, usable: Ints) -> list[Echo]:
 
 
 def _bits(numbers: Ints) -> Floats:
-    """Rough bits per number of each channel."""
     bends = np.abs(np.diff(numbers.astype(np.float64), n=2, axis=0, prepend=numbers[:2]))
     return np.asarray(np.log2(np.median(bends, axis=0) + 1) + 1)
 
@@ -172,13 +171,11 @@ def _candidates(numbers: Ints, changes: Bools) -> Iterator[tuple[int, int, int, 
 
 
 def _runs_of_true(same: Bools) -> Iterator[tuple[int, int]]:
-    """Start and end of each run of True."""
     edges = np.flatnonzero(np.diff(same.astype(np.int8), prepend=0, append=0))
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
 def _merge_echoes(echoes: list[Echo]) -> list[Echo]:
-    """Merge the echoes of neighboring channels."""
     merged: list[Echo] = []
     for echo in sorted(echoes, key=lambda e: (e.lag, e.row, e.n_rows, e.minus, e.channel)):
         last = merged[-1] if merged else None

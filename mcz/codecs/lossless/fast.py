@@ -56,7 +56,6 @@ def _builder(layout: Layout) -> StreamBuilder:
 def _prepare(
     source: SignalSource, builder: StreamBuilder, start: int, stop: int
 ) -> Callable[[], tuple[bytes, ...]]:
-    """Return a function that builds the streams of a segment."""
     grids, ordinals = source.grids(start), source.ordinals(start, stop)
     return lambda: builder.build(ordinals, grids)
 

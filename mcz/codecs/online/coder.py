@@ -132,7 +132,6 @@ class Coder:
         return out
 
     def _check(self, unit: Unit) -> None:
-        """Raise LostFrameError for a unit that depends on lost frames."""
         if unit.kind == STR and not self._whole:  # ONLINE-26
             raise LostFrameError(f"{NAME}: frame {self.at} needs the one before, which is lost")
         # ONLINE-14, ONLINE-27

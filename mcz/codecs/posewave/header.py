@@ -263,7 +263,6 @@ def _spread(octaves: int) -> float:
 
 
 def _exact(groups: Sequence[int], layout: Layout) -> Bools:
-    """Mask of the exact channels."""
     exact, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
     for before, group in pairwise([-1, *groups]):
         if group <= before:  # PWAVE-32

@@ -281,7 +281,6 @@ class _Decoder:
         wanted: list[tuple[int, int]],
         stream: Any,
     ) -> None:
-        """Put one channel of one segment where it belongs."""
         counts = [stop - start for start, stop in owns]
         prefix = [
             min(max(need[1] - own[0], 0), own[1] - own[0])
@@ -294,7 +293,6 @@ class _Decoder:
             bands[band][start - need[0] : start - need[0] + len(values), column] = values
 
     def _values(self, indices: Ints, code: int, *, detail: bool) -> Floats:
-        """Coefficients from integers."""
         values = indices.astype(np.float64)
         if not self.coding.scaled:
             return np.asarray(values / 10.0**self.fields.decimals)  # MRDWT-32

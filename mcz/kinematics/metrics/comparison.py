@@ -138,7 +138,6 @@ def named_signals(motion: Motion) -> dict[str, Signal]:
 
 
 def _further_signals(original: Motion, decoded: Motion, notes: list[str]) -> dict[str, Number]:
-    """The MSE of every signal that both have beside the motion."""
     figures: dict[str, Number] = {}
     left, right = named_signals(original), named_signals(decoded)
     for name in dict.fromkeys([*left, *right]):

@@ -143,7 +143,6 @@ def _worst_frame(measured: list[_ContactDistances]) -> tuple[int, str] | None:
 
 
 def _lengths(vectors: Floats) -> Floats:
-    """(n,) of vectors (n, 3)."""
     x, y, z = vectors.T
     result: Floats = np.sqrt(x * x + y * y + z * z)
     return result

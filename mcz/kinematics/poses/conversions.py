@@ -155,7 +155,6 @@ def to_matrices(values: Reals, form: str, order: str = "XYZ") -> Floats:
 
 
 def _matrices_of_euler_angles(angles: Floats, order: str) -> Floats:
-    """The rotations, (3, 3, n), by angles (3, n)."""
     steps = list(zip(order.lower(), angles, strict=True))  # about fixed axes: as turned, reversed
     turns = IDENTITY
     for letter, angle in steps if order.isupper() else reversed(steps):

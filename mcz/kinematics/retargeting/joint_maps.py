@@ -32,7 +32,6 @@ def joint_map(a: str | Skeleton, b: str | Skeleton) -> dict[str, str]:
 
 
 def _joints(known: str | Skeleton) -> dict[str, str]:
-    """The joints of a skeleton by part."""
     if isinstance(known, Skeleton):
         return _recognized(known)
     if not isinstance(known, str) or known not in SKELETONS:

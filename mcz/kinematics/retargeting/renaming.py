@@ -38,7 +38,6 @@ def rename(named: Named, mapping: Mapping[str, str]) -> Named:
 
 
 def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
-    """The new name of every joint; raises OptionError."""
     addresses = skeleton.joint_names
     names = [joint.name for joint in skeleton.joints]
     given: set[int] = set()

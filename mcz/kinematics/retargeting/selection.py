@@ -246,7 +246,6 @@ def _joined(
 
 
 def _beside(left: Signal, right: Signal) -> Signal:
-    """The columns of two signals of as many rows."""
     masks = [
         np.ones(part.values.shape, np.bool_) if part.mask is None else part.mask
         for part in (left, right)

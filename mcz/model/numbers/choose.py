@@ -138,7 +138,6 @@ def _styles(counts: Sequence[int]) -> tuple[int, int, int]:
 
 
 def _surveys() -> ModuleType:
-    """The compiled loops, imported on first use."""
     return importlib.import_module("mcz.model.numbers.survey_kernels")
 
 

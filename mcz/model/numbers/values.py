@@ -97,7 +97,6 @@ def _left(left: Ints, grids: Sequence[Grid]) -> Iterator[tuple[Grid, list[int]]]
 
 @lru_cache(maxsize=64)
 def _rules(grids: tuple[Grid, ...]) -> Ints:
-    """Conversion rules of each grid for the kernel."""
     loops = _kernels("value")
     rules = np.empty((len(grids), loops.RULE_SIZE), np.int64)
     for rule, grid in zip(rules, grids, strict=True):
@@ -112,5 +111,4 @@ def _rules(grids: tuple[Grid, ...]) -> Ints:
 
 
 def _kernels(what: str) -> ModuleType:
-    """The compiled loops, imported on first use."""
     return importlib.import_module(f"mcz.model.numbers.{what}_kernels")

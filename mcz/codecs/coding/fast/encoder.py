@@ -159,7 +159,6 @@ class StreamBuilder:
         return rests, fields
 
     def _find_candidates(self, channels: Channels) -> Bools:
-        """The channels that are worth a closer look."""
         head, _, survey, _, _, _ = kernels()
         is_coded = channels.plans[:, head.KIND] == head.CODED
         is_small = channels.plans[:, survey.MOST] < self.unit_limits

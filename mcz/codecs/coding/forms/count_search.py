@@ -149,7 +149,6 @@ def _guesses(gaps: Floats) -> list[float]:
 
 
 def _mean_distance(values: Floats, line: Line) -> float:
-    """Mean distance of values from whole numbers."""
     return float(np.mean(_distances(values, line)))
 
 
@@ -180,7 +179,6 @@ def _grown(distinct: Floats, unit: float) -> Line | None:
 
 
 def _fit(counts: Floats, values: Floats, weights: Floats | None = None) -> Line | None:
-    """The line of least squares through values at counts."""
     if weights is None:
         weights = np.ones(len(counts))
     total = weights.sum()
