@@ -129,7 +129,7 @@ def parse_bases(data: bytes, where: str = "model") -> tuple[Basis, ...]:
 def _loop(
     state: Ints, data: NDArray[np.uint8], tables: Sequence[Ints], shifts: Sequence[Ints]
 ) -> bool:
-    from mcz.codecs.table_kernels import code_table
+    from mcz.codecs.coding.residuals import code_table
 
     for table, digits in zip(tables, shifts, strict=True):  # BASES-07
         scales = (1 << digits) >> (table.shape[1].bit_length() // 2)  # BASES-07

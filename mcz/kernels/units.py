@@ -16,7 +16,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     "best": (
         "mcz.codecs.coding.mixing",
         "mcz.codecs.lossless.best_kernels",
-        "mcz.codecs.table_kernels",
+        "mcz.codecs.coding.residuals",
     ),
     "numbers": (
         "mcz.codecs.coding.forms.product_kernels",

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs.coding.fast.decoder import Shape, read_alone
 from mcz.codecs.coding.fast.encoder import StreamBuilder
+from mcz.codecs.coding.forms import BINARY32, COUNTS, MULTIPLES
 from mcz.codecs.coding.forms.count_search import VANISHING, find_counts
 from mcz.codecs.coding.forms.counts import Law, bounds
-from mcz.codecs.coding.forms.ids import BINARY32, COUNTS, MULTIPLES
 from mcz.codecs.coding.forms.units import find_units
 from mcz.model.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.model.numbers import Grid, GridKind

@@ -1,13 +1,15 @@
-"""Compiled: an integer whose size is roughly known, coded bit length first.
+"""Compiled: integers whose sizes are roughly known, coded bit length first, and tables of them.
 
-One function serves encoder and decoder. SPEC.md, "Residuals", is normative; a codec says what the
-scales and the neighbors of an integer are, and has its own contexts. Imported on first use only.
+One function serves encoder and decoder. SPEC.md, "Residuals" and "Bases", are normative; a codec
+says what the scales and the neighbors of an integer are, and has its own contexts. Imported on
+first use only.
 """
 
 from __future__ import annotations
 
 from mcz.codecs.coding.mixing import mixed, number
-from mcz.kernels.types import Bytes, Ints
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 # First context of each kind of bit, and its mixer; "more" has twelve, by how far the length is.
 C_BELOW, C_LESS, C_MORE, C_SECOND, C_THIRD, C_SIDE, N_CONTEXTS = 0, 72, 152, 2072, 2232, 2552, 2568
@@ -57,7 +59,6 @@ def code_residual(
     state: Ints,
     data: Bytes,
     residual: int,
-    negative: int,
     scales: tuple[int, int],
     near: int,
     sides: tuple[int, int, int],
@@ -77,10 +78,10 @@ def code_residual(
         return 0
     found = code_size(state, data, size, length, kf, ks, first)
     at = first[0] + C_SIDE
-    side = 1 if (residual < 0) != (negative == 1) else 0
     b = at + 3 + 3 * sides[0] + sides[1]
+    side = 1 if residual < 0 else 0
     side = mixed(state, data, side, first[1] + M_SIDE, at + sides[0], b, at + 12 + sides[2])
-    return -found if (side == 1) != (negative == 1) else found
+    return -found if side == 1 else found
 
 
 def code_length(
@@ -148,3 +149,35 @@ def code_size(
     if length > 3:
         code = code << (length - 3) | number(state, data, size, length - 3)
     return code
+
+
+MAX_INDEX = 1 << 40
+MEANS = 0, 0  # residuals of a stream
+BASIS = N_CONTEXTS, N_MIXERS
+
+
+@kernel
+def code_table(state: Ints, data: Bytes, table: Ints2, scales: Ints, is_basis: int) -> int:
+    """Code a table (rows, channels) in place, each row from its scale on; 1 where impossible."""
+    for row in range(len(table)):
+        fast = slow = scales[row] << 4
+        near = side_1 = side_2 = 0
+        for c in range(table.shape[1]):
+            error = code_residual(
+                state,
+                data,
+                table[row, c],
+                (fast, slow),
+                clamp(near + 3, 0, 7),
+                (side_1, side_2, 3),
+                BASIS if is_basis else MEANS,  # PCA-09
+            )
+            if error == FAULT or abs(error) > MAX_INDEX:  # PCA-12
+                return 1
+            table[row, c] = error
+            size = abs(error) << 4
+            near = (near + bits(size) - bits(slow)) >> 1
+            fast += (size - fast) >> 2  # PCA-10
+            slow += (size - slow) >> 4
+            side_2, side_1 = side_1, side_of(error)
+    return 0

@@ -51,7 +51,7 @@ def code_frame(
         while length > 0 and indices[start + length - 1] == 0:
             length -= 1
         scales = 16 * lengths[m], 16 * lengths[max(m - 1, 0)]  # FRAME-08
-        length = code_residual(state, data, length, 0, scales, 0, (0, 0, 0), LENGTHS)
+        length = code_residual(state, data, length, scales, 0, (0, 0, 0), LENGTHS)
         if length < 0 or length > stop - start:  # FAULT is far below 0 (FRAME-09)
             return 1
         lengths[m] = length
@@ -68,7 +68,7 @@ def code_frame(
                 slow = (track[SLOW] + 8 * abs(above) + 4 * abs(higher)) >> 1  # FRAME-08
                 scales, near = (fast, slow), min(bits(start + length - r), 7)
                 sides, base = (side_of(track[LAST]), side_of(side), side_of(track[BEFORE])), OTHERS
-            found = code_residual(state, data, indices[r], 0, scales, near, sides, base)
+            found = code_residual(state, data, indices[r], scales, near, sides, base)
             if found == FAULT or abs(found) > MAX_INDEX:  # SPACE-12
                 return 1
             indices[r] = found

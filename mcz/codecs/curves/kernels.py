@@ -46,7 +46,6 @@ def code_point(
             state,
             data,
             point[c] - predicted[c],
-            0,
             scales,
             clamp(near + 3, 0, 7),
             sides,
@@ -161,7 +160,7 @@ def code_length(state: Ints, data: Bytes, length: int, left: int, n_here: int, u
         return left
     half = left >> 1
     error = code_residual(  # QBC-23
-        state, data, length - half, 0, (4 * left, left), min(n_here, 7), (0, 0, 3), LENGTHS
+        state, data, length - half, (4 * left, left), min(n_here, 7), (0, 0, 3), LENGTHS
     )
     if error == FAULT or not 0 < half + error < left:  # QBC-24
         return 0

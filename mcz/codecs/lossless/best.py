@@ -27,7 +27,7 @@ from mcz.codecs.coding.fast.decoder import (
 from mcz.codecs.coding.fast.encoder import Plan, StreamBuilder
 from mcz.codecs.coding.fast.encoder import kernels as fast_kernels
 from mcz.codecs.coding.fast.lanes import fault_of
-from mcz.codecs.coding.forms.ids import WITH_UNIT
+from mcz.codecs.coding.forms import WITH_UNIT
 from mcz.codecs.coding.streams import code, start_states, uncode
 from mcz.codecs.contract import (
     Codec,

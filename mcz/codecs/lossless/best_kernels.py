@@ -116,7 +116,7 @@ def code_miss(state: Ints, data: Bytes, miss: int, memory: Ints, flow: Ints) -> 
     near = clamp(flow[NEAR] + 3, 0, 7)
     sides = memory[SIDE_1], memory[SIDE_2], flow[OTHER]
     scales = memory[FAST], memory[SLOW]
-    return code_residual(state, data, miss, 0, scales, near, sides, RESIDUALS)
+    return code_residual(state, data, miss, scales, near, sides, RESIDUALS)
 
 
 def remember(miss: int, memory: Ints) -> None:

@@ -53,7 +53,6 @@ def code_coefficients(state: Ints, data: Bytes, rows: Ints2, predictors: Ints, s
                 state,
                 data,
                 rows[at, i] - predicted,
-                0,
                 (track[FAST], track[SLOW]),
                 clamp(near + 3, 0, 7),
                 (track[SIDE_1], track[SIDE_2], track[MOVED]),

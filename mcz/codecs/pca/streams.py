@@ -116,8 +116,8 @@ def _loop(
     mean_scale: int,
 ) -> bool:
     """Code all of a segment; ``sides`` are its shifts and forms."""
+    from mcz.codecs.coding.residuals import code_table
     from mcz.codecs.pca.kernels import code_coefficients
-    from mcz.codecs.table_kernels import code_table
 
     count, n_channels = basis.shape
     scales = np.array([scale_of(mean_scale)])

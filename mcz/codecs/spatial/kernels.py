@@ -51,7 +51,6 @@ def code_window(state: Ints, data: Bytes, rows: Ints2, starts: Ints, lengths: In
             state,
             data,
             _length(rows[r]),
-            0,
             (16 * expected, slow),
             clamp(near + 3, 0, 7),
             (0, 0, 0),
@@ -91,7 +90,7 @@ def _code_row(state: Ints, data: Bytes, row: Ints, length: int, above: Ints, sid
             scales = 8 * last + 4 * before + 2 * (a + b), 6 * (a + b) + 3 * around
             near = min(bits(length - k), 7)
             sides, first = (side_1, side_2, side_of(above[k])), OTHERS
-        found = code_residual(state, data, row[k], 0, scales, near, sides, first)
+        found = code_residual(state, data, row[k], scales, near, sides, first)
         if found == FAULT or abs(found) > MAX_INDEX:  # SPACE-12
             return 1
         row[k] = found

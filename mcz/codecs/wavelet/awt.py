@@ -34,8 +34,8 @@ from mcz.codecs.parameters import (
 )
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
 from mcz.codecs.wavelet import wavelet
-from mcz.codecs.wavelet.quantizer import DEAD_ZONE, LEAST_UNIT, Quantizer
 from mcz.codecs.wavelet.reencode import recoder
+from mcz.codecs.wavelet.streams import DEAD_ZONE, LEAST_UNIT, Quantizer
 from mcz.codecs.wavelet.wavelet import (
     BITSTREAM,
     WAVELET,

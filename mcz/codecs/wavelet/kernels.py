@@ -45,7 +45,7 @@ def code_approximations(
         sides = side_1, side_2, momentum
         near_class = clamp(near + 3, 0, 7)
         error = code_residual(
-            state, data, values[at] - predicted, 0, (fast, slow), near_class, sides, OWN
+            state, data, values[at] - predicted, (fast, slow), near_class, sides, OWN
         )
         if error == FAULT or abs(predicted + error) > MAX_INDEX:  # MRDWT-26
             return at
@@ -86,7 +86,6 @@ def code_details(
             state,
             data,
             -size if given < 0 else size,
-            0,
             scales,
             min(bits(run), 7),
             (side_1, side_2, other),

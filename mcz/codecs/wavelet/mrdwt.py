@@ -17,8 +17,8 @@ from mcz.codecs.contract import Encoded, SignalSource
 from mcz.codecs.parameters import Dial, Parameter, choice, number, preset_parameter, preset_values
 from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
 from mcz.codecs.wavelet import wavelet
-from mcz.codecs.wavelet.quantizer import make_quantizer
 from mcz.codecs.wavelet.reencode import recoder
+from mcz.codecs.wavelet.streams import make_quantizer
 from mcz.codecs.wavelet.wavelet import (
     BITSTREAM,
     WAVELET,

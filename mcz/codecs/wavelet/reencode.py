@@ -11,7 +11,7 @@ from mcz.codecs.contract import Recode, RecodeRequest, SignalSource
 from mcz.codecs.parameters import code_of
 from mcz.codecs.subset_source import SubsetSource
 from mcz.codecs.transforms.wavelets import INLINE, Wavelet, by_id
-from mcz.codecs.wavelet.quantizer import DEAD_ZONE, Quantizer
+from mcz.codecs.wavelet.streams import DEAD_ZONE, Quantizer
 from mcz.codecs.wavelet.wavelet import NAME, Frames, Plan, Transform, WaveletHeader, segment_streams
 from mcz.model.schema import parse
 from mcz.model.types import Floats, Ints, Params

@@ -27,8 +27,7 @@ from mcz.codecs.parameters import (
 from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, segments_by_halving
 from mcz.codecs.transforms import wavelets
 from mcz.codecs.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
-from mcz.codecs.wavelet.quantizer import Quantizer
-from mcz.codecs.wavelet.streams import Coding, build_streams, parse_streams
+from mcz.codecs.wavelet.streams import Coding, Quantizer, build_streams, parse_streams
 from mcz.errors import FormatError
 from mcz.model.schema import UVARINT, Checked, Record, bounded, build, counted, field, parse
 from mcz.model.types import Bools, Floats, Ints

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.coding.fast.head_kernels import TAP_UNIT, scale_of
+from mcz.codecs.coding.forms import form_of_grid
 from mcz.codecs.coding.forms.counts import Law
-from mcz.codecs.coding.forms.ids import form_of_grid
 from mcz.model.numbers import Grid
 from mcz.model.schema import varint
 from tools.vectors.build import fast_heads

@@ -115,7 +115,7 @@ def _residual(
     state: Ints, data: Any, value: int, scales: tuple[int, int], near: int, sides: Any, which: int
 ) -> int:
     places = which * N_CONTEXTS, which * N_MIXERS
-    return code_residual(state, data, value, 0, scales, near, sides, places)
+    return code_residual(state, data, value, scales, near, sides, places)
 
 
 class Coding:

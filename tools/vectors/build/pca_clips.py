@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from mcz.codecs import raw
 from mcz.codecs.coding import mixing
+from mcz.codecs.coding.residuals import code_table
 from mcz.codecs.coding.streams import scale_of, start_states
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.pca import kernels, pca
-from mcz.codecs.table_kernels import code_table
 from mcz.model.schema import varint
 
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import codec_by_name, raw
-from mcz.codecs.coding.forms.ids import form_of_grid
+from mcz.codecs.coding.forms import form_of_grid
 from mcz.codecs.contract import Encoded, Segment
 from mcz.model.motion import Exceptions, Motion, Signal
 from mcz.model.numbers import Grid, GridFlag, GridKind

@@ -13,7 +13,7 @@ from types import ModuleType
 import numpy as np
 
 from mcz.codecs.coding.fast.lanes import Lanes, read_all
-from mcz.codecs.coding.forms.ids import WITH_UNIT, form_of_grid
+from mcz.codecs.coding.forms import WITH_UNIT, form_of_grid
 from mcz.codecs.coding.forms.units import parse_mapping
 from mcz.errors import FormatError
 from mcz.model.numbers import Grid

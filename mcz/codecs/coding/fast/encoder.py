@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.coding.forms import BINARY32, form_of_grid, has_binary32, unit_grid
 from mcz.codecs.coding.forms.counts import may_be_counts
-from mcz.codecs.coding.forms.ids import BINARY32, form_of_grid, has_binary32, unit_grid
 from mcz.codecs.coding.forms.products import tiny_limit
 from mcz.codecs.coding.forms.units import find_units
 from mcz.model.numbers import Grid, GridKind

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mcz.codecs.coding.forms import BINARY32
 from mcz.codecs.coding.forms.counts import MOST, Law, bounds, spacing
-from mcz.codecs.coding.forms.ids import BINARY32
 from mcz.model.numbers import Grid, GridKind, values_of
 from mcz.model.types import Floats, Ints
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.coding.forms.ids import BINARY32
+from mcz.codecs.coding.forms import BINARY32
 from mcz.errors import FormatError
 from mcz.kernels import lacks_compiled_kernels
 from mcz.model.numbers import Grid, GridKind, ordinals_of, values_of

@@ -13,9 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from mcz.codecs.coding.forms.count_search import Counted, find_counts
-from mcz.codecs.coding.forms.counts import Law, ordinals_of_binary32, parse_law
-from mcz.codecs.coding.forms.ids import (
+from mcz.codecs.coding.forms import (
     BINARY32,
     COUNTS,
     MULTIPLES,
@@ -24,6 +22,8 @@ from mcz.codecs.coding.forms.ids import (
     has_binary32,
     unit_grid,
 )
+from mcz.codecs.coding.forms.count_search import Counted, find_counts
+from mcz.codecs.coding.forms.counts import Law, ordinals_of_binary32, parse_law
 from mcz.codecs.coding.forms.products import find_products, is_tiny, of_products
 from mcz.errors import FormatError
 from mcz.model.numbers import Grid, GridKind
