@@ -18,11 +18,11 @@ from mcz.codecs.basis_models import parse_bases
 from mcz.codecs.training import (
     Recipe,
     TrainingSet,
-    mirrored,
     train,
     training_set,
-    turned,
     window_coefficients,
+    with_headings,
+    with_mirror_images,
 )
 from mcz.codecs.transforms.dct import dct_matrix
 from mcz.codecs.transforms.lsdt import (
@@ -259,18 +259,18 @@ def small(up: str = "y") -> TrainingSet:
 
 
 def test_mirrored_copies() -> None:
-    found = mirrored(small())
+    found = with_mirror_images(small())
     (clip, image) = found.clips
     assert image[:, 0] == pytest.approx(clip[:, 0] * [-1, 1, 1])
     assert image[:, 1] == pytest.approx(clip[:, 2] * [-1, 1, 1])
-    assert mirrored(replace(found, clips=(image,))).clips[1] == pytest.approx(clip)
+    assert with_mirror_images(replace(found, clips=(image,))).clips[1] == pytest.approx(clip)
     with pytest.raises(OptionError, match="left and right"):
-        mirrored(replace(small(), names=("a", "b", "c")))
+        with_mirror_images(replace(small(), names=("a", "b", "c")))
 
 
 @pytest.mark.parametrize("up", ["x", "y", "z", "-y"])
 def test_headings_turn_about_the_up_axis(up: str) -> None:
-    found = turned(small(up), 3)
+    found = with_headings(small(up), 3)
     axis = "xyz".index(up[-1])
     assert len(found.clips) == 3
     assert found.clips[0] == pytest.approx(small(up).clips[0])

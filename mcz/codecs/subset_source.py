@@ -70,10 +70,10 @@ class SubsetSource:
 def _cut(skeleton: Skeleton, columns: set[int]) -> Skeleton:
     """Return ``skeleton`` with only these channels."""
 
-    def kept(index: int, joint: Joint) -> Joint:
+    def keep_channels(index: int, joint: Joint) -> Joint:
         pairs = zip(skeleton.columns(index), joint.channels, strict=True)
         return replace(joint, channels=tuple(c for column, c in pairs if column in columns))
 
     return replace(
-        skeleton, joints=tuple(kept(i, joint) for i, joint in enumerate(skeleton.joints))
+        skeleton, joints=tuple(keep_channels(i, joint) for i, joint in enumerate(skeleton.joints))
     )

@@ -102,7 +102,7 @@ def _check_alike(first: tuple[str, TrainingSet], other: tuple[str, TrainingSet])
         raise MotionError(f"of {names} one has a length unit, the other has none")
 
 
-def mirrored(found: TrainingSet) -> TrainingSet:
+def with_mirror_images(found: TrainingSet) -> TrainingSet:
     """``found`` and its mirror image: left points become right ones, x is negated (z if x is up).
 
     Raises OptionError where no two points have names that differ in their side alone.
@@ -134,7 +134,7 @@ def mirror_order(names: Sequence[str]) -> list[int]:
     return order
 
 
-def turned(found: TrainingSet, n_turns: int) -> TrainingSet:
+def with_headings(found: TrainingSet, n_turns: int) -> TrainingSet:
     """``found`` in ``n_turns`` headings, 180 / ``n_turns`` degrees apart about the up axis.
 
     Half a turn negates the coordinates, which no basis minds, so half a circle holds all headings.
@@ -209,8 +209,8 @@ class Recipe:
     def vectors(self, found: TrainingSet) -> Floats:
         """Training vectors, (N, J, 3); raises OptionError for too short clips."""
         if self.mirror:
-            found = mirrored(found)
-        found = turned(found, self.headings)
+            found = with_mirror_images(found)
+        found = with_headings(found, self.headings)
         if self.kind == "steps":
             vectors = steps(found, STEP_FRAMES, self.every)
         elif self.kind == "windows":
@@ -227,7 +227,7 @@ class Recipe:
         """The bases of x, y and z; raises OptionError as ``learn_basis`` does."""
         vectors = self.vectors(found)
 
-        def told(done: int, at_most: int) -> None:
+        def report(done: int, at_most: int) -> None:
             if progress is not None:
                 progress(done, at_most, f"learning from {len(vectors):,} vectors")
 
@@ -237,7 +237,7 @@ class Recipe:
             iterations=self.iterations,
             growth=self.growth,
             start=self.start,
-            progress=told,
+            progress=report,
         )
         return Trained(found, len(vectors), learned)
 

@@ -79,13 +79,13 @@ class Unwrapper:
             steps = block - before
             self._last, self._begun = block[-1].copy(), np.ones_like(self._begun)
         else:
-            steps = self._gapped(block, part)
+            steps = self._steps_over_gaps(block, part)
         counted = np.cumsum(np.concatenate([self._turns[None], turns(steps, self._full)]), axis=0)
         self._turns = counted[-1].copy()
         out[:, self._columns] = np.where(part, block - self._full * counted[1:], block)
         return out
 
-    def _gapped(self, block: Floats, part: Bools) -> Floats:
+    def _steps_over_gaps(self, block: Floats, part: Bools) -> Floats:
         """Steps from the last value that takes part to the next, 0 where one does not."""
         rows = np.where(part, np.arange(len(block))[:, None], -1)
         latest = np.maximum.accumulate(rows, axis=0)

@@ -113,7 +113,7 @@ def learn_bases(
     bases: list[Learned] = []
     while len(bases) < n_axes:
 
-        def told(done: int, at_most: int, before: int = len(bases)) -> None:
+        def report(done: int, at_most: int, before: int = len(bases)) -> None:
             if progress is not None:
                 progress(before * at_most + done, n_axes * at_most)
 
@@ -124,7 +124,7 @@ def learn_bases(
                 iterations=iterations,
                 growth=growth,
                 start=start,
-                progress=told,
+                progress=report,
             )
         )
     return tuple(bases)

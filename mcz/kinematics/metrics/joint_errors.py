@@ -75,7 +75,7 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
         only_in_b=tuple(name for name in names_b if name.lower() not in both),
         unit_cm=unit,
     )
-    return _measured(found, original, other, pairs, scale) if pairs else found
+    return _measure_joints(found, original, other, pairs, scale) if pairs else found
 
 
 def pairs_of(a: Skeleton, b: Skeleton) -> list[tuple[int, int]]:
@@ -85,7 +85,7 @@ def pairs_of(a: Skeleton, b: Skeleton) -> list[tuple[int, int]]:
     return [(index, there[name.lower()]) for index, name in names if name.lower() in there]
 
 
-def _measured(
+def _measure_joints(
     found: JointErrors, original: Motion, other: Motion, pairs: list[tuple[int, int]], scale: float
 ) -> JointErrors:
     left, right = (list(side) for side in zip(*pairs, strict=True))

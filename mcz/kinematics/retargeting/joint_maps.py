@@ -33,7 +33,7 @@ def joint_map(a: str | Skeleton, b: str | Skeleton) -> dict[str, str]:
 
 def _joints(known: str | Skeleton) -> dict[str, str]:
     if isinstance(known, Skeleton):
-        return _recognized(known)
+        return _recognize_joints(known)
     if not isinstance(known, str) or known not in SKELETONS:
         near = nearest(known, SKELETONS) if isinstance(known, str) else ""
         raise OptionError(
@@ -43,7 +43,7 @@ def _joints(known: str | Skeleton) -> dict[str, str]:
     return {part: names[0] for part, names in SKELETONS[known].items()}
 
 
-def _recognized(skeleton: Skeleton) -> dict[str, str]:
+def _recognize_joints(skeleton: Skeleton) -> dict[str, str]:
     """The joints of ``skeleton`` as of the usual one that it has most joints of.
 
     It has to have all of the body's; fingers, eyes and the like may be missing. Of SMPL's, which
@@ -69,7 +69,7 @@ def _recognized(skeleton: Skeleton) -> dict[str, str]:
 def limbs_of(skeleton: Skeleton) -> set[str]:
     """The names of the joints of thighs, shins, feet and arms, of a usual skeleton; else none."""
     try:
-        known = _recognized(skeleton)
+        known = _recognize_joints(skeleton)
     except OptionError:
         return set()
     return {name for part, name in known.items() if part.partition("_")[2] in LIMBS}

@@ -14,7 +14,7 @@ from mcz.model.text_format import among
 from mcz.model.types import Floats
 
 
-def matched(
+def match_joints(
     source: Skeleton, target: Skeleton, joint_map: Mapping[str, str] | None
 ) -> dict[int, int]:
     """The joints of ``source``, by the joint of ``target`` that each turns, in joint order.
@@ -88,13 +88,13 @@ def check_channels(motion: Motion) -> None:
         raise MotionError("its channels are not those of its skeleton", clip=motion.name)
 
 
-def edited(motion: Motion, skeleton: Skeleton, signal: Signal) -> Motion:
+def replace_motion(motion: Motion, skeleton: Skeleton, signal: Signal) -> Motion:
     """``motion`` of another skeleton and signal, without the source file that it no longer is."""
     made = replace(motion, skeleton=skeleton, signals=(signal, *motion.signals[1:]), source=None)
     return made.at_times(motion.timeline)
 
 
-def computed(motion: Motion, values: Floats) -> Signal:
+def computed_signal(motion: Motion, values: Floats) -> Signal:
     """The motion signal of ``values`` (n_rows, n_channels) that were computed; NaN is invalid."""
     valid = np.isfinite(values)
     first = motion.signals[0]

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.retargeting.matching import check_channels, edited
+from mcz.kinematics.retargeting.matching import check_channels, replace_motion
 from mcz.kinematics.retargeting.sides import counterparts
 from mcz.model.motion import (
     POSITION_KINDS,
@@ -54,12 +54,12 @@ def mirror(motion: Motion, axis: str = "x", pairs: Mapping[str, str] | None = No
     others = counterparts(skeleton.joint_names, pairs)
     _check_tree(skeleton, others)
     joints = tuple(
-        replace(_reflected(skeleton.joints[other], axis), name=joint.name, parent=joint.parent)
+        replace(_reflect(skeleton.joints[other], axis), name=joint.name, parent=joint.parent)
         for joint, other in zip(skeleton.joints, others, strict=True)
     )
     mirrored = replace(skeleton, joints=joints, base=None, source=None)
     signal = motion.signals[0].of_columns(joint_columns(skeleton, others))
-    return edited(motion, mirrored, _turned_about(signal, mirrored, axis))
+    return replace_motion(motion, mirrored, _turned_about(signal, mirrored, axis))
 
 
 def _check(motion: Motion) -> None:
@@ -92,7 +92,7 @@ def _check_tree(skeleton: Skeleton, others: list[int]) -> None:
             )
 
 
-def _reflected(joint: Joint, axis: str) -> Joint:
+def _reflect(joint: Joint, axis: str) -> Joint:
     x, y, z = (
         0.0 - angle if angle and letter != axis else angle
         for letter, angle in zip(AXES, joint.axis, strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcz.errors import OptionError
-from mcz.kinematics.retargeting.matching import edited
+from mcz.kinematics.retargeting.matching import replace_motion
 from mcz.model.motion import Motion, Skeleton
 from mcz.model.text_format import among
 
@@ -34,7 +34,7 @@ def rename(named: Named, mapping: Mapping[str, str]) -> Named:
     renamed = replace(skeleton, joints=joints, base=None, source=None)
     if isinstance(named, Skeleton):
         return renamed
-    return edited(named, renamed, named.signals[0])
+    return replace_motion(named, renamed, named.signals[0])
 
 
 def _names(skeleton: Skeleton, mapping: Mapping[str, str]) -> list[str]:
@@ -83,4 +83,4 @@ def with_offsets(given: Given, offsets: ArrayLike, unit_cm: float | None = None)
     )
     unit = skeleton.unit_cm if unit_cm is None else unit_cm
     made = replace(skeleton, joints=joints, unit_cm=unit, base=None, source=None)
-    return made if isinstance(given, Skeleton) else edited(given, made, given.signals[0])
+    return made if isinstance(given, Skeleton) else replace_motion(given, made, given.signals[0])

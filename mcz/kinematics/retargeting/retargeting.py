@@ -20,11 +20,11 @@ from mcz.kinematics.joint_groups import is_foot
 from mcz.kinematics.rest_pose import rest_positions
 from mcz.kinematics.retargeting.matching import (
     check_channels,
-    computed,
-    edited,
-    matched,
+    computed_signal,
+    match_joints,
     moves,
     nearest_above,
+    replace_motion,
 )
 from mcz.kinematics.retargeting.rest_poses import rest_turns, usual_alike
 from mcz.kinematics.retargeting.turns import back, finite, local_turns, relative, set_local_turns
@@ -70,7 +70,7 @@ def retarget(
     check_channels(motion)
     source = motion.skeleton
     _check(source, skeleton)
-    pairs = matched(source, skeleton, joint_map)
+    pairs = match_joints(source, skeleton, joint_map)
     if match_rest == AUTO:
         match_rest = usual_alike(skeleton, source, pairs)
     elif isinstance(match_rest, str):
@@ -82,7 +82,7 @@ def retarget(
     values = np.asarray(motion.values, np.float64)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         made = _Retargeted(source, skeleton, pairs, values, scale, match_rest).values()
-    return edited(motion, replace(skeleton, base=None), computed(motion, made))
+    return replace_motion(motion, replace(skeleton, base=None), computed_signal(motion, made))
 
 
 def _check(source: Skeleton, target: Skeleton) -> None:

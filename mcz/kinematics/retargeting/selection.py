@@ -9,11 +9,11 @@ import numpy as np
 
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Chain, multiply_matrices
-from mcz.kinematics.retargeting.matching import check_channels, computed, edited
+from mcz.kinematics.retargeting.matching import check_channels, computed_signal, replace_motion
 from mcz.kinematics.retargeting.turns import (
     back,
     finite,
-    held,
+    hold_known,
     local_turns,
     relative,
     set_local_turns,
@@ -68,14 +68,14 @@ def select(
         )
     numbers = {joint: number for number, joint in enumerate(kept)} | {-1: -1}
     chosen = [
-        replace(_folded(skeleton, joint, above[joint]), parent=numbers[above[joint]])
+        replace(_fold_offsets(skeleton, joint, above[joint]), parent=numbers[above[joint]])
         for joint in kept
     ]
     signal = motion.signals[0].of_columns(joint_columns(skeleton, kept))
     selected = replace(skeleton, joints=tuple(chosen), base=None, source=None)
     if moved:
-        selected, signal = baked(motion, {j: above[j] for j in moved}, kept, selected, signal)
-    return edited(motion, selected, signal)
+        selected, signal = bake_joints(motion, {j: above[j] for j in moved}, kept, selected, signal)
+    return replace_motion(motion, selected, signal)
 
 
 def _kept(skeleton: Skeleton, joints: str | int | Iterable[str | int]) -> list[int]:
@@ -136,7 +136,7 @@ def _rests(motion: Motion, index: int) -> bool:
     return True
 
 
-def _folded(skeleton: Skeleton, index: int, above: int) -> Joint:
+def _fold_offsets(skeleton: Skeleton, index: int, above: int) -> Joint:
     """The joint with the offsets of those between it and ``above`` added to its own."""
     joint = skeleton.joints[index]
     between = _between(skeleton, index, above)
@@ -154,7 +154,7 @@ def _folded(skeleton: Skeleton, index: int, above: int) -> Joint:
 STRETCHING = ("sx", "sy", "sz", "length")
 
 
-def baked(
+def bake_joints(
     motion: Motion, above: Mapping[int, int], kept: list[int], selected: Skeleton, signal: Signal
 ) -> tuple[Skeleton, Signal]:
     """``selected`` and ``signal`` with position and rotation channels that hold some joints.
@@ -179,7 +179,7 @@ def baked(
         joints[number] = _held_joint(skeleton, joints[number], turn)
         columns[number] = np.concatenate([places[joint], _angles(selected, joints[number], turn)])
     made = replace(selected, joints=tuple(joints))
-    return made, _joined(motion, selected, made, signal, columns)
+    return made, _join_signals(motion, selected, made, signal, columns)
 
 
 def _check(skeleton: Skeleton, parent: int) -> None:
@@ -210,7 +210,7 @@ def _held_joint(skeleton: Skeleton, joint: Joint, turn: Floats) -> Joint:
     kinds = [c.kind for c in joint.channels if c.kind in TURNING_KINDS]
     order = "".join(kind[1] for kind in kinds)
     if order not in ORDERS or kinds[0] not in ROTATION_KINDS:
-        order = euler_order(held(turn, finite(turn)))
+        order = euler_order(hold_known(turn, finite(turn)))
         order = order if skeleton.intrinsic else order[::-1]
     others = tuple(c for c in joint.channels if c.kind not in (*TURNING_KINDS, *POSITION_KINDS))
     own = tuple(Channel(kind) for kind in (*POSITION_KINDS, *(f"r{letter}" for letter in order)))
@@ -226,11 +226,11 @@ def _angles(selected: Skeleton, joint: Joint, turn: Floats) -> Floats:
     return columns
 
 
-def _joined(
+def _join_signals(
     motion: Motion, before: Skeleton, after: Skeleton, signal: Signal, columns: dict[int, Floats]
 ) -> Signal:
     """``signal`` of ``before``, with ``columns`` of the joints that were held, as of ``after``."""
-    new = computed(motion, np.concatenate([*columns.values()]).T)
+    new = computed_signal(motion, np.concatenate([*columns.values()]).T)
     first = signal.n_channels
     order: list[int] = []
     for number, joint in enumerate(before.joints):

@@ -46,7 +46,7 @@ def counterparts(names: Sequence[str], pairs: Mapping[str, str] | None = None) -
     whose counterpart is missing.
     """
     numbers = {name: number for number, name in enumerate(names)}
-    found = _given(numbers, pairs or {})
+    found = _pair_numbers(numbers, pairs or {})
     for name, number in numbers.items():
         if number not in found:
             other = numbers[name] if (mate := _mate(name, numbers)) is None else numbers[mate]
@@ -59,7 +59,7 @@ def counterparts(names: Sequence[str], pairs: Mapping[str, str] | None = None) -
     return [found[number] for number in range(len(names))]
 
 
-def _given(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[int, int]:
+def _pair_numbers(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[int, int]:
     found: dict[int, int] = {}
     for one, other in pairs.items():
         for name in (one, other):
@@ -76,28 +76,28 @@ def _given(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[int, in
 def _mate(name: str, names: Mapping[str, int]) -> str | None:
     """The name of the counterpart, None for a name without a side."""
     for pattern in (_WORD, _LETTER):
-        others = [other for other in _swapped(pattern, name) if other in names]
+        others = [other for other in _swap_sides(pattern, name) if other in names]
         if others:
             return others[0]
         if pattern.search(name):
             raise OptionError(
                 f"mirror: joint {name!r} is of one side by its name, and there is no joint "
-                f"{next(_swapped(pattern, name))!r}; pairs= names its counterpart, or itself"
+                f"{next(_swap_sides(pattern, name))!r}; pairs= names its counterpart, or itself"
             )
     for pattern in (_PREFIX, _SUFFIX):
-        others = [other for other in _swapped(pattern, name) if other in names]
+        others = [other for other in _swap_sides(pattern, name) if other in names]
         if others:
             return others[0]
     match = _PREFIX.search(name)
     if match and _BODY.match(name, match.end()):
         raise OptionError(
             f"mirror: joint {name!r} is of one side by its name, and there is no joint "
-            f"{next(_swapped(_PREFIX, name))!r}; pairs= names its counterpart, or itself"
+            f"{next(_swap_sides(_PREFIX, name))!r}; pairs= names its counterpart, or itself"
         )
     return None
 
 
-def _swapped(pattern: re.Pattern[str], name: str) -> Iterator[str]:
+def _swap_sides(pattern: re.Pattern[str], name: str) -> Iterator[str]:
     """The name with its sides changed: all of them, then each alone."""
     if pattern.search(name):
         yield pattern.sub(lambda match: _OTHER[match[0]], name)
@@ -124,6 +124,6 @@ def _side(name: str, names: set[str]) -> str:
         if match is None:
             continue
         sure = pattern in (_WORD, _LETTER) or bool(_BODY.match(name, match.end()))
-        if sure or any(other in names for other in _swapped(pattern, name)):
+        if sure or any(other in names for other in _swap_sides(pattern, name)):
             return "left" if match[0][0] in "lL" else "right"
     return ""

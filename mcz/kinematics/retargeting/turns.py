@@ -36,7 +36,7 @@ def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -
         return IDENTITY
     wanted = np.broadcast_to(wanted, (3, 3, columns.shape[1]))
     known = finite(wanted)
-    turn = held(wanted, known)
+    turn = hold_known(wanted, known)
     if own is not None:
         turn = multiply_matrices(multiply_matrices(own.T[:, :, None], turn), own[:, :, None])
     set_turns(link, turn, columns, chain.radians)
@@ -54,7 +54,7 @@ def finite(matrices: Floats) -> Bools:
     return result
 
 
-def held(matrices: Floats, known: Bools) -> Floats:
+def hold_known(matrices: Floats, known: Bools) -> Floats:
     """Matrices (3, 3, F), those not known as the last known one before, or the first one after."""
     if known.all():
         return matrices

@@ -64,11 +64,11 @@ def _candidates(tokens: Tokens, n_sample: int) -> list[Candidate]:
     found = [(bits, (*rule, 1.0, 0)) for bits, rule in _plain_candidates(survey)]
     n_known, n_plain = int(survey.significant.sum()), int(survey.decimals.sum())
     if 2 * (n_known - n_plain) > n_known or survey.significant[10:].any():
-        found += printed_candidates(_sampled(tokens, n_sample))
+        found += printed_candidates(_sample_tokens(tokens, n_sample))
     return sorted(found)
 
 
-def _sampled(tokens: Tokens, n_sample: int) -> Tokens:
+def _sample_tokens(tokens: Tokens, n_sample: int) -> Tokens:
     return tokens[np.arange(n_sample) * _STEP % len(tokens)] if n_sample < len(tokens) else tokens
 
 
@@ -163,13 +163,13 @@ def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]
     ranked = _candidates(tokens, n_sample)
     order: Sequence[int] = range(len(ranked))
     if len(tokens) > FEW:
-        order = _likeliest_first(_sampled(tokens, n_sample), ranked)
+        order = _likeliest_first(_sample_tokens(tokens, n_sample), ranked)
     least = float("inf"), len(ranked)  # the lowest price, and the first candidate that has it
     for rank in order:
         bits, rule = ranked[rank]
         if (cost(len(tokens), bits, 0), rank) >= least:
             continue
-        tried = _tried(tokens, rule, least[0] - cost(len(tokens), bits, 0))
+        tried = _try_rule(tokens, rule, least[0] - cost(len(tokens), bits, 0))
         misses = len(tokens) if tried is None else len(tokens) - int(np.count_nonzero(tried[1]))
         price = cost(len(tokens), bits, misses), rank
         if tried is not None and price < least:
@@ -192,7 +192,7 @@ def _likeliest_first(sample: Tokens, ranked: Sequence[Candidate]) -> list[int]:
     return [first, *(rank for rank in range(len(ranked)) if rank != first)]
 
 
-def _tried(tokens: Tokens, rule: Rule, spare: float) -> tuple[Ints, Bools] | None:
+def _try_rule(tokens: Tokens, rule: Rule, spare: float) -> tuple[Ints, Bools] | None:
     """Ordinals and printed tokens; None where exceptions cost more than ``spare`` bits."""
     kind, digits, flags, _, _ = rule
     allowed = int(min(spare / _EXCEPTION_BITS, len(tokens))) + 1  # prices decide, not this

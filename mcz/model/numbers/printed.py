@@ -114,13 +114,13 @@ def texts(digits: int, style: int, flags: int, magnitudes: Ints, negative: Bools
         for x, minus in zip(values.tolist(), negative.tolist(), strict=True)
     ]
     if flags & ~GridFlag.PLUS:
-        lines = [_restyled(line, flags) for line in lines]
+        lines = [_restyle(line, flags) for line in lines]
     offsets = np.zeros(len(lines) + 1, np.int64)
     np.cumsum([len(line) for line in lines], out=offsets[1:])
     return Texts(np.frombuffer("".join(lines).encode(), np.uint8), offsets)
 
 
-def _restyled(line: str, flags: int) -> str:
+def _restyle(line: str, flags: int) -> str:
     """A number with an exponent in the style of the flags."""
     mantissa, e, power = line.partition("e")
     size = power[1:].lstrip("0") if flags & GridFlag.EXPONENT1 else power[1:]

@@ -100,7 +100,7 @@ class Streams:
         """The next bits of the first ``n`` streams."""
         bits = self.bits[:n]
         words = self.data[np.minimum(bits >> 3, len(self.data) - 1)]
-        return _shifted(words, bits & 7)
+        return _shift_words(words, bits & 7)
 
     def check(self, part: str) -> None:
         """Raise FormatError where bits are left or missing."""
@@ -148,7 +148,9 @@ def _streams(
     return Streams(windows, begins, stops, n_rows, nth)
 
 
-def _joined(batch: Sequence[Lanes], field: Callable[[Lanes], NDArray[np.signedinteger]]) -> Ints:
+def _concatenate(
+    batch: Sequence[Lanes], field: Callable[[Lanes], NDArray[np.signedinteger]]
+) -> Ints:
     return np.concatenate([field(lanes).astype(np.int64) for lanes in batch], axis=-1)
 
 
@@ -157,15 +159,15 @@ def _read_leads(batch: Sequence[Lanes]) -> None:
     sizes = [len(lanes.columns) for lanes in batch]
     every = np.ones(sum(sizes), np.bool_)
     streams = _streams(batch, lambda lanes: lanes.residuals, every)
-    scales = _joined(batch, lambda lanes: lanes.predictors.scales)
-    behind = _joined(batch, lambda lanes: lanes.predictors.behind)[::-1]
-    weights = _joined(batch, lambda lanes: lanes.predictors.weights)
+    scales = _concatenate(batch, lambda lanes: lanes.predictors.scales)
+    behind = _concatenate(batch, lambda lanes: lanes.predictors.behind)[::-1]
+    weights = _concatenate(batch, lambda lanes: lanes.predictors.weights)
     firsts = np.repeat(np.cumsum([0, *sizes[:-1]]), sizes)
-    parents = _joined(batch, lambda lanes: lanes.predictors.parents)
+    parents = _concatenate(batch, lambda lanes: lanes.predictors.parents)
     weights[parents < 0] = 0
     parents = np.where(parents < 0, 0, parents + firsts)
     leads = np.empty((residual.BEHIND + max(lengths), len(scales)), np.int64)
-    leads[: residual.BEHIND + 1] = _joined(batch, lambda lanes: lanes.predictors.first)
+    leads[: residual.BEHIND + 1] = _concatenate(batch, lambda lanes: lanes.predictors.first)
     residuals = np.zeros(len(scales), np.int64)
     for row in range(residual.BEHIND + 1, len(leads)):
         if row - residual.BEHIND in lengths:  # what lanes of these segments have now is not used
@@ -191,7 +193,7 @@ def _read_codes(streams: Streams, scales: Ints) -> tuple[Ints, Ints]:
     words = streams.words(len(scales))
     k = np.frexp((scales >> 4).astype(np.float64))[1].astype(np.int64)
     zeros = ZEROS[(words & np.uint64(255)).astype(np.int64)]
-    folded = (zeros << k) | (_shifted(words, zeros + 1) & MASKS[k]).astype(np.int64)
+    folded = (zeros << k) | (_shift_words(words, zeros + 1) & MASKS[k]).astype(np.int64)
     sizes = zeros + 1 + k
     for at in np.flatnonzero(zeros == residual.PLAIN + 1).tolist():  # they are rare
         folded[at], sizes[at] = _read_long(streams, at, int(words[at]), int(k[at]))
@@ -201,7 +203,7 @@ def _read_codes(streams: Streams, scales: Ints) -> tuple[Ints, Ints]:
     return (half ^ -odd).astype(np.int32).astype(np.int64), scales + growth
 
 
-def _shifted(words: Words, n: Ints) -> Words:
+def _shift_words(words: Words, n: Ints) -> Words:
     return np.right_shift(words, n.astype(np.uint64))
 
 
@@ -300,7 +302,7 @@ def _read_bits(streams: Streams, bits: Ints, long: Ints, longer: Ints) -> Ints:
             words = streams.words(len(lanes))
             values = words & masks[row]
             is_long = values >= least[row]
-            more = (_shifted(words, own_bits[row]) & ONE).astype(np.int64) * is_long
+            more = (_shift_words(words, own_bits[row]) & ONE).astype(np.int64) * is_long
             found[row, lanes] = values.astype(np.int64) + more * longer[row, lanes]
             streams.bits[: len(lanes)] += own_bits[row] + is_long
     if (streams.bits > streams.ends).any():
