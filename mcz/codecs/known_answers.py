@@ -54,9 +54,7 @@ def digest(codec: Codec, answer: KnownAnswer) -> str:
     layout = answer_layout(answer.grouping)
     n_groups = len(layout.groups)
     layout = replace(
-        layout,
-        n_resolutions=len(answer.streams) // n_groups,
-        find_model=model_finder(models),
+        layout, n_resolutions=len(answer.streams) // n_groups, find_model=model_finder(models)
     )
     streams = [bytes.fromhex(stream) for stream in answer.streams]
     is_earlier = answer.version < codec.version

@@ -23,8 +23,7 @@ from mcz.codecs.contract import (
     Span,
     refuse_extras,
 )
-from mcz.codecs.parameters import Parameter, integer
-from mcz.codecs.segments import Sizing, gather, segments_by_guess
+from mcz.codecs.segments import Sizing, gather, lossless_segment_frames, segments_by_guess
 from mcz.errors import FormatError
 from mcz.model.types import Ints, Params
 
@@ -111,12 +110,5 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     recode=recode,
-    parameters=(
-        Parameter(
-            "segment_frames",
-            0,
-            "frames a segment; 0: as many as make about 60,000 bytes",
-            integer("segment_frames", 0, MAX_ROWS),
-        ),
-    ),
+    parameters=(lossless_segment_frames("60,000", MAX_ROWS),),
 )

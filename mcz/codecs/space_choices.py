@@ -39,12 +39,7 @@ from mcz.codecs.space import (
     columns_of,
 )
 from mcz.codecs.transforms.dct import dct_matrix
-from mcz.errors import (
-    AccessError,
-    MotionError,
-    OptionError,
-    reason_of,
-)
+from mcz.errors import AccessError, MotionError, OptionError, reason_of
 from mcz.kinematics.angles import Unwrapper
 from mcz.model.motion import POSITION_KINDS, Skeleton
 from mcz.model.types import Floats
@@ -361,8 +356,5 @@ VIRTUAL_MARKERS = Parameter(
     in_range("true, false", _flag),
 )
 WINDOW = Parameter(
-    "window",
-    None,
-    "frames a window, which is the delay; default 240",
-    integer("window", 1, 2048),
+    "window", None, "frames a window, which is the delay; default 240", integer("window", 1, 2048)
 )

@@ -11,13 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from mcz.kinematics.chain import IDENTITY, Chain, SkeletonKey
-from mcz.kinematics.frame_kernels import (
-    Joints,
-    Points,
-    place_frames,
-    position_points,
-    turn_frames,
-)
+from mcz.kinematics.frame_kernels import Joints, Points, place_frames, position_points, turn_frames
 from mcz.kinematics.points import (
     discard_infinite,
     listed_points,

@@ -158,13 +158,7 @@ class InitialPose:
         _fill_gaps(link, size > 0, columns)
 
     def _moment(
-        self,
-        joint: int,
-        link: Link,
-        origin: Floats,
-        seen: Floats,
-        known: Floats,
-        weights: Floats,
+        self, joint: int, link: Link, origin: Floats, seen: Floats, known: Floats, weights: Floats
     ) -> Floats:
         """Sum of w b a', (3, 3, F): b as seen and a at rest, from the origin or from the mean."""
         body = self.fastened[joint]

@@ -141,10 +141,7 @@ def polish_turns(link: Link, wanted: Floats, columns: Floats, radians: float) ->
         better = trial_near > near - ROUNDING
         angles = np.where(better, trial, angles)
         near = np.where(better, trial_near, near)
-        turn, spins = (
-            np.where(better, trial_turn, turn),
-            np.where(better, trial_spins, spins),
-        )
+        turn, spins = (np.where(better, trial_turn, turn), np.where(better, trial_spins, spins))
         damping *= np.where(better, EASIER, HARDER)
     columns[own] = angles / radians
 

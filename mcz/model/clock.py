@@ -200,9 +200,7 @@ class Counting(NamedTuple):
 
 
 def timeline_of(
-    counting: Counting,
-    first_time: float | None = None,
-    column: Column | None = None,
+    counting: Counting, first_time: float | None = None, column: Column | None = None
 ) -> Timeline | None:
     """The times of frames; None where nothing tells them.
 

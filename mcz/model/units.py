@@ -44,10 +44,7 @@ def axes_of(skeleton: Skeleton) -> tuple[str, str, str]:
 
 
 def facing(
-    skeleton: Skeleton,
-    up: str | None,
-    forward: str | None = None,
-    handedness: str | None = None,
+    skeleton: Skeleton, up: str | None, forward: str | None = None, handedness: str | None = None
 ) -> Skeleton:
     """``skeleton`` with these axes and handedness, None: as they are; raises OptionError.
 

@@ -123,13 +123,7 @@ def octave(quarters_of: int) -> int:
 
 
 def code_size(
-    state: Ints,
-    data: Bytes,
-    size: int,
-    length: int,
-    kf: int,
-    ks: int,
-    first: tuple[int, int],
+    state: Ints, data: Bytes, size: int, length: int, kf: int, ks: int, first: tuple[int, int]
 ) -> int:
     """Code the bits of an absolute value after its first; ``length`` >= 1 is how many it has."""
     contexts, mixers = first

@@ -29,12 +29,7 @@ FAST, SLOW, SIDE_1, SIDE_2, TRACK_SIZE = range(5)  # what is remembered of a cha
 
 
 def code_point(
-    state: Ints,
-    data: Bytes,
-    point: Ints,
-    predicted: Ints,
-    tracks: Ints2,
-    first: tuple[int, int],
+    state: Ints, data: Bytes, point: Ints, predicted: Ints, tracks: Ints2, first: tuple[int, int]
 ) -> int:
     """Code the channels of one control point in place; 1 where that is impossible."""
     near, other = 0, 3
@@ -43,13 +38,7 @@ def code_point(
         sides = track[SIDE_1], track[SIDE_2], other
         scales = track[FAST], track[SLOW]
         error = code_residual(
-            state,
-            data,
-            point[c] - predicted[c],
-            scales,
-            clamp(near + 3, 0, 7),
-            sides,
-            first,
+            state, data, point[c] - predicted[c], scales, clamp(near + 3, 0, 7), sides, first
         )
         if error == FAULT or abs(predicted[c] + error) > MAX_INDEX:  # QBC-21
             return 1
@@ -276,13 +265,7 @@ def worst(
 
 
 def fit(
-    points: Floats2,
-    exact: Floats2,
-    a: int,
-    b: int,
-    rule: Rule,
-    enough: float,
-    work: Floats2,
+    points: Floats2, exact: Floats2, a: int, b: int, rule: Rule, enough: float, work: Floats2
 ) -> tuple[float, int]:
     """Fit one curve; ``work`` (3, channels) then has its two ends and its middle.
 
@@ -299,12 +282,7 @@ def fit(
 
 @kernel
 def breaks_by_splitting(
-    points: Floats2,
-    exact: Floats2,
-    marks: Ints,
-    limit: float,
-    rule: Rule,
-    is_break: Flags,
+    points: Floats2, exact: Floats2, marks: Ints, limit: float, rule: Rule, is_break: Flags
 ) -> None:
     """Set ``is_break`` at the frames at which curves meet between marks: split at the worst one."""
     work = np.zeros((3, points.shape[1]))
@@ -328,12 +306,7 @@ def breaks_by_splitting(
 
 @kernel
 def breaks_of_fewest(
-    points: Floats2,
-    exact: Floats2,
-    marks: Ints,
-    limit: float,
-    rule: Rule,
-    is_break: Flags,
+    points: Floats2, exact: Floats2, marks: Ints, limit: float, rule: Rule, is_break: Flags
 ) -> None:
     """Set ``is_break`` at the fewest frames that keep the bound; of equals, the best fit.
 

@@ -204,13 +204,7 @@ def _predict(kind: int, values: Floats, reference: Floats) -> None:
 
 @kernel
 def decode_frames(
-    state: Ints,
-    data: Bytes,
-    coder: int,
-    kind: int,
-    out: Floats2,
-    past: Past,
-    transform: Transform,
+    state: Ints, data: Bytes, coder: int, kind: int, out: Floats2, past: Past, transform: Transform
 ) -> int:
     """Decode the frames of a unit, (frames, n_channels), to ``out``; return a faulty one, or -1.
 

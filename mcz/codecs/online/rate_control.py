@@ -268,10 +268,7 @@ PARAMETERS = (
         choice("rate_control", MODES),
     ),
     Parameter(
-        "buffer",
-        1.0,
-        "of steady: seconds over which the rate is held",
-        number("buffer", 1e-3, 1e6),
+        "buffer", 1.0, "of steady: seconds over which the rate is held", number("buffer", 1e-3, 1e6)
     ),
     Parameter(
         "gof", 30, "frames a group, the first of which is an LTR", integer("gof", 1, MOST_GOF)

@@ -197,12 +197,7 @@ def _limit(value: float) -> float:
 
 
 def _note_features(
-    learner: Learner,
-    places: Floats2,
-    anchor: Floats,
-    moves: Ints2,
-    first: int,
-    t: int,
+    learner: Learner, places: Floats2, anchor: Floats, moves: Ints2, first: int, t: int
 ) -> None:
     """Note the last three moves, those of the decoded point around them, and the distance left.
 

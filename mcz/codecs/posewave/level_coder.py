@@ -44,12 +44,7 @@ class LevelCoder:
     """Goes through the levels of a segment, coarse to fine, from rows that are in the metric."""
 
     def __init__(
-        self,
-        header: Header,
-        skeleton: Skeleton,
-        pyramid: Pyramid,
-        kept: Bools,
-        first: Floats,
+        self, header: Header, skeleton: Skeleton, pyramid: Pyramid, kept: Bools, first: Floats
     ) -> None:
         """``first`` (n_channels,) is the pose before the first; channels not ``kept`` keep it."""
         self.header, self.pyramid, self.still = header, pyramid, first

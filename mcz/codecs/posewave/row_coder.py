@@ -12,13 +12,7 @@ from types import ModuleType
 import numpy as np
 
 from mcz.codecs.posewave.header import NAME, Header
-from mcz.codecs.posewave.model import (
-    Start,
-    make_model,
-    new_rows,
-    no_rows,
-    start_coder,
-)
+from mcz.codecs.posewave.model import Start, make_model, new_rows, no_rows, start_coder
 from mcz.codecs.posewave.model_state import N_SMALL
 from mcz.errors import FormatError, MotionError
 from mcz.model.types import Bools, Floats, Ints
@@ -90,14 +84,7 @@ class RowCoder:
     stream: Stream
     exponents: Ints  # (n_rows,) of the level, or of what it goes on with
 
-    def __init__(
-        self,
-        header: Header,
-        classes: Ints,
-        kept: Bools,
-        coder: Ints,
-        where: str,
-    ) -> None:
+    def __init__(self, header: Header, classes: Ints, kept: Bools, coder: Ints, where: str) -> None:
         known, channels = header.prior, np.flatnonzero(kept)
         self.where, self.n_kept, self.refining = where, len(channels), header.refining
         prior = None if known is None else known.of(channels)

@@ -113,12 +113,7 @@ def synthesize_courses(out: Floats2, entries: Floats2, cosines: Floats2) -> None
 
 @kernel
 def synthesize(
-    out: Floats2,
-    rows: Ints2,
-    lengths: Ints,
-    temporal: Floats2,
-    transform: Transform,
-    mean: Floats,
+    out: Floats2, rows: Ints2, lengths: Ints, temporal: Floats2, transform: Transform, mean: Floats
 ) -> None:
     """Write the frames of a window, (frames, channels), from its coefficients.
 
@@ -173,13 +168,7 @@ def _sums(
 
 @kernel
 def code_frames(
-    state: Ints,
-    data: Bytes,
-    indices: Ints2,
-    starts: Ints,
-    lengths: Ints,
-    tracks: Ints2,
-    first: int,
+    state: Ints, data: Bytes, indices: Ints2, starts: Ints, lengths: Ints, tracks: Ints2, first: int
 ) -> int:
     """Code ``indices`` (frames, n_rows) in place; return the frame of a fault, or -1.
 

@@ -40,8 +40,5 @@ def encode(source: SignalSource, params: Params) -> Encoded:
 
 
 CODEC = windows.BITSTREAM(
-    preset=2,
-    name=NAME,
-    encode=encode,
-    parameters=parameters_of(PRESETS, WINDOW),
+    preset=2, name=NAME, encode=encode, parameters=parameters_of(PRESETS, WINDOW)
 )

@@ -325,10 +325,7 @@ def parameters_of(presets: Presets, window: int) -> tuple[Parameter, ...]:
         preset_parameter(presets),
         STEP,
         Parameter(
-            "window",
-            None,
-            f"frames a window; default {window}",
-            integer("window", 1, MAX_WINDOW),
+            "window", None, f"frames a window; default {window}", integer("window", 1, MAX_WINDOW)
         ),
         Parameter(
             "threshold",

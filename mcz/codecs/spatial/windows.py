@@ -182,11 +182,7 @@ def _segments(
 
 
 def decode(
-    header: bytes,
-    layout: Layout,
-    spans: Sequence[Span],
-    request: Request,
-    fetch: Fetch,
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> Floats:
     """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
     fields = parse(WindowsHeader, header, f"{NAME} header")
@@ -258,14 +254,7 @@ def _segment(
             if whole
             else np.empty((stop - start, out.shape[1]))
         )
-        synthesize(
-            block,
-            window.rows,
-            window.lengths,
-            temporal,
-            space.transform(),
-            space.mean,
-        )
+        synthesize(block, window.rows, window.lengths, temporal, space.transform(), space.mean)
         if not whole:
             out[a - request.start : b - request.start] = block[a - start : b - start]
 

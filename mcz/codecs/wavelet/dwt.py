@@ -22,14 +22,7 @@ from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, segment_frames_of, ske
 from mcz.codecs.wavelet import wavelet
 from mcz.codecs.wavelet.reencode import recoder
 from mcz.codecs.wavelet.streams import make_quantizer
-from mcz.codecs.wavelet.wavelet import (
-    BITSTREAM,
-    WAVELET,
-    N,
-    Plan,
-    Q,
-    transform_of,
-)
+from mcz.codecs.wavelet.wavelet import BITSTREAM, WAVELET, N, Plan, Q, transform_of
 from mcz.model.types import Floats, Params, Settings
 
 PRESETS: dict[str, Settings] = {

@@ -19,14 +19,7 @@ from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames
 from mcz.codecs.wavelet import wavelet
 from mcz.codecs.wavelet.reencode import recoder
 from mcz.codecs.wavelet.streams import make_quantizer
-from mcz.codecs.wavelet.wavelet import (
-    BITSTREAM,
-    WAVELET,
-    N,
-    Plan,
-    Q,
-    transform_of,
-)
+from mcz.codecs.wavelet.wavelet import BITSTREAM, WAVELET, N, Plan, Q, transform_of
 from mcz.model.types import Floats, Params, Settings
 
 PRESETS: dict[str, Settings] = {
@@ -53,10 +46,7 @@ def encode(source: SignalSource, params: Params) -> Encoded:
     chosen, published = preset_values(PRESETS, params), preset == "khan2016"
     transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = weights_of(
-        skeleton,
-        sample(source, SAMPLED_FRAMES),
-        chosen["threshold_rule"],
-        unit_aware=not published,
+        skeleton, sample(source, SAMPLED_FRAMES), chosen["threshold_rule"], unit_aware=not published
     )
     quantizer = make_quantizer(weights, chosen["T_g"], chosen["Q"])
     frames = segment_frames_of(layout, params["segment_frames"], as_published=published)

@@ -60,10 +60,7 @@ def build_streams(bands: Sequence[Ints], step: int, coding: Coding) -> list[byte
 
 
 def parse_streams(
-    stream: Callable[[int], bytes],
-    counts: Sequence[int],
-    wanted: Sequence[int],
-    coding: Coding,
+    stream: Callable[[int], bytes], counts: Sequence[int], wanted: Sequence[int], coding: Coding
 ) -> tuple[list[Ints], int]:
     """The first ``wanted`` of ``counts`` coefficients of every band, and the step code.
 

@@ -123,11 +123,7 @@ def _measure_contacts(
         original, decoded = (_lengths(np.diff(places, axis=0)) for places in (a, b))
         known = np.isfinite(original) & np.isfinite(decoded)
         yield _ContactDistances(
-            run,
-            apart,
-            float(decoded[known].sum()),
-            float(original[known].sum()),
-            int(known.sum()),
+            run, apart, float(decoded[known].sum()), float(original[known].sum()), int(known.sum())
         )
 
 

@@ -18,12 +18,7 @@ from mcz.kinematics.poses.conversions import (
     slerp,
     slerp_quaternions,
 )
-from mcz.kinematics.rotations import (
-    ORDERS,
-    euler_angles,
-    matrices_of_vectors,
-    nearest_vector,
-)
+from mcz.kinematics.rotations import ORDERS, euler_angles, matrices_of_vectors, nearest_vector
 from mcz.model.clock import TIMES, Timeline, known_timeline
 from mcz.model.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.model.types import Floats, Ints
@@ -53,11 +48,7 @@ class Times:
 
 
 def resample(
-    motion: Motion,
-    rate: Fraction | float,
-    *,
-    drop_signals: bool = False,
-    components: bool = False,
+    motion: Motion, rate: Fraction | float, *, drop_signals: bool = False, components: bool = False
 ) -> Motion:
     """``motion`` at ``rate`` frames a second, from its first frame to at most its last.
 

@@ -37,12 +37,7 @@ _POINT_ZERO, _POINT_ONLY, _NO_ZERO, _PLUS, _EXP3, _EXP1, _UPPER = 1, 2, 4, 8, 16
 
 
 @kernel
-def scan(
-    text: Bytes,
-    start: Ints,
-    stop: Ints,
-    fields: Ints2,
-) -> int:
+def scan(text: Bytes, start: Ints, stop: Ints, fields: Ints2) -> int:
     """Fill ``fields`` (n, 3) from tokens ``text[start[i]:stop[i]]``; returns how many are bad."""
     n_bad = 0
     for token in range(len(start)):

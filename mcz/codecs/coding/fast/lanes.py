@@ -122,11 +122,7 @@ class Streams:
         return Streams(self.data, self.bits[own], self.ends[own], self.rows[own], [])
 
 
-def _streams(
-    batch: Sequence[Lanes],
-    parts: Callable[[Lanes], Ints],
-    wanted: Bools,
-) -> Streams:
+def _streams(batch: Sequence[Lanes], parts: Callable[[Lanes], Ints], wanted: Bools) -> Streams:
     """The streams of a part of all groups, and which of the lanes that are ``wanted`` they have."""
     bits, ends, rows, own = [], [], [], []
     at = first = 0
