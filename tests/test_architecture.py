@@ -48,7 +48,7 @@ ALLOWED = ROOMS | {
 # Parts of a room from below: none imports a part of a later line.
 LAYERS = {
     "model": (
-        "annexes arguments checks extras indexing notebook text_format threads types",
+        "checks extras indexing text_format threads types",
         "schema",
         "numbers",
         "source",
@@ -56,7 +56,7 @@ LAYERS = {
         "signal",
         "clock",
         "motion",
-        "units whole_turns",
+        "units",
     ),
     "codecs": ("coding transforms", "*", "training"),
     "container": ("*", "recovery"),

@@ -1,9 +1,9 @@
 """Forward and inverse kinematics: the points of a skeleton and the channels that move them.
 
 SPEC.md, "Kinematics", has the conventions and the point sets. Distances are in the length unit of
-the skeleton. Everything is vectorized over frames and works in blocks of them. What fewer need is
-imported from its own module: ``inverse``, ``sensitivity``, ``single``. ``metrics`` compares two
-motions, ``poses`` resamples and differentiates, ``retargeting`` moves motions between skeletons.
+the skeleton. Everything is vectorized over frames and works in blocks of them. ``inverse`` is
+imported from its own module. ``metrics`` compares two motions, ``poses`` resamples and
+differentiates, ``retargeting`` moves motions between skeletons.
 
 Imports ``mcz.model``.
 """
