@@ -72,9 +72,9 @@ def pack_command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Pack every motion file below DIR into OUT.mcz, skeletons that are shared only once.
+    """Pack every motion file below DIR into OUT.mcz; shared skeletons are stored once.
 
-    A file that cannot be parsed is left out, listed at the end, and makes the exit code 1;
+    A file that cannot be parsed is left out and listed at the end, and the exit code is 1.
     --verbatim keeps it as an attachment instead.
     """
     check_force_rate(options)
@@ -115,7 +115,7 @@ def _packing(scheduler: str | None) -> Callable[..., Report]:
     "sources", metavar="SRC...", nargs=-1, required=True, type=click.Path(readable=False)
 )
 @click.argument("target", metavar="FILE.mcz", type=click.Path(readable=False))
-@skeleton_option("The ASF of the AMCs, or none.")
+@skeleton_option("Use this ASF for the AMCs, or none.")
 @click.option(
     "--root",
     metavar="DIR",
@@ -131,15 +131,15 @@ def _packing(scheduler: str | None) -> Callable[..., Report]:
 @click.option(
     "--rename",
     is_flag=True,
-    help="Put clips of an .mcz whose name is taken below the name of their file.",
+    help="If the name of a clip of an .mcz is taken, put it below the name of its file.",
 )
 @click.option(
     "--skip-identical",
     is_flag=True,
-    help="Skip clips of an .mcz that are here already, the same under the same name.",
+    help="Skip clips of an .mcz that FILE.mcz already has, identical and under the same name.",
 )
 @click.option("--replace", is_flag=True, help="Replace a file of the same path; rewrites FILE.mcz.")
-@copies_option("where the file has some")
+@copies_option("yes if the file has copies")
 @encoding_options
 @rate_option()
 @force_rate_option
@@ -162,11 +162,11 @@ def append_command(
 ) -> Exit:
     """Append SRC... to FILE.mcz; when one of them cannot be added, none is.
 
-    SRC is a motion file, a folder of such files, or an .mcz, of which all is carried over as it is.
+    SRC is a motion file, a folder of motion files, or an .mcz, whose contents are copied unchanged.
 
-    What the file held stays readable at every moment, even if the computer stops in between. After
-    that, the next append takes the file up from its last end; whole clips behind it are named, and
-    --salvage or --force must say what becomes of them.
+    The existing contents stay readable at every moment, even after a crash. The next append then
+    continues from the last valid end. If complete clips lie behind it, choose --salvage to keep
+    them or --force to drop them.
     """
     import mcz
 
@@ -207,8 +207,8 @@ def append_command(
     type=click.Choice(("stored", "portable", "strict")),
     default="stored",
     show_default=True,
-    help="Treat names that some systems cannot hold, or not beside another: write them as stored "
-    "if this system can, write portable ones instead, or refuse them.",
+    help="Handle names that some systems cannot store, or would confuse: write them as stored if "
+    "possible, write portable names, or refuse.",
 )
 @click.option("--mtimes", is_flag=True, help="Set files to the time in their clips' metadata.")
 @decoded_option
@@ -230,9 +230,9 @@ def unpack_command(
 ) -> Exit:
     """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
 
-    With --clip or --where those of the clips alone, with their skeletons. No link that lies in DIR
-    is followed, and no file replaces another of FILE.mcz. With --salvage those of a damaged file
-    that are whole are written; each is checked as in a sound one.
+    With --clip or --where, write only the files of those clips and of their skeletons. Links in DIR
+    are not followed, and no file replaces another of FILE.mcz. With --salvage, write the intact
+    files of a damaged FILE.mcz; each is verified.
     """
     import mcz
 
@@ -260,7 +260,7 @@ def unpack_command(
 @clips_option
 @where_option
 @rate_option()
-@unit_option("Length unit of clips that say none.")
+@unit_option("clips that state none")
 @key_error_option
 @decoded_option
 @force_option
@@ -282,8 +282,8 @@ def export_command(
 ) -> Exit:
     """Write every clip of FILE.mcz below DIR under its name, as numbers or as another format.
 
-    What a format cannot hold fails with the reason, and the other clips are written all the same.
-    With an AMC comes its ASF. mcz unpack gives the original files.
+    A clip that the format cannot hold fails with the reason; the other clips are still written. An
+    AMC comes with its ASF. mcz unpack gives the original files.
     """
     import mcz
 

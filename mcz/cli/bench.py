@@ -34,8 +34,8 @@ PAPERS = "python -m tools.papers"
 )
 @click.option("--tables", "paper", hidden=True)  # where the papers' tables are is said
 @click.option("--peers", is_flag=True, help="Add the general compressors that are installed.")
-@click.option("--speeds/--no-speeds", default=True, help="Measure speed and memory, too (default).")
-@unit_option("Length unit of files that say none.")
+@click.option("--speeds/--no-speeds", default=True, help="Also measure speed and memory (default).")
+@unit_option("files that state none")
 @click.option(
     "--out",
     metavar="DIR",
@@ -46,7 +46,7 @@ PAPERS = "python -m tools.papers"
     "--jobs",
     metavar="N",
     type=click.IntRange(1),
-    help="Work with N processes. Default: one a processor.",
+    help="Use N processes. Default: one per processor.",
 )
 @click.option("--cache/--no-cache", default=True, help="Reuse earlier results (default).")
 @json_option
@@ -64,12 +64,11 @@ def bench_command(
 ) -> Exit:
     """Sweep the quality of every codec on CLIPS: files, or folders of .amc, .bvh and .c3d.
 
-    Without CLIPS on a walk that is made for it.
+    Without CLIPS, use a generated walk.
 
-    Prints sizes by three numerators, errors of channels and positions, what codecs reach at equal
-    error and at equal size, Bjontegaard deltas, speed as a ratio to parsing the text, and memory.
-    Results are kept in the user's cache folder, by what they depend on; speeds are measured one at
-    a time.
+    Print sizes by three numerators, errors of channels and positions, comparisons at equal error
+    and at equal size, Bjontegaard deltas, speed relative to parsing the text, and memory. Results
+    are cached in the user's cache folder; speeds are measured one at a time.
     """
     from mcz.bench.report import bench
     from mcz.bench.tasks import Cache, Runner, default_folder

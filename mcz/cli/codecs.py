@@ -36,9 +36,9 @@ WIDEST = 44  # characters of a line of the meaning
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @json_option
 def codecs_command(names: tuple[str, ...], as_json: bool) -> Exit:
-    """List the codecs, or of each NAME its parameters: default, range and meaning.
+    """List the codecs, or the parameters of each NAME: default, range and meaning.
 
-    mcz encode --codec NAME --param KEY=VALUE sets one.
+    Set one with mcz encode --codec NAME --param KEY=VALUE.
     """
     from mcz.codecs import CODECS, DEFAULT, codec_by_name
 
@@ -112,21 +112,21 @@ AXES = "xyz"
     metavar="N",
     type=click.IntRange(1),
     default=8,
-    help="Keep so many coefficients of each frame while learning. Default: 8.",
+    help="Keep N coefficients of each frame while learning. Default: 8.",
 )
 @click.option(
     "--iterations",
     metavar="N",
     type=click.IntRange(0, 100_000),
     default=300,
-    help="Iterate at most so often, less if nothing is gained. Default: 300.",
+    help="Iterate at most N times, less if nothing is gained. Default: 300.",
 )
 @click.option(
     "--growth",
     metavar="N",
     type=click.IntRange(0, 10_000),
     default=40,
-    help="Iterate so often with each smaller P before; 0 is the published algorithm. Default: 40.",
+    help="Iterate N times with each smaller P before; 0: the published algorithm. Default: 40.",
 )
 @click.option(
     "--start",
@@ -139,8 +139,8 @@ AXES = "xyz"
     "kind",
     type=click.Choice(("frames", "steps", "windows")),
     default="steps",
-    help="Make sparse: steps between frames, frames themselves as published, or DCT coefficients "
-    "of windows. Default: steps.",
+    help="Choose the data to make sparse: steps between frames, frames as published, or DCT "
+    "coefficients of windows. Default: steps.",
 )
 @click.option(
     "--mirror/--no-mirror", default=False, help="Add mirror images, left points for right ones."
@@ -153,9 +153,9 @@ AXES = "xyz"
     help="Add copies turned about the up axis, 180 / N degrees apart. Default: 1, none.",
 )
 @click.option(
-    "--every", metavar="N", type=click.IntRange(1), default=1, help="Take every N-th frame alone."
+    "--every", metavar="N", type=click.IntRange(1), default=1, help="Use only every N-th frame."
 )
-@unit_option("Length unit of files that say none.")
+@unit_option("files that state none")
 @force_option
 @json_option
 def train_command(
@@ -166,11 +166,10 @@ def train_command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Learn one orthogonal basis a coordinate from the positions of CLIPS (.amc, .bvh, .c3d, .mcz).
+    """Learn one orthogonal basis per coordinate from positions of CLIPS (.amc, .bvh, .c3d, .mcz).
 
-    All clips must have the same points. A basis is learned by turns: the largest coefficients of
-    each frame stay, then comes the basis nearest to what has stayed. OUT holds the bases in
-    integers, as SPEC.md, "Bases", has them.
+    All clips must have the same points. Each iteration keeps the largest coefficients of each
+    frame, then finds the basis nearest to them. OUT holds the bases as integers (SPEC.md, "Bases").
     """
     from mcz.codecs.training import Recipe, train
     from mcz.files.writing.atomic import refuse_inputs

@@ -72,12 +72,12 @@ if TYPE_CHECKING:
     "names",
     metavar="NAME",
     multiple=True,
-    help="Choose a clip (repeatable); needed if there are several.",
+    help="Choose a clip (repeatable). Required if there are several.",
 )
 @where_option
-@frames_option("Frames A <= f < B, counted from 0.")
+@frames_option("Use only frames A <= f < B, counted from 0.")
 @click.option(
-    "--joints", metavar="a,b", help="Write these joints alone, by name or index (with --to)."
+    "--joints", metavar="a,b", help="Write only these joints, by name or index (with --to)."
 )
 @click.option(
     "--resolution",
@@ -87,19 +87,21 @@ if TYPE_CHECKING:
     help="Leave out the K finest details.",
 )
 @click.option(
-    "--decimate", is_flag=True, help="Write every 2^K-th frame alone, at the rate divided by 2^K."
+    "--decimate",
+    is_flag=True,
+    help="Write only every 2^K-th frame, at the frame rate divided by 2^K.",
 )
 @click.option(
     "--preview",
     "preview",
     is_flag=True,
-    help="Write only frames that need no decoding of the rest (with --to).",
+    help="Write only the preview frames, without decoding the rest (with --to).",
 )
 @click.option(
     "--post-filter",
     "filtered",
     is_flag=True,
-    help="Filter the noise of a coarse codec out of the positions of markers.",
+    help="Smooth the coding noise in positions of markers.",
 )
 @click.option(
     "--to",
@@ -113,23 +115,25 @@ if TYPE_CHECKING:
     metavar="NAME",
     help="Write another signal, such as analog or outputs, or the events (with --to csv or npz).",
 )
-@click.option("--stored", is_flag=True, help="Write words as stored, not in units (with --signal).")
-@up_option("Axis that points up, where the clip does not know it (with --to c3d, glb or usda).")
-@unit_option("Length unit, where the clip does not know it (with --to another format).")
+@click.option(
+    "--stored",
+    is_flag=True,
+    help="Write stored words instead of values in units (with --signal).",
+)
+@up_option("Set the up axis of a clip that states none (with --to c3d, glb or usda).")
+@unit_option("a clip that states none (with --to another format)")
 @key_error_option
-@rate_option("Frames a second, in place of the clip's own (with --to, --post-filter).")
+@rate_option("Set the frame rate, replacing the clip's own (with --to, --post-filter).")
 @click.option(
     "--solve-ik",
     "solve",
     is_flag=True,
-    help="Fit the skeleton of a clip of positions to them (--to amc, bvh, glb or usda).",
+    help="Fit the skeleton of a clip of positions to its points (--to amc, bvh, glb or usda).",
 )
-@click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF), too.")
+@click.option("--with-skeleton", is_flag=True, help="Also write the skeleton's own file (ASF).")
 @salvage_option
 @click.option(
-    "--unverified",
-    is_flag=True,
-    help="Read only the bytes that are needed; no checksum covers them.",
+    "--unverified", is_flag=True, help="Read fewer bytes, without checking their checksums."
 )
 @decoded_option
 @force_option
@@ -147,10 +151,10 @@ def decode_command(
     as_json: bool,
     **settings: Any,
 ) -> Exit:
-    """Write the original file of a clip, byte for byte, or its numbers, or another format.
+    """Restore the original file of a clip byte for byte, or write its numbers or another format.
 
-    A file without clips gives its skeleton's ASF or its attachment. A source file in place of
-    FILE.mcz is converted at once, as by mcz convert.
+    A file without clips gives its skeleton's ASF or its attachment. Given a source file instead of
+    FILE.mcz, decode works like mcz convert.
     """
     options = DecodeOptions(**settings)
     refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
@@ -255,18 +259,18 @@ OF_SOURCES = ("skeleton", "arrays", "model")
 )
 @click.option("--clip", "names", metavar="NAME", multiple=True, help="Choose the clip of an .mcz.")
 @where_option
-@frames_option("Frames A <= f < B, counted from 0.")
+@frames_option("Use only frames A <= f < B, counted from 0.")
 @click.option(
-    "--joints", metavar="a,b", help="Write these joints alone, by name or index (to csv or npz)."
+    "--joints", metavar="a,b", help="Write only these joints, by name or index (to csv or npz)."
 )
-@skeleton_option("The ASF of an AMC, or none. Default: the one beside it, as in mcz encode.")
+@skeleton_option("Use this ASF for an AMC, or none. Default: the one beside it, as in mcz encode.")
 @rate_option(ITS_RATE_HELP)
-@unit_option("Length unit of a file that says none.")
-@up_option("Axis that points up, of a file that does not say.")
+@unit_option("a file that states none")
+@up_option("Set the up axis of a file that states none.")
 @arrays_option
 @model_option
 @key_error_option
-@click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF), too.")
+@click.option("--with-skeleton", is_flag=True, help="Also write the skeleton's own file (ASF).")
 @decoded_option
 @force_option
 @threads_option
@@ -281,10 +285,10 @@ def convert_command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Write the motion of IN as OUT, whose suffix says the format: any two that mcz knows.
+    """Convert IN to OUT, between any two formats that mcz knows; the suffix of OUT sets the format.
 
-    It is mcz encode and mcz decode in one step. What OUT has no place for is named. A copy in IN's
-    own format has the same bytes; with --frames it is a part.
+    This combines mcz encode and mcz decode. A note names facts that OUT cannot hold. A copy in the
+    format of IN has the same bytes, unless --frames selects a part.
     """
     facts = {name: options.pop(name) for name in OF_SOURCES}
     wanted = DecodeOptions(**options)

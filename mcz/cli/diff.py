@@ -72,11 +72,11 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     help="Choose a clip of an .mcz (repeatable). Default: the only one, or all that both have.",
 )
 @where_option
-@frames_option("Frames A <= f < B of both, from 0.")
-@unit_option("Length unit of a file that says none.")
-@skeleton_option("The ASF of an AMC, or none.")
+@frames_option("Use only frames A <= f < B of both, counted from 0.")
+@unit_option("a file that states none")
+@skeleton_option("Use this ASF for an AMC, or none.")
 @rate_option()
-@up_option("Axis that points up, of a file that does not say.")
+@up_option("Set the up axis of a file that states none.")
 @arrays_option
 @model_option
 @click.option(
@@ -108,12 +108,12 @@ def diff_command(
     as_json: bool,
     **settings: Any,
 ) -> Exit:
-    """Compare B with A, the original: any two of .mcz and of source formats.
+    """Compare B with A, the original; both may be an .mcz or a source file.
 
-    Print errors of channels, and of positions in length units and cm (docs/reference/measures.md),
-    how far feet slide that stand in A, and compression ratios of an .mcz. The exit code is 0
-    whenever the two could be compared, however much they differ. --where is asked of the clips of
-    A, or of B where A is no .mcz.
+    Print errors of channels and of positions in length units and cm (docs/reference/measures.md),
+    sliding of feet that stand in A, and compression ratios of an .mcz. The exit code is 0 whenever
+    the two could be compared, however much they differ. --where selects clips of A, or of B if A is
+    not an .mcz.
     """
     options = _Options(frames=frames, **settings)
     if (a, b) == ("-", "-"):

@@ -52,15 +52,15 @@ if TYPE_CHECKING:
     help="Write to a file, a folder, or - for standard output. Default: SRC with the suffix .mcz.",
 )
 @skeleton_option(
-    "The ASF of an AMC, or none. Default: one beside it or in a sibling folder asf/ that has "
-    "the take's name or the subject's, or the only one whose bones fit."
+    "Use this ASF for an AMC, or none. Default: an ASF beside the AMC or in a sibling folder asf/ "
+    "with the name of the take or the subject, or the only one whose bones fit."
 )
 @click.option(
     "--format",
     "format_name",
     type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "npy", "npz")),
-    help="Set the format of standard input. Default: by its content; live BVH, or AMC with "
-    "--skeleton.",
+    help="Set the format of standard input. Default: detect it from the content; for live input "
+    "BVH, or AMC with --skeleton.",
 )
 @copies_option("no")
 @encoding_options
@@ -80,11 +80,11 @@ def encode_command(
 ) -> Exit:
     """Encode SRC (.bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npy or .npz) into OUT.mcz.
 
-    An ASF alone makes one of a skeleton.
+    An ASF gives an .mcz with only a skeleton.
 
-    With SRC - standard input is read. A codec that works frame by frame (lsdt-frame, or posewave
-    with levels=0) then writes each frame of a BVH or AMC before it reads the next, to standard
-    output unless -o says otherwise.
+    Use - as SRC to read standard input. Codecs that work frame by frame (lsdt-frame, or posewave
+    with levels=0) then write each frame of a BVH or AMC before reading the next. Their default
+    output is standard output.
     """
     if more:
         text = "encode takes one file; mcz pack takes a folder of them, mcz append several"

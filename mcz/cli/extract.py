@@ -44,13 +44,13 @@ if TYPE_CHECKING:
 @click.option(
     "--recode",
     is_flag=True,
-    help="Decode and code anew, if lossy with another small error, joints that are coded together "
-    "with others (by default refused), and frames beside which others would stay stored.",
+    help="Re-encode if joints are coded together, or if other frames would stay stored; adds a "
+    "small error if lossy. Default: refuse such joints.",
 )
 @clips_option
 @where_option
 @salvage_option
-@copies_option("where IN.mcz has some")
+@copies_option("yes if IN.mcz has copies")
 @decoded_option
 @force_option
 @json_option
@@ -71,10 +71,10 @@ def extract_command(
 ) -> Exit:
     """Cut frames, joints or the finest resolutions out of IN.mcz, without re-encoding.
 
-    Streams are copied byte for byte, so the values of OUT.mcz are those that IN.mcz gives for the
-    same frames, joints and resolution; some codecs code all joints in one, see --recode. Its
-    quality record says what was cut. With --salvage IN.mcz may be damaged, if not in what is cut
-    out; mcz repair takes out all that is whole.
+    Streams are copied byte for byte, so OUT.mcz has the values that IN.mcz has for the same frames,
+    joints and resolution. Some codecs code all joints together: see --recode. The quality record
+    lists the cuts. With --salvage, IN.mcz may be damaged outside the selected parts; mcz repair
+    saves all intact parts.
     """
     import mcz
 

@@ -75,17 +75,17 @@ RATIOS = (  # of the bytes that a codec wrote, which restore no source alone
     "--validate",
     "check",
     is_flag=True,
-    help="Check everything; name the offset and SPEC.md's heading of each fault.",
+    help="Check everything; print the offset and the SPEC.md heading of each fault.",
 )
 @clips_option
 @where_option
 @salvage_option
-@skeleton_option("The ASF of an AMC.")
+@skeleton_option("Use this ASF for an AMC.")
 @click.option(
     "--preview/--no-preview",
     default=None,
-    help="Draw the energy over time as a line, and the bytes of joints as bars. Default: on a "
-    "terminal, for clips that are quickly decoded.",
+    help="Draw motion over time as a line and bytes of joints as bars. Default: on a terminal, for "
+    "clips that decode quickly.",
 )
 @decoded_option
 def info_command(
@@ -102,8 +102,8 @@ def info_command(
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz.
 
-    Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .npy, .npz) it shows the
-    skeleton and the clip.
+    For a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .npy, .npz), show its
+    skeleton and clip.
     """
     from mcz.files.reading.file import is_source
     from mcz.files.reading.report import info

@@ -43,7 +43,7 @@ HEADS = {"name": "clip", "n_frames": "frames", "n_channels": "channels", "frame_
     "docs/reference/queries.md. Default: those of the index.",
 )
 @click.option("--sort", metavar="KEY", help="Sort by a field or metadata key; -KEY: descending.")
-@click.option("--csv", "as_csv", is_flag=True, help="Print a CSV table of the clips alone.")
+@click.option("--csv", "as_csv", is_flag=True, help="Print only the clips, as a CSV table.")
 @salvage_option
 @json_option
 def list_command(
@@ -55,9 +55,9 @@ def list_command(
     salvage: bool,
     as_json: bool,
 ) -> Exit:
-    """List the clips and attachments of FILE.mcz; only its index is read.
+    """List the clips and attachments of FILE.mcz.
 
-    With --where, --columns and --sort as much more is read as they ask for.
+    Only the index is read, unless --where, --columns or --sort need more.
     """
     if as_csv and as_json:
         raise JsonRefused("--csv or --json, not both", Exit.USAGE)

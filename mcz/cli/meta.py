@@ -59,30 +59,31 @@ def _to_pairs(
 )
 @click.option(
     "--set", "pairs", metavar="KEY=VALUE", multiple=True, callback=_to_pairs,
-    help="Set a key (repeatable). Keys: docs/guides/metadata.md, or x-... of your own."
+    help="Set a key (repeatable). Keys: see docs/guides/metadata.md; your own begin with x-."
 )  # fmt: skip
 @click.option(
     "--remove", "removed", metavar="KEY", multiple=True, help="Remove a key (repeatable)."
 )
 @click.option(
     "--from", "table", metavar="TABLE.csv", type=click.Path(readable=False),
-    help="Set the metadata of a table: a row a clip, a column a key; CSV or TSV with a head."
+    help="Import metadata from a table (CSV or TSV with a header): one row per clip, one column "
+    "per key."
 )  # fmt: skip
 @click.option(
     "--match",
     metavar="TEXT",
-    help="Name clips by columns of the table: {subject:0>2}_{trial:0>2}. Default: a column clip, "
-    "name, path or file.",
+    help="Build clip names from columns of the table: {subject:0>2}_{trial:0>2}. Default: the "
+    "column clip, name, path or file.",
 )
 @click.option(
     "--take", metavar="a,b",
-    help="Take these columns of the table, as KEY=COLUMN if the names differ. Default: all."
+    help="Import only these columns; KEY=COLUMN if the names differ. Default: all."
 )  # fmt: skip
 @click.option("--skip-unknown", is_flag=True, help="Ignore rows that match no clip.")
 @click.option(
     "--rate", metavar="R", callback=to_rate,
     help="Set the frame rate of clips whose source states none (AMC); rewrites the file. Default: "
-    "of all clips of unknown rate."
+    "all clips with unknown rate."
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Change a known rate.")
 @click.option(

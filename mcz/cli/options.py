@@ -13,8 +13,8 @@ from mcz.cli.outputs import file_in
 from mcz.model.types import Settings
 
 EFFORTS = ("fast", "best")  # as in mcz.codecs, which takes longer to import
-RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
-ITS_RATE_HELP = "Frames a second (120, 29.97, 30000/1001), in place of what the source states."
+RATE_HELP = "Set the frame rate of files that state none (120, 29.97, 30000/1001)."
+ITS_RATE_HELP = "Set the frame rate (120, 29.97, 30000/1001), replacing the one in the source."
 PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as those of the codec posewave
 Function = Callable[..., object]
 
@@ -49,7 +49,7 @@ version_option = click.option(
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 
-force_option = click.option("--force", is_flag=True, help="Overwrite what exists.")
+force_option = click.option("--force", is_flag=True, help="Overwrite existing files.")
 
 
 def output_option(function: Function) -> Function:
@@ -77,7 +77,8 @@ decoded_option = click.option(
     "--max-decoded",
     metavar="BYTES",
     callback=to_bytes,
-    help="Decode up to BYTES (200M, 2G) of one file. Default: 64 MiB, or 4096 times its size.",
+    help="Limit the decoded bytes of one file (200M, 2G). Default: 64 MiB or 4096 times its size, "
+    "whichever is more.",
 )
 
 
@@ -97,7 +98,7 @@ def threads_option(function: Function) -> Function:
         "--threads",
         metavar="N",
         type=click.IntRange(1),
-        help="Decode and encode with N threads. Default: one a processor.",
+        help="Use N threads. Default: one per processor.",
     )(command)
 
 
@@ -116,7 +117,7 @@ def jobs_option(function: Function) -> Function:
         "--jobs",
         metavar="N",
         type=click.IntRange(1),
-        help="Work with N processes if it pays. Default: one a processor.",
+        help="Use up to N processes. Default: one per processor.",
     )(command)
 
 
@@ -125,8 +126,8 @@ def copies_option(default: str) -> Callable[[Function], Function]:
     return click.option(
         "--copies/--no-copies",
         default=None,
-        help="Skeletons, templates and the like a second time, for --salvage to use where a bit "
-        f"of them is flipped. Default: {default}.",
+        help="Store skeletons, templates and the like twice, so that --salvage survives a flipped "
+        f"bit in them. Default: {default}.",
     )
 
 
@@ -156,13 +157,12 @@ where_option = click.option(
     "see docs/reference/queries.md.",
 )
 
-token_option = click.option(
-    "--token",
-    metavar="TEXT",
-    envvar="MCZ_TOKEN",
-    help="Require this token from clients; MCZ_TOKEN in the environment keeps it out of the list "
-    "of processes. It encrypts nothing.",
-)
+
+def token_option(what: str) -> Callable[[Function], Function]:
+    """``--token``, as the argument ``token``; ``what`` begins its help."""
+    hint = "Use MCZ_TOKEN to keep it out of the process list. It is not encryption."
+    return click.option("--token", metavar="TEXT", envvar="MCZ_TOKEN", help=f"{what} {hint}")
+
 
 param_option = click.option(
     "--param",
@@ -188,12 +188,12 @@ def _to_unit(ctx: click.Context, param: click.Parameter, value: str | None) -> s
 
 
 def unit_option(what: str) -> Callable[[Function], Function]:
-    """``--unit``, as the argument ``unit``; ``what`` is its help."""
+    """``--unit``, as the argument ``unit``, the length unit of ``what``."""
     return click.option(
         "--unit",
         metavar="UNIT",
         callback=_to_unit,
-        help=f"{what} mm, cm, dm, m, in, ft, or a length (5.6444cm).",
+        help=f"Set the length unit of {what}: mm, cm, dm, m, in, ft, or a length (5.6444cm).",
     )
 
 
@@ -214,16 +214,16 @@ arrays_option = click.option(
 model_option = click.option(
     "--model",
     metavar="NPZ",
-    help="Take the bone lengths of bodies in an .npz from your model file of SMPL and its "
-    "kin. {gender} stands for that of the take, {body} for smpl, smplh or smplx.",
+    help="Read the bone lengths of bodies in an .npz from your model file of the SMPL family. "
+    "{gender} is replaced by the gender of the take, {body} by smpl, smplh or smplx.",
 )
 
 key_error_option = click.option(
     "--key-error",
     metavar="MM",
     type=click.FloatRange(min=0),
-    help="Leave out keys of an animation as long as all stays within MM (with --to glb). 0: a "
-    "key in every frame. Default: 0.1, or 1/20,000 of the figure if its unit is unknown.",
+    help="Drop animation keys while the error stays within MM (with --to glb). 0: keep a key in "
+    "every frame. Default: 0.1, or 1/20,000 of the figure if its unit is unknown.",
 )
 
 
@@ -279,18 +279,18 @@ def encoding_options(function: Function) -> Function:
         click.option(
             "--effort",
             type=click.Choice(EFFORTS),
-            help="Choose a lossless codec: read fastest, or smallest.",
+            help="Choose the lossless codec: fast (fastest to read) or best (smallest).",
         ),
         click.option(
             "--quality",
             metavar="Q",
             callback=_to_quality,
-            help="Encode lossy, with no point off by more than a length (0.5mm), or than mm (1 "
-            "mm), visible (5 mm) or preview (3 cm). Sets --codec to lossy by default.",
+            help="Encode lossy and limit the error of every point: a length (0.5mm), mm (1 mm), "
+            "visible (5 mm) or preview (3 cm). Default codec: lossy.",
         ),
         param_option,
-        unit_option("Length unit of the source."),
-        up_option("Axis of the source that points up. BVH and AMC do not say theirs."),
+        unit_option("the source"),
+        up_option("Set the axis that points up. BVH and AMC state none."),
         arrays_option,
         model_option,
         click.option(

@@ -58,11 +58,11 @@ def moving_options(function: Function) -> Function:
             metavar="NAME",
             help="Choose the clip of an .mcz. Default: the only one.",
         ),
-        frames_option("Frames A <= f < B, from 0."),
+        frames_option("Use only frames A <= f < B, counted from 0."),
         rate_option(),
-        unit_option("Length unit of a file without."),
-        up_option("Axis that points up, of a file that does not say."),
-        skeleton_option("The ASF of an AMC, or none."),
+        unit_option("a file that states none"),
+        up_option("Set the up axis of a file that states none."),
+        skeleton_option("Use this ASF for an AMC, or none."),
         arrays_option,
         model_option,
         decoded_option,
@@ -130,7 +130,7 @@ def to_size(
 @moving_options
 @click.option("--sheet", metavar="N", type=int, help="Draw N poses on one .png or .svg.")
 @click.option(
-    "--fps", metavar="R", type=float, help="Set the pictures a second. Default: GIF 25, else 30."
+    "--fps", metavar="R", type=float, help="Set the pictures per second. Default: GIF 25, else 30."
 )
 @click.option("--speed", metavar="X", type=float, default=1.0, help="Set the speed. Default: 1.")
 @click.option(
@@ -166,10 +166,11 @@ def render_command(
     """Draw the motion in FILE: a film, a still or a sheet of poses.
 
     FILE is an .mcz, .bvh, .amc, .c3d, .trc, .csv of Motive or Vicon, or .npz; a .mot, a .sto and
-    other .csv have no points to draw, nor has a plain .npy unless --arrays says what it is.
+    other .csv have no points to draw. A plain .npy needs --arrays.
 
-    A .png or .svg without --sheet shows the middle frame of --frames. A grid on the floor has its
-    length, left and right have colors of their own. It needs pip install 'mcz[render]'.
+    A .png or .svg without --sheet shows the middle frame of --frames. The picture states the
+    spacing of the floor grid, and colors left and right differently. Requires pip install
+    'mcz[render]'.
     """
     import mcz
     from mcz.files.writing.atomic import refuse_inputs
@@ -267,9 +268,9 @@ def plot_command(
 ) -> Exit:
     """Draw numbers of FILE (.mcz or of any source format), and print them.
 
-    channels and spectrum of a --joint, or of a --signal; error of FILE2 against FILE, the original,
-    as mcz diff has it; bytes of a clip by joint and resolution, as mcz info --layout has them;
-    rate-distortion at a few settings of lossy codecs. It needs pip install 'mcz[plot]'.
+    --what chooses the plot: channels or spectrum of a --joint or --signal; error of FILE2 against
+    FILE, the original, as in mcz diff; bytes of a clip by joint and resolution, as in mcz info
+    --layout; rate-distortion of lossy codecs at a few settings. Requires pip install 'mcz[plot]'.
     """
     import mcz
     from mcz.files.writing.atomic import refuse_inputs

@@ -45,12 +45,12 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
 @click.option("--check", is_flag=True, help="Report the state of the file, and change nothing.")
 @json_option
 def protect_command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool) -> Exit:
-    """Append recovery data to FILE.mcz: mcz repair then restores every byte of it.
+    """Append recovery data to FILE.mcz, with which mcz repair can restore every byte.
 
-    It does so as long as no more blocks are bad than there are recovery blocks, wherever they lie:
-    single bytes, a burst, the beginning or the end of the file. What the file held stays readable
-    at every moment. What was appended since has recovery data of its own, which a lost tail may
-    take along; --anew makes one set for all.
+    Repair succeeds if there are at least as many recovery blocks as bad blocks, anywhere: single
+    bytes, a burst, the beginning or the end of the file. The file stays readable at every moment.
+    Parts appended later have their own recovery data, which may be lost with the tail; --anew makes
+    one set for the whole file.
     """
     existing(file)
     if anew and check:
@@ -111,7 +111,7 @@ def _print_protection(file: str, recovery: Recovery) -> None:
         echo(f"{file}: {recovery.behind:,} bytes at its end are not protected")
 
 
-@click.command(short_help="Write the intact parts of a damaged .mcz to a sound one.")
+@click.command(short_help="Write the intact parts of a damaged .mcz to a valid one.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.option("-o", "--output", metavar="OUT.mcz", required=True, help="Write to this file.")
 @decoded_option
@@ -120,12 +120,11 @@ def _print_protection(file: str, recovery: Recovery) -> None:
 def repair_command(
     file: str, output: str, max_decoded: int | None, force: bool, as_json: bool
 ) -> Exit:
-    """Write all that is whole in FILE.mcz to OUT.mcz, a sound file; FILE.mcz stays as it is.
+    """Write the intact parts of FILE.mcz to OUT.mcz, a valid file; FILE.mcz does not change.
 
-    With recovery data (mcz protect) OUT.mcz is what was protected, byte for byte, as long as they
-    can give that back. Otherwise, of a clip that has lost frames, each run of frames that is whole
-    becomes a clip called NAME.A-B. Nothing is coded anew and nothing is made up: what is lost is
-    named, and the exit code is 4; it is 0 where nothing is lost.
+    With enough recovery data (mcz protect), OUT.mcz is the protected file, byte for byte. Otherwise
+    each intact run of frames in a damaged clip becomes a clip NAME.A-B. Stored bytes are copied
+    without re-encoding. Losses are listed, with exit code 4; without losses the exit code is 0.
     """
     import mcz
 
@@ -177,10 +176,10 @@ def _repair_lines(output: str, result: Repair) -> Iterator[str]:
 )
 @json_option
 def bag_command(files: tuple[str, ...], folder: str, info: tuple[str, ...], as_json: bool) -> Exit:
-    """Make DIR, a new folder, a bag that holds copies of the files.
+    """Copy the files into DIR, a new folder, as a bag (BagIt).
 
-    The checksums of each .mcz are checked first; a damaged one is refused. Other files, such as
-    a report of mcz verify, may be among them. mcz verify DIR checks a bag.
+    The checksums of each .mcz are checked first; a damaged one is refused. You may add other files,
+    such as a report of mcz verify. To check a bag, run mcz verify DIR.
     """
     import mcz
     from mcz.files.bags import check_bag

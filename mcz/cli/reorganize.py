@@ -15,7 +15,7 @@ from mcz.cli.terminal import Progress
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @where_option
 @click.option(
-    "--aliases", is_flag=True, help="Also delete further names of the same content, else refused."
+    "--aliases", is_flag=True, help="Also delete aliases of the same content. Default: refuse."
 )
 @output_option
 @force_option
@@ -29,11 +29,11 @@ def delete_command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Take clips, attachments or aliases out of FILE.mcz, and what only they needed.
+    """Delete clips, attachments or aliases from FILE.mcz, with everything that only they need.
 
-    Their bytes are in no part of the new file: neither their skeletons, templates and models nor
-    what was said of them, unless another clip has the same. Other copies of FILE.mcz, and what the
-    disk or a backup keeps of the old one, are not touched.
+    The new file contains none of their bytes, skeletons, templates, models and metadata, except
+    those that other clips share. Other copies of FILE.mcz, and remains of the old file on the disk
+    or in a backup, are not affected.
     """
     import mcz
 
@@ -55,10 +55,9 @@ def delete_command(
 def rename_command(
     file: str, names: tuple[str, ...], output: str | None, force: bool, as_json: bool
 ) -> Exit:
-    """Call the clip, attachment or alias OLD of FILE.mcz NEW; pairs may be repeated, and swap.
+    """Rename the clip, attachment or alias OLD to NEW (pairs repeatable; names may be swapped).
 
-    The source of a clip, where it was called like the clip, follows, so that unpack gives it under
-    the new name.
+    A source with the name of its clip is renamed too, and unpack writes it under the new name.
     """
     import mcz
 
@@ -91,9 +90,9 @@ def reorder_command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Put the clips NAME first, then the others: as they were, or sorted --by KEY.
+    """Put the named clips first, then the others in their order, or sorted --by KEY.
 
-    What is sorted by is a field or a metadata key, as in docs/reference/queries.md.
+    KEY is a field or a metadata key, see docs/reference/queries.md.
     """
     import mcz
 
@@ -127,9 +126,9 @@ def reorder_command(
 def split_command(
     file: str, folder: str, by: str, rest: str | None, force: bool, as_json: bool
 ) -> Exit:
-    """Write DIR/VALUE.mcz for each value of KEY that clips of FILE.mcz have, with these clips.
+    """Write one DIR/VALUE.mcz for each value of KEY, with its clips.
 
-    Chunks are copied, with the skeletons and templates that they need; FILE.mcz stays as it is.
+    Chunks are copied without re-encoding; FILE.mcz does not change.
     """
     import mcz
 
@@ -147,10 +146,12 @@ def split_command(
 @click.option(
     "--rename",
     is_flag=True,
-    help="Put clips whose name is taken below the name of their file: day2/walk.",
+    help="If the name of a clip is taken, put it below the name of its file: day2/walk.",
 )
 @click.option(
-    "--skip-identical", is_flag=True, help="Take content that two files share under one name once."
+    "--skip-identical",
+    is_flag=True,
+    help="Copy content that two files share under one name only once.",
 )
 @force_option
 @json_option
@@ -162,10 +163,10 @@ def merge_command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Put all that the files hold into OUT.mcz; chunks are copied, what they share once.
+    """Join files into OUT.mcz. Chunks are copied without re-encoding, shared ones once.
 
-    A name that two of them have is refused, unless --rename or --skip-identical says what becomes
-    of it. Where all files have recovery data (mcz protect), OUT.mcz has its own.
+    Equal names are refused, unless --rename or --skip-identical is given. If all files have
+    recovery data (mcz protect), so has OUT.mcz.
     """
     import mcz
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     help="Read the new values from a .csv or .npz as decode --to writes them.",
 )
 @click.option(
-    "--clip", "name", metavar="NAME", help="Choose the clip; needed if there are several."
+    "--clip", "name", metavar="NAME", help="Choose the clip. Required if there are several."
 )
 @click.option("--in-place", is_flag=True, help="Write to IN.mcz itself, without OUT.mcz.")
 @click.option(
@@ -45,10 +45,10 @@ if TYPE_CHECKING:
 @click.option(
     "--recode",
     is_flag=True,
-    help="Re-encode a clip whose joints are coded in one, so that others change a little. "
-    "Default: refuse such a clip.",
+    help="Re-encode a clip whose joints are coded together; other joints change a little. Default: "
+    "refuse such a clip.",
 )
-@copies_option("where IN.mcz has some")
+@copies_option("yes if IN.mcz has copies")
 @force_option
 @json_option
 def replace_command(
@@ -64,10 +64,10 @@ def replace_command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Give one joint of a clip other values; all other streams are copied byte for byte.
+    """Replace the values of one joint; all other streams are copied byte for byte.
 
-    The table has a row for every frame and the columns of the joint, by their names or nothing
-    else. IN.mcz itself is changed by --in-place alone.
+    The table has a row for every frame, and the columns of the joint by name, or only these
+    columns. Only --in-place changes IN.mcz.
     """
     import mcz
     from mcz.files.writing.atomic import refuse_inputs

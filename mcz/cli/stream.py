@@ -69,7 +69,7 @@ COMMANDS = {"encode": "stream.stream_encode_command", "decode": "stream.stream_d
     epilog=EXIT_CODES,
 )
 def stream_command() -> None:
-    """Code frames as they come, each before the next is known, over a pipe or TCP."""
+    """Encode or decode frames as they arrive, each before the next is known, over pipe or TCP."""
 
 
 HEARTBEAT = 5.0  # seconds
@@ -96,12 +96,12 @@ WARN_AFTER = 5.0  # seconds of frames
     default=0,
     help="Wait for N clients before the first row is read (with --listen).",
 )
-@token_option
+@token_option("Require this token from clients.")
 @click.option("--codec", metavar="NAME", default="online", show_default=True)
 @param_option
-@rate_option("Frames a second (120, 29.97, 30000/1001).")
-@unit_option("Length unit of the numbers.")
-@up_option("Axis of the numbers that points up.")
+@rate_option("Set the frame rate (120, 29.97, 30000/1001).")
+@unit_option("the numbers")
+@up_option("Set the up axis of the numbers.")
 @click.option("--name", metavar="NAME", default="live", help="Name the clip.  [default: live]")
 @click.option(
     "--skeleton",
@@ -121,7 +121,7 @@ WARN_AFTER = 5.0  # seconds of frames
     "--heartbeat",
     metavar="SECONDS",
     type=click.FloatRange(min=0),
-    help="Tell clients every so often that the stream goes on while no row comes; 0: never.  "
+    help="Tell clients every SECONDS that the stream continues while no row arrives; 0: never.  "
     "[default: 5 with --listen, else 0]",
 )
 @force_option
@@ -136,16 +136,16 @@ def stream_encode_command(
     force: bool,
     **options: Any,
 ) -> Exit:
-    """Encode rows of numbers on standard input, each before the next is read.
+    """Encode rows of numbers from standard input, one by one.
 
     The first line names markers (a,b,c: then a row has x, y and z of each in turn) or their
     coordinates (a.x,a.y,a.z,...), unless --skeleton says what the columns are. CSV rows follow, an
-    empty field where a value is missing, or, with --float32, binary ones, NaN there. What mcz
-    decode --to csv and mcz stream decode print of markers will do, too. A CSV line
+    empty field where a value is missing, or, with --float32, binary ones, NaN there. The
+    output of mcz decode --to csv and mcz stream decode for markers is accepted, too. A CSV line
     "# set bitrate=4 gof=20" changes parameters of the codec from its next group of frames on.
 
-    A bad row or one that is cut off aborts the stream: all frames before it are sent, and no end.
-    Standard error says at the end what the stream took, framing included.
+    A bad or truncated row aborts the stream: all earlier frames are sent, but no end. At the end
+    standard error reports the size of the stream, including framing.
     """
     from mcz.cli.tcp import Heart, listening
     from mcz.files.writing.atomic import refuse_inputs
@@ -228,29 +228,29 @@ def _push_all(rows: Rows, writer: LiveWriter, heart: Heart) -> None:
 @click.option(
     "--connect", metavar="HOST:PORT", help="Read from this address over TCP; implies --join."
 )
-@token_option
+@token_option("Send this token to the server.")
 @click.option(
     "--lost",
     type=click.Choice(("refuse", "missing", "hold", "linear")),
     default="refuse",
     show_default=True,
-    help="Of frames that did not come: stop, print empty fields, the last frame that came, or "
-    "what lies between that and the next one.",
+    help="Handle frames that did not arrive: stop, print empty fields, repeat the last frame, or "
+    "interpolate to the next one.",
 )
 @click.option("--join", is_flag=True, help="Join a stream anywhere.")
 @click.option(
     "--timeout",
     metavar="SECONDS",
     type=click.FloatRange(min=0),
-    help="Stop after so long without data; 0: wait for ever.  [default: 30 with --connect, else 0]",
+    help="Stop after SECONDS without data; 0: wait forever.  [default: 30 with --connect, else 0]",
 )
 @click.option(
     "--post-filter",
     "post_filter",
     is_flag=True,
-    help="Smooth positions as coarse coding needs it; rows come 12 frames late.",
+    help="Smooth coarsely coded positions; rows come 12 frames late.",
 )
-@rate_option("Frames a second of a stream that states none (with --post-filter).")
+@rate_option("Set the frame rate of a stream that states none (with --post-filter).")
 @click.option("--float32", "binary", is_flag=True, help="Print little-endian binary32 rows.")
 @click.option("--states", is_flag=True, help="Print which frames are concealed or missing.")
 def stream_decode_command(
@@ -265,13 +265,13 @@ def stream_decode_command(
     binary: bool,
     states: bool,
 ) -> Exit:
-    """Print the frames of a live stream, each as soon as its bytes have come.
+    """Print the frames of a live stream as they arrive.
 
     The stream is FILE.mcz, or standard input. A line of names comes first. CSV rows begin with the
     number of the frame, counted from 0, and have an empty field where a value is missing; with
-    --float32 a row is its values alone, NaN there. Standard error says at the end what came; the
-    exit code is 4 where frames are missing, or where the stream was cut off: the source died, the
-    connection broke, or nothing came for --timeout.
+    --float32 a row is only its values, NaN there. At the end standard error reports what arrived.
+    The exit code is 4 if frames are missing, or if the stream was cut off: the source died, the
+    connection broke, or no data arrived for --timeout.
     """
     if connect is not None and file != "-":
         raise Failure("FILE.mcz and --connect exclude each other", Exit.USAGE)

@@ -47,16 +47,14 @@ if TYPE_CHECKING:
     "--source",
     metavar="SRC",
     type=click.Path(readable=False),
-    help="Compare with this source file, too.",
+    help="Also compare with this source file.",
 )
-@click.option(
-    "--quick", is_flag=True, help="Check checksums and index alone, at the speed of the disk."
-)
+@click.option("--quick", is_flag=True, help="Check only checksums and index, at disk speed.")
 @click.option(
     "--report",
     metavar="REPORT",
     type=click.Path(readable=False),
-    help="Write a report file, too: REPORT.txt or REPORT.json.",
+    help="Also write a report: REPORT.txt or REPORT.json.",
 )
 @click.option(
     "--date", metavar="DATE", help="Set the date of the report. Default: now; 'none' leaves it out."
@@ -80,9 +78,9 @@ def verify_command(
 ) -> Exit:
     """Check every checksum, decode everything, restore every source and compare its SHA-256.
 
-    With --where every checksum of the file, and all that is said of the clips that it takes. With
-    --quick every checksum and the index; it says that nothing was decoded. Of a BAG, a folder that
-    mcz bag or another tool has made (BagIt), each file against the manifests, then each .mcz in it.
+    With --where, check every checksum, but decode only the selected clips. With --quick, check only
+    checksums and index. For a BAG (a BagIt folder of mcz bag or another tool), check each file
+    against the manifests, then each .mcz in it.
     """
     if quick and (where is not None or source is not None):
         raise Failure("--quick decodes nothing: it takes no --where and no --source", Exit.USAGE)

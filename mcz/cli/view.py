@@ -74,11 +74,9 @@ LOOPBACK = "127.0.0.1"
     metavar="OUT.html",
     help="Write one page that holds the files and the player; OUT.rrd: a file for rerun.",
 )
-@click.option(
-    "--rerun", is_flag=True, help="Show the motion in the viewer of rerun, which is started."
-)
+@click.option("--rerun", is_flag=True, help="Start the rerun viewer and show the motion in it.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open nothing.")
-@click.option("--keep", is_flag=True, help="Stay when the last page is closed, until Ctrl-C.")
+@click.option("--keep", is_flag=True, help="Run until Ctrl-C, even after the last page is closed.")
 @click.option(
     "--host",
     metavar="NAME",
@@ -92,10 +90,10 @@ LOOPBACK = "127.0.0.1"
     default=0,
     help="Listen on this port. Default: any free one.",
 )
-@skeleton_option("The ASF of an AMC, or none. Default: found as mcz encode finds it.")
+@skeleton_option("Use this ASF for an AMC, or none. Default: found as mcz encode finds it.")
 @rate_option()
-@unit_option("Length unit of a file that says none.")
-@up_option("Axis that points up, of a file that does not say.")
+@unit_option("a file that states none")
+@up_option("Set the up axis of a file that states none.")
 @arrays_option
 @model_option
 @salvage_option
@@ -106,7 +104,7 @@ LOOPBACK = "127.0.0.1"
     metavar="NAME",
     help="Encode the clips with this codec (with -o). Default: as they are.",
 )
-@click.option("--effort", type=click.Choice(EFFORTS), help="Choose a lossless codec (with -o).")
+@click.option("--effort", type=click.Choice(EFFORTS), help="Choose the lossless codec (with -o).")
 @param_option
 @click.option(
     "--max-size",
@@ -122,18 +120,18 @@ LOOPBACK = "127.0.0.1"
 def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
     """Show motions in the browser: files, folders of them, URLs of an .mcz.
 
-    Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot, .sto, .npy and .npz. What has no points is
-    shown as curves.
+    Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot, .sto, .npy and .npz. Files without
+    points appear as curves.
 
-    A server on this machine serves the page and the files to this machine alone, at an address
-    that nobody can guess. It ends some seconds after its last page was closed, and at Ctrl-C.
+    A local server serves the page and the files to this machine only, at an unguessable address. It
+    ends some seconds after the last page is closed, or at Ctrl-C.
 
-    With -o one page is written, which needs neither a server nor a network: of an archive the clips
-    that --clip and --where take, coded anew with --codec. Several files are compared, the first
-    being the original.
+    With -o, write one page that needs neither a server nor a network. --clip and --where select
+    clips of an archive; --codec re-encodes them. Several files are compared with the first, the
+    original.
 
-    With --rerun, or -o OUT.rrd, every clip is logged for rerun: its points and bones, other signals
-    as time series.
+    With --rerun, or -o OUT.rrd, log every clip for rerun: points and bones, and other signals as
+    time series.
     """
     if output is not None:
         output = file_in(output, files[0], ".rrd" if options["rerun"] else ".html")

@@ -26,7 +26,7 @@ PAPERS = {"khan2014": khan2014, "khan2016": khan2016, "hou2016": hou2016, "kwak"
 @click.command()
 @click.argument("paper", type=click.Choice([*PAPERS, "all"]))
 @click.argument("clips", nargs=-1, required=True, type=click.Path())
-@unit_option("Length unit of files that say none.")
+@unit_option("files that state none")
 @click.option(
     "--out",
     metavar="DIR",
