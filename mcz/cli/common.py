@@ -57,11 +57,11 @@ class Exit(IntEnum):
 
 EXIT_CODES = """\b
 Exit codes:
-  0  fine
+  0  success
   1  bad input: a file is missing, unreadable, damaged or refused
   2  wrong usage, a package is missing, or the target exists and --force is not given
   3  verification failed
-  4  salvaged: what could be read was written, and something was lost
+  4  salvaged: the readable parts were written, and something was lost
   130  interrupted
   143  terminated"""
 

@@ -64,7 +64,7 @@ def unknown(name: str, names: Sequence[str]) -> str:
 
     near = get_close_matches(name.lower(), names, 3, 0.7)
     if (meant := OTHER_NAMES.get(name.lower(), "")) and meant.split()[0] in names:
-        return f"no command {name!r}; that is {meant}"
+        return f"no command {name!r}; did you mean {meant}?"
     near += [known for known in names if known.startswith(name) and known not in near][:3]
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names)}"
     return f"no command {name!r}; {hint}"

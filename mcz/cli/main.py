@@ -59,7 +59,7 @@ COMMANDS = {  # name: module and function
 
 @click.command(
     cls=lazy_group(COMMANDS),
-    help="Motion capture files (BVH, ASF, AMC, C3D, TRC, MOT, STO), compressed and given back byte "
+    help="Compress motion capture files (BVH, ASF, AMC, C3D, TRC, MOT, STO) and restore them byte "
     "for byte.\n\n"
     "Every command has its own --help. Nothing is overwritten without --force.",
     epilog=EXIT_CODES,
@@ -112,9 +112,9 @@ def completion_command(shell: str) -> Exit:
 def sample_command(folder: Path, force: bool, as_json: bool) -> Exit:
     """Write walk.asf, walk.amc, walk.bvh and walk.c3d into DIR: two seconds of walking at 120 Hz.
 
-    The AMC and its ASF have 31 joints and 62 channels and say nothing of a rate (encode takes
-    --rate 120); the BVH is the same walk in centimeters (--unit cm), the C3D its markers, some of
-    them out of sight for a while. The bytes are the same on every machine.
+    The AMC and its ASF have 31 joints and 62 channels, and state no frame rate (use encode --rate
+    120). The BVH is the same walk in centimeters (--unit cm). The C3D has its markers, some of them
+    hidden for a while. The bytes are the same on every machine.
     """
     from mcz.sources.sample import sample_files
 

@@ -183,7 +183,7 @@ def test_a_command_is_suggested(given: str, meant: str, capsys: pytest.CaptureFi
 
 def test_a_command_by_another_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(cli, "mcz", ["cut"]) == 2
-    assert "no command 'cut'; that is extract" in capsys.readouterr().err
+    assert "no command 'cut'; did you mean extract?" in capsys.readouterr().err
     for meant in OTHER_NAMES.values():
         assert meant.split()[0] in COMMANDS
 
