@@ -287,14 +287,14 @@ def test_info_of_some_clips(archive_path: Path, call: Call) -> None:
 
 def test_pack_names_what_it_leaves_out(folder: Path, call: Call) -> None:
     (folder / "sub").mkdir()
-    for name in ("a.tsv", "sub/b.tsv", "notes.txt", "README"):
+    for name in ("a.log", "sub/b.log", "notes.txt", "README"):
         (folder / name).write_bytes(b"12345")
     (folder / "sloppy.bvh").write_text(SLOPPY % 2)
     words = ("pack", folder, folder / "all.mcz")
     code, out, errors = call(*words)
     assert code == 0
-    assert "left out 4 files: 2 .tsv, 1 .txt, 1 without suffix" in errors
-    for name in ("a.tsv", "sub/b.tsv", "notes.txt", "README"):
+    assert "left out 4 files: 2 .log, 1 .txt, 1 without suffix" in errors
+    for name in ("a.log", "sub/b.log", "notes.txt", "README"):
         assert f"mcz: {name}: skipped: no motion file; --keep-all keeps it" in errors
     assert "mcz: sloppy.bvh: 2 frames are declared, 3 are there" in errors
     size = (folder / "all.mcz").stat().st_size
@@ -307,7 +307,7 @@ def test_pack_names_what_it_leaves_out(folder: Path, call: Call) -> None:
     assert document["bytes"] == size
     assert document["counts"] == {"parsed": 4, "skeleton": 1, "skipped": 4}
     rows = {row["path"]: row for row in document["files"]}
-    assert rows["a.tsv"]["result"] == "skipped"
+    assert rows["a.log"]["result"] == "skipped"
     assert rows["sloppy.bvh"]["notes"] == ["2 frames are declared, 3 are there"]
     assert "left out" not in call(*words, "--force", "--keep-all")[2]
 
