@@ -34,7 +34,7 @@ SAME, NOTHING = 1e-2, 1e-10  # of a sum of squares, of typical levers: no differ
 EXACT = 1e-5  # of the typical lever: distances that leave nothing to steady
 STEADY = 0.05  # radians: how far angles stray from their mean over the frames around
 AROUND = (8, 4)  # frames to each side, from coarse to fine
-LOOSER = 1.5  # times what all the freedom of the channels may have taken off the distances
+LOOSER = 1.5  # excess error of a smoothed solution, in units of noise times free channels
 
 
 def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) -> Floats:
@@ -295,7 +295,7 @@ class _Descent:
         return columns, errors
 
     def _floor(self) -> float:
-        """A sum of squares beyond which numbers are rounded alone."""
+        """A sum of squares below which only rounding errors are left."""
         return len(self.targets) * (NEGLIGIBLE * self.targets.lever) ** 2
 
     def _objectives(self, columns: Floats, frames: Ints) -> tuple[Floats, Floats]:

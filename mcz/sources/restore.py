@@ -22,9 +22,9 @@ from mcz.sources.text.notes import RowNotes
 
 Ints = NDArray[np.int64]
 
-TEXT_LIMIT = 2**26  # a text may always be that large,
-TEXT_PER_CELL = 512  # or that large for each row and channel, plus one,
-TEXT_PER_SIZE = 4  # but then only so many times the stated size of the source file
+TEXT_LIMIT = 2**26  # bytes that any text may have
+TEXT_PER_CELL = 512  # bytes a cell of a larger text, with one more row and channel
+TEXT_PER_SIZE = 4  # most bytes of a larger text, as a multiple of the source file's stated size
 
 
 def restore(motion: Motion, source: Source) -> bytes:
@@ -188,7 +188,8 @@ class Cells:
         """Give the ``chosen`` cells (n_rows, n_channels) one text, which may be empty."""
         self.start[:, :-1][chosen] = self._total
         self.size[:, :-1][chosen] = len(text)
-        self._append(np.frombuffer(text + b"\0", np.uint8))  # what is empty begins with no sign
+        # The padding loop reads the first byte, of an empty text too.
+        self._append(np.frombuffer(text + b"\0", np.uint8))
 
     def _append(self, buffer: Bytes) -> None:
         self._pieces.append(buffer)

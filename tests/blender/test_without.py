@@ -267,7 +267,7 @@ def wheel_with(path: Path, *modules: str, **sources: bytes) -> Path:
     """A wheel of this tree with compiled modules of these names, and with changed sources."""
     files = zip_members(build.mcz_wheel({name: name.encode() for name in modules})[1])
     files |= {f"mcz/{name}.py": data for name, data in sources.items()}
-    path.write_bytes(build.build_zip(files))
+    path.write_bytes(build.zip_files(files))
     return path
 
 

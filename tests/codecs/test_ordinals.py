@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import codec_by_name
-from mcz.codecs.coding.fast import decoder
+from mcz.codecs.coding.fast import lanes
 from mcz.codecs.coding.fast.encoder import StreamBuilder
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.model.numbers import Grid
@@ -72,7 +72,7 @@ def test_segments_of_several_lengths_at_once(grid: Grid) -> None:
     spans = [Span(end - n, n) for end, n in zip(ends, lengths, strict=True)]
     layout, request = Layout(ends[-1], groups, grids=(grid,) * 5), Request(3, ends[-1], (0, 1, 2))
     for lacking in (False, True):
-        with mock.patch.object(decoder, "lacks_compiled_kernels", return_value=lacking):
+        with mock.patch.object(lanes, "lacks_compiled_kernels", return_value=lacking):
             found = codec_by_name("fast").decode(
                 b"", layout, spans, request, lambda s, r, g: streams[s][g]
             )

@@ -1,8 +1,8 @@
 """A Reed-Solomon erasure code over GF(2^16): any lost blocks from as many recovery blocks.
 
-Recovery block i is the sum over the data blocks j of ``weight(j) / (i + M + j)`` times block j,
-where M is the least power of two that is not below the number of recovery blocks, + is exclusive or
-between the brackets' first two terms, and the rest is SPEC.md's, "RECV". The same blocks come of
+Recovery block i is the sum over the data blocks j of ``weight(j) / (i ^ (M + j))`` times block j,
+where M is the least power of two that is not below the number of recovery blocks and ``^`` is
+exclusive or. SPEC.md, "RECV", defines the rest. The same blocks come of
 polynomials through runs of M data blocks, which is how they are computed.
 
 Elements of the field are 16-bit integers, and adding is exclusive or. No library fits: galois has
@@ -126,10 +126,10 @@ def _by_columns(transform: Callable[..., int], blocks: Ints, levels: int, offset
 
 
 def recover_blocks(rest: Ints, lost: Sequence[int], rows: Sequence[int], n_recovery: int) -> Ints:
-    """The blocks ``lost``, from as many recovery blocks, the ``rows``.
+    """Solve for the ``lost`` data blocks by as many recovery blocks, the ``rows``.
 
-    ``rest`` (len(rows), lanes): each of these, from which what the blocks that are there add to it
-    was taken away.
+    ``rest`` (len(rows), lanes): these recovery blocks minus the contribution of the intact data
+    blocks.
     """
     from mcz.container.recovery.kernels import add_product
 

@@ -19,8 +19,7 @@ class Outcome:
     "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged"; of
     what is carried over "copied", "renamed", "moved" or "deleted".
     The ``message`` of one that failed or exists names the file.
-    ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it
-    got.
+    ``notes`` are remarks of the reader of an added file, and the name of the skeleton it uses.
     """
 
     path: str

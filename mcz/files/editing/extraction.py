@@ -114,7 +114,7 @@ def extract(
     ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
     are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
     ``clip``: take out this clip, or these, alone; otherwise all are cut, and attachments kept.
-    ``where``: take out those alone that it takes, see ``File.find``.
+    ``where``: keep only the clips that match it, see ``File.find``.
     ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
     ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
@@ -251,7 +251,7 @@ class Copier(ChunkCopier):
     def recode(self, clip: Clip, motion: Motion, settings: Params, amend: Amend) -> dict[str, str]:
         """Write ``motion``, coded anew, in the place of ``clip``; return its quality record.
 
-        ``amend`` makes that from the one of this coding; a lossless codec has none.
+        ``amend`` edits the new quality record before it is written; lossless codecs have none.
         """
         row, codec = self.container.directory.clips[clip.name], clip.signals[0].codec
         self.skeleton(clip.skeleton_id)
@@ -335,7 +335,7 @@ class Copier(ChunkCopier):
         return digest.digest()
 
     def quality(self, cut: ClipCut, row: ClipRow) -> None:
-        """The quality record, another one where the clip is, and the other ancillary chunks."""
+        """Write the quality record, edited if the clip was cut, and copy other ancillary chunks."""
         if self.is_same(cut):
             self.behind(row)
             return

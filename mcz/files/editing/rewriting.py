@@ -156,9 +156,9 @@ def path_of(file: File, thing: Thing, change: Change = SAME) -> str:
 
 
 def writer_like(stream: BinaryIO, files: Iterable[File], copies: bool | None = None) -> Writer:
-    """A Writer of a new file that has what the first of ``files`` has, and holds what all hold.
+    """A Writer with the HEAD of the first of ``files`` and a profile that fits all of them.
 
-    ``copies`` None: where one of them has some.
+    ``copies`` None: write copies if one of the files has some.
     """
     files = list(files)
     head = parse(payloads.Head, files[0].container.directory.head, "HEAD")
@@ -243,13 +243,13 @@ def protect(
 ) -> list[Protection]:
     """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
 
-    ``mcz.repair`` restores every byte of it as long as no more blocks are bad than there are
-    recovery blocks, wherever they lie: single bytes, a burst, the beginning, the end. Where the
-    file has some already, what was appended since gets its own; where nothing was, nothing is
-    done. ``anew``: what it has is left out, and all of the file gets recovery data together, for
-    which it is rewritten. Returns what there is of it then, in the order of the file. Raises
-    OptionError, FormatError where rewriting would lose a chunk that nobody here knows, AccessError
-    where another process is appending, and as ``mcz.append`` for a file cut short.
+    ``mcz.repair`` restores every byte as long as there are no more bad blocks than recovery blocks,
+    wherever they lie: single bytes, a burst, the beginning, the end. If the file has recovery data
+    already, only bytes appended since get new data; without such bytes nothing changes. ``anew``
+    rewrites the file and computes recovery data for all of it. Returns all recovery data, in the
+    order of the file. Raises OptionError for a ``redundancy`` out of range, FormatError where
+    rewriting would lose a chunk of unknown type, AccessError where another process is appending,
+    and as ``mcz.append`` for a file cut short.
     """
     check_redundancy(redundancy)
     if anew and (found := _protected_anew(target, redundancy, progress)) is not None:

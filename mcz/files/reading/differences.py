@@ -129,7 +129,7 @@ def _things(motion: Motion) -> dict[str, dict[Any, Any]]:
 
 
 def _events(events: Iterable[Event]) -> Iterator[tuple[str, Event]]:
-    """Each event under its words and time; of those that are the same each has a number."""
+    """Events by words and time; from the second of equal ones on with a suffix ``#n``."""
     seen: Counter[str] = Counter()
     for event in events:
         words = " ".join(filter(None, (event.subject, event.context, event.label)))
@@ -166,7 +166,7 @@ def _source_difference(a: Motion, b: Motion) -> str:
         return "header or layout of the files"
     numbers = [[signal.masked() for signal in motion.signals] for motion in (a, b)]
     if not all(np.array_equal(x, y, equal_nan=True) for x, y in zip(*numbers, strict=True)):
-        return ""  # whose digits may take other places
+        return ""  # changed values change the layout, which is no difference of its own
     notes = [source.notes and source.notes.cut(0, a.n_frames) for source in (one, other)]
     if (one.detail, notes[0]) == (other.detail, notes[1]):
         return ""

@@ -48,11 +48,11 @@ def compare(
 ) -> Comparison:
     """The figures of ``decoded`` against ``original``, defined in docs/reference/measures.md.
 
-    Without ``virtual_markers`` theirs are None, and with ``shell_cm``, its radius, None those of
-    the shell: either takes a quarter of the time or so. ``contacts`` asks how far feet slide that
-    stand in the original: True finds the feet by their names; joints, by index or name, are feet
-    whose contacts are to be found; ``Contacts`` are taken as they are. Figures that make no sense
-    for these two (other channels, other points) are None too, with a note.
+    ``virtual_markers=False`` leaves out the figures of virtual markers, ``shell_cm=None`` those of
+    the shell, whose radius it is: each takes about a quarter of the time. ``contacts`` measures the
+    sliding of feet that stand in the original: True finds feet by their names, joints (index or
+    name) name them, ``Contacts`` give their runs. Figures that do not apply to the two motions
+    (different channels or points) are None, with a note.
 
     Raises MotionError where the two differ in frames, or in rows a frame, or have no such joint
     as ``contacts`` names, and OptionError where ``shell_cm`` is no length.
@@ -127,7 +127,7 @@ def _blocks(original: Motion, decoded: Motion) -> Iterator[tuple[int, Floats, Fl
 
 
 def named_signals(motion: Motion) -> dict[str, Signal]:
-    """The further signals by role, or name; ``#n`` behind it from the second of one on."""
+    """Signals beside the motion by role or name; repeated keys get a suffix ``#n``."""
     signals: dict[str, Signal] = {}
     seen: dict[str, int] = {}
     for signal in motion.signals[1:]:

@@ -27,9 +27,10 @@ from mcz.sources.text.rows import DENSE, FEW_CELLS, Rows, line_of, padding
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-FEW_TEXTS = 16  # of a column, which are laid out whole where
-FEW_CHANGES = 64  # they change as seldom, or
-ROWS_A_TEXT = 8  # so many rows have the same, on average
+# A column of few texts is stored whole if they seldom change, or if many rows share each.
+FEW_TEXTS = 16
+FEW_CHANGES = 64
+ROWS_A_TEXT = 8  # on average
 _DIGITS = re.compile(rb"[0-9]+")
 _PLAIN = re.compile(rb"0|[1-9][0-9]{0,14}")
 
