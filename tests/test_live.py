@@ -403,7 +403,6 @@ from mcz import codecs
 from mcz.files.live.writer import LiveWriter
 from tests import live_codec
 from tests.motions import skeleton
-from tools.records import built
 codecs.CODECS[live_codec.CODEC.name] = live_codec.CODEC
 with open(sys.argv[1], "wb", buffering=0) as sink:
     writer = LiveWriter(sink, skeleton(), "stairs")

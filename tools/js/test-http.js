@@ -125,7 +125,7 @@ test("headers go with every request", async () => {
 const ARCHIVE = `
 import sys
 from dataclasses import replace
-from mcz.codecs import by_name
+from mcz.codecs import codec_by_name
 from mcz.container.writer import Writer
 from mcz.files.writing.clip_writer import write_clip
 from tests.motions import smooth
@@ -137,7 +137,7 @@ with open(sys.argv[1], "wb") as out:
         name = f"subject-{k // 20:03}/take-{k % 20:02}"
         metadata = {"subject": f"{k // 20:03}", "action": f"walk {k % 7}"}
         motion = replace(motions[k % 17], name=name, metadata=metadata)
-        write_clip(writer, motion, by_name("raw"), {})
+        write_clip(writer, motion, codec_by_name("raw"), {})
     writer.finish()
 `;
 
