@@ -66,13 +66,10 @@ def recognize_robot(motion: Motion) -> Motion:
 
     A layout fits by the number of columns, of which four are a unit quaternion in every row.
     """
-    order = _quaternion_order(motion.values)
     n_joints = motion.skeleton.n_channels - N_ROOT
-    names = [
-        name
-        for name, layout in robot_layouts().items()
-        if order and len(layout.joints) == n_joints and layout.quaternion in ("", order)
-    ]
+    fitting = {n: each for n, each in robot_layouts().items() if len(each.joints) == n_joints}
+    order = _quaternion_order(motion.values) if fitting else ""
+    names = [name for name, each in fitting.items() if order and each.quaternion in ("", order)]
     if not names:
         return motion
     named = with_robot_layout(motion, names[0]) if len(names) == 1 else None
