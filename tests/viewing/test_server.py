@@ -75,7 +75,7 @@ def test_api_says_what_is_there(server: Server) -> None:
     ]
     assert (api["canEncode"], api["canConvert"], api["salvage"]) == (True, True, False)
     assert api["diff"] is False  # there are three
-    known = [".amc", ".asf", ".bvh", ".c3d", ".csv", ".mot", ".npy", ".npz", ".sto", ".trc"]
+    known = ".amc .asf .bvh .c3d .csv .mot .npy .npz .sto .trc .tsv".split()
     assert api["suffixes"] == known
     assert api["version"] == mcz.__version__
     codecs = {codec["name"]: codec for codec in api["codecs"]}

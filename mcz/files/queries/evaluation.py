@@ -50,7 +50,7 @@ def as_number(text: str) -> int | float | None:
 def compare(left: Value, sign: str, right: Value) -> bool | None:
     """Compare ``left`` and ``right`` by a sign of ``COMPARISONS``; None: unknown.
 
-    >>> compared("05", "==", 5), compared("05", "==", "5"), compared("a", "<", 5)
+    >>> compare("05", "==", 5), compare("05", "==", "5"), compare("a", "<", 5)
     (True, False, None)
     """
     if left is None or right is None:
