@@ -332,7 +332,7 @@ if not TYPE_CHECKING:  # a type checker shall find a name that is not there
         return value
 
 
-def _play(motion: Any) -> str:
+def _play(motion: object) -> str:
     html: str = import_module("mcz.show.viewing.player").player(motion)
     return html
 

@@ -8,7 +8,7 @@ robots in the order of their columns, and the public description that they come 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -53,12 +53,16 @@ def with_robot_layout(motion: Motion, name: str) -> Motion | None:
     if n_root not in (0, N_ROOT):
         return None
     order = (layout.quaternion or _quaternion_order(motion.values)) if n_root else ""
-    notes = motion.metadata.get("source-note", "").split(SEPARATOR)
-    note = SEPARATOR.join(note for note in notes if not note.startswith(NOTE))
-    metadata = dict(motion.metadata) | {"source-note": note, "x-robot": name}
-    if not note:
-        del metadata["source-note"]
+    metadata = without_robot(motion.metadata) | {"x-robot": name}
     return replace(motion, skeleton=_skeleton(layout.joints, order), metadata=metadata)
+
+
+def without_robot(metadata: Mapping[str, str]) -> dict[str, str]:
+    """``metadata`` without the layout that was recognized, where another source names columns."""
+    notes = metadata.get("source-note", "").split(SEPARATOR)
+    note = SEPARATOR.join(note for note in notes if not note.startswith(NOTE))
+    others = {k: text for k, text in metadata.items() if k not in ("source-note", "x-robot")}
+    return others | ({"source-note": note} if note else {})
 
 
 def recognize_robot(motion: Motion) -> Motion:

@@ -99,3 +99,22 @@ def test_units_that_differ_make_no_markers(tmp_path: Path) -> None:
     mixed = positions().replace("mm", "m", 1)
     motion = mcz.read(data_set(tmp_path, mixed, 6))
     assert motion.skeleton.joint_names[0] == "toe_x"
+
+
+def test_two_side_files_that_apply_alike_are_refused(tmp_path: Path) -> None:
+    path = data_set(tmp_path, positions(), 6)
+    for entity in ("ses-walk", "run-1"):
+        (path.parent / f"sub-01_{entity}_motion.json").write_text('{"SamplingFrequency": 100}')
+    with pytest.raises(mcz.SourceError, match="sub-01_run-1_motion.json and sub-01_ses-walk_mot"):
+        mcz.read(path)
+
+
+def test_side_files_name_columns_that_look_like_a_robot(tmp_path: Path) -> None:
+    rows = HEADER + "".join(f"angle {k}\tn/a\tMISC\tn/a\trad\n" for k in range(36))
+    path = data_set(tmp_path, rows, 36)
+    table = np.loadtxt(path, delimiter="\t")
+    table[:, 3:7] = [0, 0, 0, 1]
+    np.savetxt(path, table, fmt="%.4f", delimiter="\t")
+    motion = mcz.read(path)
+    assert motion.skeleton.joint_names[0] == "angle 0"
+    assert not {"x-robot", "source-note"} & motion.metadata.keys()

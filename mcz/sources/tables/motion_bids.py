@@ -12,10 +12,12 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 
 from mcz.errors import SourceError
 from mcz.model.motion import POSITION_KINDS, Channel, Joint, Motion, Skeleton
+from mcz.sources.robots import without_robot
 from mcz.sources.tables.layout import UNIT_CM
 
 MOTION_SUFFIX = "_motion.tsv"
@@ -41,24 +43,49 @@ def with_side_files(motion: Motion, path: Path) -> Motion:
                 f"{len(rows)} channels for the {motion.skeleton.n_channels} columns of {path.name}",
                 path=channels,
             )
-        motion = replace(motion, skeleton=_markers(rows) or _scalars(rows, motion.skeleton))
+        motion = replace(
+            motion,
+            skeleton=_markers(rows) or _scalars(rows, motion.skeleton),
+            metadata=without_robot(motion.metadata),
+        )
     about = _find(path, ABOUT)
     rate = None if about is None or motion.frame_rate is not None else _rate(about)
     return motion if rate is None else motion.at_rate(rate)
 
 
 def _find(path: Path, suffix: str) -> Path | None:
-    """The nearest side file whose entities are all among those of ``path``."""
-    entities = set(path.name.removesuffix(MOTION_SUFFIX).split("_"))
-    for folder in [path.parent, *path.absolute().parents[1 : 1 + LEVELS]]:
+    """The nearest side file whose entities are all among those of ``path``; of several, most."""
+    stem = path.name.removesuffix(MOTION_SUFFIX)
+    own_side = path.with_name(stem + suffix)
+    if own_side.is_file():  # the usual case, of all entities
+        return own_side
+    entities = frozenset(stem.split("_"))
+    for folder in path.absolute().parents[: 1 + LEVELS]:
         fit = [
-            (len(own), side)
-            for side in sorted(folder.glob(f"*{suffix}"))
-            if (own := set(side.name.removesuffix(suffix).split("_"))) <= entities
+            side for own, side in _side_files(folder, suffix, _modified(folder)) if own <= entities
         ]
-        if fit:
-            return max(fit, key=lambda each: each[0])[1]
+        most = [side for side in fit if side.name.count("_") == fit[0].name.count("_")]
+        if len(most) > 1:
+            raise SourceError(f"{most[0].name} and {most[1].name} both apply", path=path)
+        if most:
+            return most[0]
     return None
+
+
+def _modified(folder: Path) -> int:
+    try:
+        return folder.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+@lru_cache(maxsize=64)  # a folder is listed once for all of its tables
+def _side_files(
+    folder: Path, suffix: str, modified: int
+) -> tuple[tuple[frozenset[str], Path], ...]:
+    """The side files in a folder with their entities, those of most entities first."""
+    names = sorted(folder.glob(f"*{suffix}"), key=lambda side: (-side.name.count("_"), side.name))
+    return tuple((frozenset(side.name.removesuffix(suffix).split("_")), side) for side in names)
 
 
 def _text(path: Path) -> str:
