@@ -37,7 +37,14 @@ if TYPE_CHECKING:
     from mcz.exchange.adapters.pybvh import from_pybvh, to_pybvh
     from mcz.exchange.conversion import Fit, convert, from_positions, left_out
     from mcz.exchange.conversion.scenes import SceneFile, to_glb, to_usda
-    from mcz.exchange.datasets import Dataset, Window, dataset
+    from mcz.exchange.datasets import (
+        Dataset,
+        FieldStatistics,
+        Window,
+        dataset,
+        humanml3d,
+        humanml3d_positions,
+    )
     from mcz.exchange.exporting import export
     from mcz.files.bags import BagCheck, bag, check_bag
     from mcz.files.editing.archive import append, pack
@@ -107,7 +114,14 @@ _HOMES = {
     "mcz.files.editing.metadata_edit": ("set_metadata", "set_rate"),
     "mcz.exchange.exporting": ("export",),
     "mcz.files.tables": ("to_pandas", "to_xarray"),
-    "mcz.exchange.datasets": ("Dataset", "Window", "dataset"),
+    "mcz.exchange.datasets": (
+        "Dataset",
+        "FieldStatistics",
+        "Window",
+        "dataset",
+        "humanml3d",
+        "humanml3d_positions",
+    ),
     "mcz.files.editing.archive": ("append", "pack"),
     "mcz.files.editing.unpacking": ("unpack",),
     "mcz.files.editing.reorganize": ("delete_clips", "rename_clips", "reorder_clips", "split"),
@@ -209,6 +223,7 @@ __all__ = [
     "ExistsError",
     "ExtractedClip",
     "Extraction",
+    "FieldStatistics",
     "File",
     "Fit",
     "ForcePlatform",
@@ -267,6 +282,8 @@ __all__ = [
     "from_movement",
     "from_positions",
     "from_pybvh",
+    "humanml3d",
+    "humanml3d_positions",
     "in_positions",
     "joint_map",
     "left_out",

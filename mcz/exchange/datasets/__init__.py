@@ -1,12 +1,22 @@
 """Data sets: windows of many clips as arrays, for whoever trains or measures on them.
 
-``dataset`` finds the clips, ``fields`` says what arrays are made of them, ``features`` makes these
-of a part of a clip, ``caches`` keeps them, ``Dataset`` counts, cuts, shuffles and splits.
+``dataset`` finds the clips; ``field_table`` has the arrays that are made of them; ``sources`` reads
+the frames, ``blocks`` keeps the features of some at a time, in one of the ``caches``; ``Dataset``
+counts, cuts, shuffles and splits.
 """
 
 from __future__ import annotations
 
+from mcz.exchange.datasets.humanml import humanml3d, humanml3d_positions
 from mcz.exchange.datasets.member_list import dataset
+from mcz.exchange.datasets.statistics import FieldStatistics
 from mcz.exchange.datasets.windows import Dataset, Window
 
-__all__ = ["Dataset", "Window", "dataset"]
+__all__ = [
+    "Dataset",
+    "FieldStatistics",
+    "Window",
+    "dataset",
+    "humanml3d",
+    "humanml3d_positions",
+]

@@ -11,6 +11,7 @@ from contextlib import suppress
 from decimal import Decimal
 from pathlib import Path
 from threading import Lock
+from urllib.parse import quote, unquote
 
 import numpy as np
 
@@ -119,7 +120,7 @@ def _packed(arrays: Arrays) -> bytes:
     parts = []
     for name, array in arrays.items():
         shape = ",".join(map(str, array.shape))
-        parts.append(f"{name} {array.dtype.str} {shape}\n".encode("ascii") + array.tobytes())
+        parts.append(f"{quote(name)} {array.dtype.str} {shape}\n".encode("ascii") + array.tobytes())
     return b"".join(parts)
 
 
@@ -130,8 +131,9 @@ def _unpacked(data: bytes) -> Arrays:
         name, dtype, shape = data[at:end].decode("ascii").split(" ")
         dims = tuple(map(int, shape.split(",")))
         count = int(np.prod(dims))
-        arrays[name] = np.frombuffer(data, dtype, count, end + 1).reshape(dims)
-        at = end + 1 + arrays[name].nbytes
+        array = np.frombuffer(data, dtype, count, end + 1).reshape(dims)
+        arrays[unquote(name)] = array
+        at = end + 1 + array.nbytes
     return arrays
 
 

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mcz.errors import MczError, OptionError
+from mcz.exchange.datasets.blocks import Settings
 from mcz.exchange.datasets.caches import to_size
-from mcz.exchange.datasets.fields import chosen_fields, names_of
-from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe
-from mcz.exchange.datasets.windows import Dataset, Settings
+from mcz.exchange.datasets.fields import SignalShape, Units, names_of
+from mcz.exchange.datasets.sources import MOST_OPEN, Member, Recipe, recipe_of
+from mcz.exchange.datasets.windows import Dataset
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.fields import Where
 from mcz.files.reading.file import File, is_source, open
@@ -44,21 +45,25 @@ def dataset(
     where: Where | None = None,
     joints: Joints = None,
     unit: str | None = None,
+    up: str | None = None,
     dtype: DTypeLike = "float32",
     source_rate: Fraction | float | None = None,
     cache: int | str = "64 MB",
     folder: str | os.PathLike[str] | None = None,
     across_gaps: bool = False,
+    normalize: bool = False,
 ) -> Dataset:
     """Windows of the clips of MCZ files, as arrays: a ``Dataset``.
 
     ``target``: an archive, a folder (all ``.mcz`` below it, by name), an open File, or several.
     ``fields``: names, with commas or as a list: channels, positions, velocities, accelerations,
-    root, rot6d, quat, rotvec, matrix, and the last four as world_rot6d and so on; ``docs`` has
-    their shapes. ``rate``: all are resampled to it, exactly where every n-th frame will do;
-    ``source_rate`` is that of clips that do not say theirs. ``window`` frames each, every
-    ``stride`` (as many, where None); None: whole clips. ``where`` chooses clips: an expression as
-    of ``File.find``, or a function of a Clip. ``joints`` and ``unit`` as of ``positions``.
+    root, rot6d, quat, rotvec, matrix, heading, foot_speed, contacts, humanml3d and more, or the
+    name of any signal; docs/guides/datasets.md has their shapes. ``rate``: all are resampled to it,
+    exactly where every n-th frame will do; ``source_rate`` is that of clips that do not say theirs.
+    ``window`` frames each, every ``stride`` (as many, where None); None: whole clips. ``where``
+    chooses clips: an expression as of ``File.find``, or a function of a Clip. ``joints`` and
+    ``unit`` as of ``positions``; ``up`` is the axis that points up where skeletons do not say it.
+    ``normalize``: see ``Dataset.normalized``.
     ``cache``: bytes to keep in memory, or in ``folder``, across runs: "64 MB".
 
     Where frames are missing, the parts between are clips of their own, so that no window spans a
@@ -66,7 +71,7 @@ def dataset(
     Raises OptionError where clips do not go together: other joints, rates or units; MotionError and
     FormatError where one cannot be used.
     """
-    recipe = _recipe(fields, rate, joints, unit, dtype)
+    recipe = _recipe(fields, rate, joints, Units(unit, up), dtype)
     window, stride = _cut(window, stride)
     given: dict[str, File] = {}
     size = to_size(cache)
@@ -96,14 +101,14 @@ def dataset(
         stack.pop_all()
     made = Dataset(settings, members, given, skipped)
     made.adopt(opened)
-    return made
+    return made.normalized() if normalize else made
 
 
 def _recipe(
     fields: str | Iterable[str],
     rate: Fraction | float | None,
     joints: Joints,
-    unit: str | None,
+    units: Units,
     dtype: DTypeLike,
 ) -> Recipe:
     kind = np.dtype(dtype)
@@ -111,7 +116,7 @@ def _recipe(
         raise OptionError(f"dtype {kind}: float16, float32 or float64")
     exact = None if rate is None else frame_rate_of(rate, "rate")
     names = joints if joints is None or isinstance(joints, (str, int)) else tuple(joints)
-    return Recipe(chosen_fields(fields), exact, names, unit, kind)
+    return recipe_of(fields, exact, names, units, kind)
 
 
 def _cut(window: int | None, stride: int | None) -> tuple[int | None, int]:
@@ -188,7 +193,7 @@ class _Agreement:
 
     def check(self, clip: Clip, member: Member) -> None:
         """Raises OptionError where ``clip`` differs from the first."""
-        key = member.target, clip.skeleton_id, member.source_rate, member.time is None
+        key = member.target, *self._recipe.subject_key(clip, member)
         if key in self._known:
             return
         self._known.add(key)
@@ -211,11 +216,12 @@ class _Agreement:
         except MczError as error:
             error.add(path=member.target, clip=member.clip)
             raise
-        lengths = any(field.lengths for field in recipe.fields)
+        lengths = any(field.lengths for field in recipe.fields) and recipe.units.length is None
         return {
             "frame rates": None if recipe.rate else member.source_rate,
-            "length units": clip.skeleton.unit_cm if lengths and recipe.unit is None else None,
-            "joints": [names_of(field, subject) for field in recipe.fields],
+            "length units": clip.skeleton.unit_cm if lengths else None,
+            "joints": [names_of(field, subject) for field in recipe.fields if not field.signal],
+            "signals": [subject.signals[each.name] for each in recipe.fields if each.signal],
         }
 
 
@@ -223,11 +229,13 @@ ADVICE = {
     "frame rates": "give one to resample to with rate=",
     "length units": "give one with unit=",
     "joints": "choose those that all have with joints=, or clips with where=",
+    "signals": "choose clips with where=",
 }
 
 
 def _short(fact: object) -> str:
     if isinstance(fact, list):
-        names = [name for each in fact for name in each]
+        parts = [each.channels if isinstance(each, SignalShape) else each for each in fact]
+        names = [name for part in parts for name in part]
         return f"{len(names)} names ({', '.join(names[:3])} ...)"
     return "none" if fact is None else str(fact)

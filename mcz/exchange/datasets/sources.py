@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from threading import Lock
+from typing import Any
 from weakref import finalize
 
 import numpy as np
 
 from mcz.container.decoded_cache import DecodedCache, SharedCache
+from mcz.errors import OptionError
 from mcz.exchange.datasets.caches import Arrays
-from mcz.exchange.datasets.fields import Field, Rows, Subject, features_of, subject_of
+from mcz.exchange.datasets.field_table import SIGNAL, chosen_fields
+from mcz.exchange.datasets.fields import WHOLE, Field, Rows, Subject, Units, features_of
+from mcz.exchange.datasets.subjects import subject_of
 from mcz.files.reading.clip import Clip
 from mcz.files.reading.file import File, open
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.poses.conversions import scalar_quaternions
-from mcz.kinematics.poses.motion_like import values_of
-from mcz.kinematics.poses.resampling import frames_within, resample_rows, times_at, turn_scalars
+from mcz.kinematics.poses.resampling import (
+    Times,
+    frames_within,
+    resample_rows,
+    times_at,
+    turn_scalars,
+)
 from mcz.model.clock import Timeline, known_timeline
+from mcz.model.motion import check_poses
 from mcz.model.skeleton import Joints
 
 MOST_OPEN = 64  # files at once: systems allow 256 and more
 MOST_SUBJECTS = 512
-BLOCK = 128  # frames whose features are made and kept together
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +45,38 @@ class Recipe:
     fields: tuple[Field, ...]
     rate: Fraction | None
     joints: Joints
-    unit: str | None
+    units: Units
     dtype: np.dtype[np.generic]
+
+    def __reduce__(self) -> tuple[object, ...]:
+        names = tuple(field.name for field in self.fields)
+        return recipe_of, (names, self.rate, self.joints, self.units, self.dtype)
 
     @property
     def reach(self) -> int:
         return max(field.reach for field in self.fields)
 
+    @property
+    def is_whole(self) -> bool:
+        """True if a field can only be computed for a whole clip."""
+        return self.reach == WHOLE
+
+    @property
+    def is_of_joints(self) -> bool:
+        """True if a field needs the values of the motion."""
+        return not all(field.signal for field in self.fields)
+
     def subject(self, clip: Clip, member: Member) -> Subject:
         is_timed = self.rate is not None or member.source_rate is not None
         is_timed = is_timed or member.time is not None
-        return subject_of(clip.skeleton, self.fields, self.joints, self.unit, is_timed)
+        return subject_of(clip, self.fields, self.joints, self.units, is_timed)
+
+    def subject_key(self, clip: Clip, member: Member) -> tuple[object, ...]:
+        """Equal for clips with equal subjects; the id of a skeleton is its hash."""
+        names = {field.signal for field in self.fields} - {""}
+        infos = clip.signals if names else ()
+        signals = [(i.name, i.channels, i.samples_per_frame) for i in infos if i.name in names]
+        return clip.skeleton_id, member.source_rate, member.time is None, tuple(signals)
 
     def copies(self, member: Member) -> bool:
         """Return True if frames of the data set are consecutive frames of the clip."""
@@ -57,6 +87,11 @@ class Recipe:
         if self.rate is None or member.source_rate is None:
             return Fraction(1)
         return member.source_rate / self.rate
+
+
+def recipe_of(names: str | Iterable[str], *facts: Any) -> Recipe:
+    """The recipe of fields by name; raises OptionError."""
+    return Recipe(chosen_fields(names), *facts)
 
 
 class Sources:
@@ -126,15 +161,12 @@ class Sources:
         clip = self.clip(member)
         subject = self._subject(recipe, clip, member)
         low, high = max(0, start - recipe.reach), min(member.n_frames, stop + recipe.reach)
-        values = _values(recipe, subject, clip, member, low, high)
-        margins = start - low, high - stop
-        steps = _steps(recipe, clip, member, low, high)
-        return features_of(recipe.fields, subject, Rows(values, steps), margins, recipe.dtype)
+        rows = _rows(recipe, subject, clip, member, (low, high))
+        return features_of(recipe.fields, subject, rows, (start - low, high - stop), recipe.dtype)
 
     def _subject(self, recipe: Recipe, clip: Clip, member: Member) -> Subject:
         """Prepared once for each skeleton."""
-        # the id is the hash of the skeleton
-        key = clip.skeleton_id, member.source_rate, member.time is None
+        key = recipe.subject_key(clip, member)
         with self._lock:
             found = self._subjects.get(key)
             if found is None:
@@ -155,29 +187,70 @@ def _close(files: OrderedDict[str, File]) -> None:
         files.popitem()[1].close()
 
 
-def _values(
-    recipe: Recipe, subject: Subject, clip: Clip, member: Member, low: int, high: int
-) -> Floats:
-    """All channels of frames low <= f < high at the rate of the data set."""
-    needed = sorted({joint for field in recipe.fields for joint in field.needs(subject)})
+def _rows(
+    recipe: Recipe, subject: Subject, clip: Clip, member: Member, span: tuple[int, int]
+) -> Rows:
+    """The frames low <= f < high at the rate of the data set."""
+    low, high = span
+    steps = _steps(recipe, clip, member, low, high)
     if recipe.copies(member):
-        return values_of(clip, (member.first + low, member.first + high), needed)
-    if member.is_even:
-        times = times_at(range(low, high), recipe.step(member))
-    else:
-        assert recipe.rate is not None
-        part = timeline_of_member(clip, member)
-        _, lie = frames_within(part, recipe.rate, (0, member.n_source))
-        times = lie(range(low, high))
+        frames = member.first + low, member.first + high
+        signals = {n: _signal_values(clip, subject, n, frames) for n in subject.signals}
+        values = _joint_values(clip, subject, frames) if recipe.is_of_joints else None
+        return Rows(_or_none(values, high - low), steps, signals)
+
+    times = _times(recipe, clip, member, range(low, high))
     first, last = int(times.before[0]), int(times.after[-1]) + 1
-    if times.share.any():  # splines look at one more on either side
+    if times.share.any():  # splines need one more on either side
         first, last = max(0, first - 1), min(member.n_source, last + 1)
-    old = values_of(clip, (member.first + first, member.first + last), needed)
+    frames = member.first + first, member.first + last
     times = replace(times, before=times.before - first)
+    signals = {}
+    for name, shape in subject.signals.items():
+        if shape.samples_per_frame > 1:
+            raise OptionError(f"signal {name!r} has several samples a frame; leave rate= out")
+        signals[name] = resample_rows(None, _signal_values(clip, subject, name, frames), times)
+    if not recipe.is_of_joints:
+        return Rows(_or_none(None, high - low), steps, signals)
+    old = _joint_values(clip, subject, frames)
     new = resample_rows(clip.skeleton, old, times)
     if times.share.any():
         turn_scalars(scalar_quaternions(clip.skeleton, None, old), old, new, times)
-    return new
+    return Rows(new, steps, signals)
+
+
+def _or_none(values: Floats | None, n_frames: int) -> Floats:
+    return np.empty((n_frames, 0)) if values is None else values
+
+
+def _joint_values(clip: Clip, subject: Subject, frames: tuple[int, int]) -> Floats:
+    """All channels, of which those that no field needs may hold anything."""
+    check_poses(clip.name, clip.signals[0])
+    skeleton, columns = subject.skeleton, subject.read_columns
+    if len(columns) == skeleton.n_channels:
+        return np.asarray(clip.read(frames), np.float64)
+    values = np.zeros((frames[1] - frames[0], skeleton.n_channels))
+    if columns:
+        values[:, columns] = clip.read(frames, joints=subject.read_joints)
+    return values
+
+
+def _signal_values(clip: Clip, subject: Subject, name: str, frames: tuple[int, int]) -> Floats:
+    values = clip.read(frames, signal=name.removeprefix(SIGNAL)).astype(np.float64, copy=False)
+    per_frame = subject.signals[name].samples_per_frame
+    if per_frame > 1:
+        values = values.reshape(frames[1] - frames[0], per_frame, values.shape[1])
+    return values
+
+
+def _times(recipe: Recipe, clip: Clip, member: Member, frames: range) -> Times:
+    """The places of frames of the data set among the frames of the clip."""
+    if member.is_even:
+        return times_at(frames, recipe.step(member))
+    assert recipe.rate is not None
+    part = timeline_of_member(clip, member)
+    _, locate = frames_within(part, recipe.rate, (0, member.n_source))
+    return locate(frames)
 
 
 def _steps(recipe: Recipe, clip: Clip, member: Member, low: int, high: int) -> Floats:

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import OptionError, OutOfRangeError
-from mcz.exchange.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
-from mcz.exchange.datasets.fields import FIELDS, Subject, names_of
+from mcz.exchange.datasets.blocks import BLOCK, Blocks, Settings
+from mcz.exchange.datasets.fields import Subject, names_of
 from mcz.exchange.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler, WindowSampler
-from mcz.exchange.datasets.sources import BLOCK, Member, Recipe, Sources, timeline_of_member
+from mcz.exchange.datasets.sources import Member
+from mcz.exchange.datasets.statistics import FieldStatistics, statistics_of
 from mcz.files.reading.file import File
 from mcz.kinematics.poses.conversions import continuous_signs
 from mcz.model.indexing import row_numbers
 from mcz.model.text_format import counted
 from mcz.model.types import JsonObject, Reals
 
-RUNS_SHARE = 4  # a quarter of the cache is for frames as they were decoded
 RUN_BLOCKS = 6  # of windows that stay together until a pool is shuffled
-VERSION = 2  # of what features are: counted up where a kept one would be wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +38,6 @@ class Window:
     start: int
     stop: int
     time: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """Settings of windows and caches."""
-
-    recipe: Recipe
-    window: int | None
-    stride: int
-    cache_bytes: int
-    folder: Path | None
 
 
 class Dataset:
@@ -76,32 +62,23 @@ class Dataset:
         self.members, self.skipped = tuple(members), tuple(skipped)
         counts = [self._count(member) for member in self.members]
         self._ends = np.cumsum(counts, dtype=np.int64)
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Create the parts that are not pickled: open files and caches of them."""
-        targets = {member.target for member in self.members}
-        self._sources = Sources(self._given, self._settings.cache_bytes // RUNS_SHARE, len(targets))
-        self._keys: dict[Member, str] = {}
-        folder, most = self._settings.folder, self._settings.cache_bytes
-        kept = most - most // RUNS_SHARE
-        self._cache: Cache = MemoryCache(kept) if folder is None else FolderCache(folder, most)
+        self._scales: dict[str, FieldStatistics] | None = None  # of windows that are normalized
+        self._blocks = Blocks(settings, self.members, self._given)
 
     def adopt(self, files: Mapping[str, File]) -> None:
         """Read from these files, by target, which are open, and close them with the rest."""
-        self._sources.adopt(files)
+        self._blocks.sources.adopt(files)
 
     def close(self) -> None:
         """Close the files that the data set has opened; they are opened anew when needed."""
-        self._sources.close()
+        self._blocks.sources.close()
 
     def __getstate__(self) -> JsonObject:
-        made = ("_sources", "_cache", "_keys")
-        return {k: v for k, v in self.__dict__.items() if k not in made}
+        return {name: value for name, value in self.__dict__.items() if name != "_blocks"}
 
     def __setstate__(self, state: JsonObject) -> None:
         self.__dict__.update(state)
-        self._prepare()
+        self._blocks = Blocks(self._settings, self.members, self._given)
 
     def _count(self, member: Member) -> int:
         window = self._settings.window
@@ -155,7 +132,7 @@ class Dataset:
         if not self.members:
             raise OptionError("a data set of no clips")
         member = self.members[0]
-        return self._settings.recipe.subject(self._sources.clip(member), member)
+        return self._settings.recipe.subject(self._blocks.sources.clip(member), member)
 
     def window(self, index: int) -> Window:
         """Clip and frames of window ``index``; raises OutOfRangeError, which is an IndexError."""
@@ -164,7 +141,7 @@ class Dataset:
             raise OutOfRangeError(f"{index!r} is not the number of a window")
         member, start, stop = self._place(number)
         first = ceil(member.first / self._settings.recipe.step(member))
-        time = self._sources.time(self._settings.recipe, member, start)
+        time = self._blocks.sources.time(self._settings.recipe, member, start)
         return Window(member.target, member.clip, first + start, first + stop, time)
 
     def _place(self, number: int) -> tuple[Member, int, int]:
@@ -202,68 +179,58 @@ class Dataset:
         if self._settings.window is None:
             raise OptionError("whole clips differ in length and make no batch; give a window=")
         shape = len(numbers), self._settings.window
-        shapes = self.shapes if not numbers else None
+        if not numbers:
+            dtype = self._settings.recipe.dtype
+            return {name: np.empty((*shape, *rest), dtype) for name, rest in self.shapes.items()}
         out: dict[str, Reals] = {}
         for row, number in enumerate(numbers):
-            for name, parts in self._parts(*self._place(number)).items():
+            for name, parts in self._blocks.parts(*self._place(number)).items():
                 if name not in out:
                     out[name] = np.empty((*shape, *parts[0].shape[1:]), parts[0].dtype)
                 np.concatenate(parts, out=out[name][row])
-                self._finish(name, out[name][row])
-        if shapes is not None:
-            dtype = self._settings.recipe.dtype
-            return {name: np.empty((*shape, *rest), dtype) for name, rest in shapes.items()}
-        return out
+        for name in self._signed:
+            for window in out[name]:
+                window[:] = continuous_signs(np.asarray(window, np.float64))
+        return self._scaled(out)
 
     def _arrays(self, member: Member, start: int, stop: int) -> dict[str, Reals]:
-        parts = self._parts(member, start, stop)
+        parts = self._blocks.parts(member, start, stop)
         arrays = {name: np.concatenate(each) for name, each in parts.items()}
-        for name, array in arrays.items():
-            self._finish(name, array)
-        return arrays
+        for name in self._signed:
+            arrays[name][:] = continuous_signs(np.asarray(arrays[name], np.float64))
+        return self._scaled(arrays)
 
-    def _finish(self, name: str, array: Reals) -> None:
-        """Give quaternions the signs that keep them together, whichever blocks they are from."""
-        if FIELDS[name].signed:
-            array[:] = continuous_signs(np.asarray(array, np.float64))
+    @property
+    def _signed(self) -> list[str]:
+        """Quaternions: a window gives them the signs that keep them together."""
+        return [field.name for field in self._settings.recipe.fields if field.signed]
 
-    def _parts(self, member: Member, start: int, stop: int) -> dict[str, list[Reals]]:
-        """The arrays of frames of a clip as parts of blocks, which nobody may change."""
-        parts: dict[str, list[Reals]] = {name: [] for name in self.fields}
-        first = start // BLOCK
-        for number in range(first, max(first + 1, -(-stop // BLOCK))):
-            at = number * BLOCK
-            for name, array in self._block(member, number).items():
-                parts[name].append(array[max(start - at, 0) : stop - at])
-        return parts
+    def _scaled(self, arrays: dict[str, Reals]) -> dict[str, Reals]:
+        if self._scales is None:
+            return arrays
+        return {name: self._scales[name].normalize(array) for name, array in arrays.items()}
 
-    def _block(self, member: Member, number: int) -> Arrays:
-        key = f"{self._key(member)}-{number}"
-        found = self._cache.get(key)
-        if found is None:
-            start = number * BLOCK
-            stop = min(start + BLOCK, member.n_frames)
-            found = self._sources.features(self._settings.recipe, member, start, stop)
-            self._cache.put(key, found)
-        return found
+    def statistics(self) -> dict[str, FieldStatistics]:
+        """Mean and standard deviation of each field over all frames of the clips, once each.
 
-    def _key(self, member: Member) -> str:
-        """Cache key of a clip's features: in a folder, independent of the file's name."""
-        key = self._keys.get(member)
-        if key is None:
-            recipe = self._settings.recipe
-            told = [self.fields, recipe.rate, member.source_rate, recipe.joints, recipe.unit]
-            told += [member.first, member.n_source]
-            text = repr([*told, recipe.dtype.str, BLOCK, VERSION]).encode()
-            if isinstance(self._cache, FolderCache):
-                clip = self._sources.clip(member)
-                text += clip.value_hashes[0] + clip.skeleton_id
-                if not member.is_even:
-                    text += np.diff(timeline_of_member(clip, member).even).tobytes()
-            else:
-                text += repr((member.target, member.clip)).encode()
-            key = self._keys[member] = hashlib.sha256(text).hexdigest()[:32]
-        return key
+        Unknown values (NaN) do not count. Computed in one pass, which decodes every clip, and kept
+        with the features in the cache; in a ``folder``, for later runs as well.
+        """
+        return statistics_of(self._blocks, self.members)
+
+    def normalized(self, statistics: Mapping[str, FieldStatistics] | None = None) -> Dataset:
+        """The same windows less the mean of each field, divided by the standard deviation.
+
+        ``statistics`` of another data set, the training part, say, or by default the own ones.
+        Raises OptionError where they lack a field.
+        """
+        scales = dict(self.statistics() if statistics is None else statistics)
+        missing = [name for name in self.fields if name not in scales]
+        if missing:
+            raise OptionError(f"statistics of no {', '.join(missing)}")
+        made = self.part(self.members)
+        made.skipped, made._scales = self.skipped, scales
+        return made
 
     def order(self, seed: int, epoch: int = 0) -> NDArray[np.int64]:
         """All windows in an order that follows from ``seed`` and ``epoch`` and is quick to read.
@@ -296,6 +263,8 @@ class Dataset:
             before = int(self._ends[which - 1]) if which else 0
             numbers = np.arange(before, int(self._ends[which]))
             each = max(1, RUN_BLOCKS * BLOCK // self._settings.stride)
+            if self._settings.recipe.is_whole:
+                each = max(1, len(numbers))
             for at in range(0, len(numbers), each):
                 part = numbers[at : at + each]
                 if self._settings.window is None:
@@ -311,8 +280,8 @@ class Dataset:
             return 2**62
         size = self._settings.recipe.dtype.itemsize
         values = sum(int(np.prod(shape)) for shape in self.shapes.values())
-        decoded = self._settings.cache_bytes // RUNS_SHARE
-        kept = (self._settings.cache_bytes - decoded) // (size * max(1, values))
+        decoded = self._settings.decoded_bytes
+        kept = self._settings.feature_bytes // (size * max(1, values))
         if self.n_frames <= kept:
             return 2**62
         n_channels = self._first_subject().skeleton.n_channels
@@ -352,7 +321,7 @@ class Dataset:
     def part(self, members: Sequence[Member]) -> Dataset:
         """The same of some of its ``members`` alone; files and cache are shared."""
         made = Dataset(self._settings, members, self._given)
-        made._sources, made._cache = self._sources, self._cache
+        made._blocks, made._scales = self._blocks, self._scales
         return made
 
     def split(
@@ -383,7 +352,7 @@ class Dataset:
     def _labels(self, by: str, pattern: str | None) -> list[str]:
         from mcz.exchange.datasets.samplers import label_of
 
-        clips = (self._sources.clip(member) for member in self.members)
+        clips = (self._blocks.sources.clip(member) for member in self.members)
         return [label_of(m, clip, by, pattern) for m, clip in zip(self.members, clips, strict=True)]
 
     def torch(self) -> Any:
