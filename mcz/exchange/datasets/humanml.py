@@ -56,10 +56,10 @@ def humanml3d(
     ``threshold`` in metres, from a frame to the next. Where a position is NaN, so is what depends
     on it. Raises MotionError for another shape, and OptionError for other lengths.
     """
-    places = _checked(positions)
-    if bone_lengths is not None:
-        places = _with_lengths(places, np.asarray(bone_lengths, np.float64))
-    with np.errstate(invalid="ignore", divide="ignore"):
+    places = _check_positions(positions)
+    with np.errstate(all="ignore"):  # positions that coincide, or overflow, have NaN
+        if bone_lengths is not None:
+            places = _with_lengths(places, np.asarray(bone_lengths, np.float64))
         return _features(places, threshold)
 
 
@@ -82,7 +82,7 @@ def humanml3d_positions(features: ArrayLike) -> Floats:
     return places
 
 
-def _checked(positions: ArrayLike) -> Floats:
+def _check_positions(positions: ArrayLike) -> Floats:
     places = np.array(positions, np.float64)
     if places.ndim != 3 or places.shape[1:] != (len(JOINTS), 3) or len(places) < 2:
         raise MotionError(f"positions {places.shape}: (2 frames or more, {len(JOINTS)} joints, 3)")
