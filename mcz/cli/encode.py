@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from mcz.files.writing.file import Written
 
 
-@click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv or .npz file.")
+@click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npz or .pkl.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.argument("more", metavar="", nargs=-1, type=click.Path(readable=False))
 @click.option(
@@ -58,7 +58,9 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "npy", "npz")),
+    type=click.Choice(
+        ("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "npy", "npz", "pickle")
+    ),
     help="Set the format of standard input. Default: detect it from the content; for live input "
     "BVH, or AMC with --skeleton.",
 )
@@ -78,7 +80,7 @@ def encode_command(
     format_name: str | None,
     **options: Any,
 ) -> Exit:
-    """Encode SRC (.bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npy or .npz) into OUT.mcz.
+    """Encode SRC (.bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npy, .npz, .pkl) into OUT.mcz.
 
     An ASF gives an .mcz with only a skeleton.
 

@@ -208,7 +208,7 @@ ROBOTS = ("unitree-g1-29", "unitree-g1-23", "unitree-h1", "unitree-h1-2", "boost
 arrays_option = click.option(
     "--arrays",
     type=click.Choice((*ARRAYS, *ROBOTS)),
-    help="Set the meaning of the numbers of a plain .npy or .npz, or name a robot's columns.",
+    help="Set the meaning of the numbers of a plain .npy, .npz or .pkl, or name a robot's columns.",
 )
 
 model_option = click.option(

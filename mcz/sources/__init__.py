@@ -1,8 +1,8 @@
 """Source formats: bytes -> Motion or Skeleton, and back, byte for byte.
 
 ``FORMATS`` is the explicit table; SPEC.md, "Registry", has the ids. ``text`` has ASF, AMC and BVH,
-``tables`` TRC, STO, MOT and CSV, ``c3d`` C3D, ``arrays`` NPY and NPZ; ``sample`` makes small files
-of every format.
+``tables`` TRC, STO, MOT and CSV, ``c3d`` C3D, ``arrays`` NPY, NPZ and pickles; ``sample`` makes
+small files of every format.
 
 Imports ``mcz.model`` and ``mcz.kinematics``: MCZ files are unknown here.
 """
@@ -168,9 +168,19 @@ FORMATS: dict[str, Format] = {
                 _of("arrays.read", "write_arrays"),
                 states_rate=name == "npz",
                 is_motion=_of("arrays.header", "is_motion"),
-                arrays=_of("arrays.layout", "list_arrays"),
+                arrays=_of("arrays.pickles" if name == "npy" else "arrays.layout", "list_arrays"),
             )
             for format_id, name in ((12, "npy"), (13, "npz"))
+        ),
+        Format(
+            "pickle",
+            14,
+            (".pkl", ".pickle", ".joblib"),
+            _of("arrays.read", "read_pickle_file"),
+            _of("arrays.read", "write_arrays"),
+            states_rate=True,
+            is_motion=_of("arrays.pickles", "is_motion"),
+            arrays=_of("arrays.pickles", "list_arrays"),
         ),
     )
 }
@@ -225,6 +235,8 @@ def likely_formats(data: bytes) -> tuple[str, ...]:
         return ("npy",)
     if head.startswith(b"PK\3\4"):
         return ("npz",)
+    if head[:1] == b"\x80" and head[1:2] in (b"\2", b"\3", b"\4", b"\5"):
+        return ("pickle",)
     start = head.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()
     if start.startswith(b"HIERARCHY"):
         return ("bvh",)

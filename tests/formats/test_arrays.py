@@ -202,7 +202,7 @@ def test_nothing_is_unpickled_nor_inflated(monkeypatch: pytest.MonkeyPatch) -> N
     members = (Member("evil.npy", evil), Member("a.npy", npy(floats(3, 2))))
     motion = back(npz(members))
     assert motion.metadata["source-note"] == "evil is pickled, and not unpickled"
-    with pytest.raises(SourceError, match="pickled"):
+    with pytest.raises(SourceError, match="_Fail.*is never called"):
         FORMATS["npy"].read(evil)
     monkeypatch.setattr("zlib.decompressobj", lambda *given: pytest.fail("inflated"))
     buffer = io.BytesIO()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import pickle
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -79,6 +80,10 @@ def saved_array(array: Any) -> bytes:
     return buffer.getvalue()
 
 
+def pickled(array: Any) -> bytes:
+    return pickle.dumps({"walk": array, "fps": 30}, 4)
+
+
 TABLES = (MOTIVE, EULER, VICON, DEVICES, ODD_SECTIONS, COLUMNS)
 CASES = {
     "bvh": Case("bvh", (BVH,), bvh_texts()),
@@ -91,9 +96,15 @@ CASES = {
     "mot": Case("mot", (FORCES,), storage_files(), step=5),
     "csv": Case("csv", TABLES, motive_files() | vicon_files() | column_files(), step=17),
     "npy": Case("npy", (npy(floats(4, 3)),), arrays().map(saved_array)),
+    "pickle": Case("pickle", (pickled(floats(4, 3)),), arrays().map(pickled)),
     "npz": Case("npz", (plain_npz({"a": floats(3, 2)}), save_npz(a=floats(2, 2))), archives()),
 }
-REFUSING = ("c3d", "npy", "asf")  # formats of which a file at random may say what cannot be
+REFUSING = (
+    "c3d",
+    "npy",
+    "pickle",
+    "asf",
+)  # formats of which a file at random may say what cannot be
 CLIPS = [name for name in CASES if name != "asf"]
 SMALL = [(name, data) for name in CLIPS for data in CASES[name].small]
 
@@ -131,10 +142,10 @@ def test_every_prefix_is_read_exactly_or_refused(case: Case) -> None:
     for file in case.small:
         for size in range(0, len(file), case.step):
             found = case.back_or_refused(file[:size])
-            assert found is None or case.format not in ("npy", "npz")
+            assert found is None or case.format not in ("npy", "npz", "pickle")
 
 
-@pytest.mark.parametrize("name", ["c3d", "npy", "npz"])
+@pytest.mark.parametrize("name", ["c3d", "npy", "npz", "pickle"])
 def test_every_flipped_bit_is_read_exactly_or_refused(name: str) -> None:
     case = CASES[name]
     for file in case.small[:1]:
@@ -234,7 +245,7 @@ def test_hostile_templates_are_refused_or_written(
                 return
 
 
-TEXTS = [name for name in CASES if name not in ("c3d", "npy", "npz")]
+TEXTS = [name for name in CASES if name not in ("c3d", "npy", "npz", "pickle")]
 
 
 @pytest.mark.parametrize("name", TEXTS)

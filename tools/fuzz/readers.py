@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import pickle
 import tempfile
 import zlib
 from contextlib import suppress
@@ -50,6 +51,11 @@ WORDS = {
         "poses.npy trans.npy root_orient.npy times.npy mocap_framerate.npy "
         "\\xff\\xff\\xff\\xff \\x01\\x00\\x10\\x00"
     ),
+    "pickle": (
+        "\\x80\\x04 \\x8c\\x05numpy ccopyreg _reconstruct\\x0a NumpyArrayWrapper dof_pos fps "
+        "C\\x10 K\\x03 \\x85 \\x86 \\x94 R b h\\x01 ( t }( u ] e \\x93 "
+        "\\x95\\x00\\x01\\x00\\x00\\x00\\x00\\x00\\x00"
+    ),
     "c3d": (
         "POINT ANALOG USED SCALE RATE DATA_START FRAMES LABELS LABELS2 DESCRIPTIONS UNITS OFFSET "
         "GEN_SCALE FORMAT UNSIGNED SIGNED TRIAL ACTUAL_START_FIELD ACTUAL_END_FIELD EVENT "
@@ -87,7 +93,7 @@ def seeds(name: str) -> dict[str, bytes]:
 
 
 def _sample(name: str) -> bytes:
-    if name in ("npy", "npz"):
+    if name in ("npy", "npz", "pickle"):
         return _array_sample(name)
     if name == "asf":
         return asf.write(acclaim_walk().skeleton)
@@ -105,6 +111,8 @@ def _array_sample(name: str) -> bytes:
     buffer = io.BytesIO()
     if name == "npy":
         np.save(buffer, numbers)
+    elif name == "pickle":
+        pickle.dump({"dof_pos": numbers, "fps": 30}, buffer, protocol=4)
     else:
         np.savez(buffer, poses=numbers, fps=30, times=np.arange(FRAMES) / 30)
     return buffer.getvalue()
@@ -116,6 +124,10 @@ def check_npy(data: bytes) -> bool:
 
 def check_npz(data: bytes) -> bool:
     return _check("npz", data)
+
+
+def check_pickle(data: bytes) -> bool:
+    return _check("pickle", data)
 
 
 def check_bvh(data: bytes) -> bool:

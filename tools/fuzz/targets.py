@@ -83,6 +83,7 @@ TARGETS: dict[str, Target] = {
         _reader("csv", readers.check_csv),
         _reader("npy", readers.check_npy),
         _reader("npz", readers.check_npz),
+        _reader("pickle", readers.check_pickle),
         Target(
             "mcz",
             "whole files: strict, in parts, salvaged, live, verified",

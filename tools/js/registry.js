@@ -28,6 +28,7 @@ const SOURCE_FORMATS = new Map([
   [11, { name: "csv", of: "clip", kind: "table" }],
   [12, { name: "npy", of: "clip", kind: "arrays" }],
   [13, { name: "npz", of: "clip", kind: "arrays" }],
+  [14, { name: "pickle", of: "clip", kind: "arrays" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

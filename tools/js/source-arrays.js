@@ -1,4 +1,4 @@
-// SPEC.md, "Template of arrays" and "The bytes of arrays": NPY and NPZ files.
+// SPEC.md, "Template of arrays" and "The bytes of arrays": NPY and NPZ files, pickles.
 
 import { ByteReader } from "./bytes.js";
 import { crc32 } from "./crc32.js";
@@ -13,6 +13,10 @@ const DATA = 3;
 const CRC = 4;
 const SIZE4 = 5;
 const SIZE8 = 6;
+const ROWS = 8;
+const SIZE1 = 9;
+/** Bytes of the kinds that follow from other pieces. */
+const SIZES = { [CRC]: 4, [SIZE4]: 4, [SIZE8]: 8, [SIZE1]: 1 };
 
 const BIG_ENDIAN = 1;
 const BY_COLUMNS = 2;
@@ -45,7 +49,7 @@ function integer(size, signed) {
 }
 
 /**
- * Restores an NPY or NPZ file.
+ * Restores an NPY or NPZ file, or a pickle.
  *
  * @param {object} source of CLIP: template.data, detail
  * @param {object[]} signals all of them, decoded: see sources.js
@@ -113,13 +117,23 @@ function readPiece(reader, left) {
       return { kind, signal: reader.varint(), after: reader.sized(), size: reader.varint() };
     case DATA:
       return readData(reader, left);
+    case ROWS:
+      return readRows(reader);
     case CRC:
     case SIZE4:
     case SIZE8:
+    case SIZE1:
       return { kind, start: reader.varint(), stop: reader.varint() };
     default:
       return reader.refuse(`a piece of kind ${kind}`);
   }
+}
+
+function readRows(reader) {
+  const signal = reader.varint();
+  const size = reader.varint();
+  if (![1, 2, 4].includes(size)) reader.refuse(`a number of rows in ${size} bytes`);
+  return { kind: ROWS, signal, size };
 }
 
 function readData(reader, left) {
@@ -144,7 +158,7 @@ function checkSpans(pieces) {
   for (const { kind } of pieces) sums.push(sums[sums.length - 1] + (kind === CRC ? 1 : 0));
   const spans = [];
   for (const { kind, start, stop } of pieces) {
-    if (kind < CRC) continue;
+    if (!(kind in SIZES)) continue;
     if (start > stop || stop > pieces.length) {
       throw new Refused(`arrays: pieces ${start} to ${stop} of ${pieces.length}`);
     }
@@ -163,11 +177,10 @@ function checkSpans(pieces) {
 function sizeOf(piece, signals) {
   const { kind } = piece;
   if (kind === TEXT || kind === OWN) return piece.text.length;
-  if (kind === CRC || kind === SIZE4) return 4;
-  if (kind === SIZE8) return 8;
+  if (kind in SIZES) return SIZES[kind];
   const decoded = signals[piece.signal];
   if (!decoded) throw new Refused(`arrays: signal ${piece.signal} of ${signals.length}`);
-  if (kind === COUNT) return piece.size;
+  if (kind === COUNT || kind === ROWS) return piece.size;
   let nColumns = 0;
   for (const { channel, nChannels } of piece.runs) {
     if (channel + nChannels > decoded.nChannels) {
@@ -192,12 +205,27 @@ function put(out, view, starts, piece, at, signals) {
     out.set(piece.after, at + number.length);
   } else if (kind === DATA) {
     putNumbers(view, at, piece, signals[piece.signal]);
+  } else if (kind === ROWS) {
+    putRows(view, at, piece.size, signals[piece.signal].nRows);
   } else if (kind !== CRC) {
     const size = starts[piece.stop] - starts[piece.start];
-    if (kind === SIZE4 && size >= TWO_32) throw new Refused(`arrays: ${size} in four bytes`);
+    const width = SIZES[kind];
+    if (width < 8 && size >= 2 ** (8 * width)) {
+      throw new Refused(`arrays: a size of ${size} in ${width} bytes`);
+    }
+    if (kind === SIZE1) {
+      view.setUint8(at, size);
+      return;
+    }
     view.setUint32(at, size % TWO_32, true);
     if (kind === SIZE8) view.setUint32(at + 4, Math.floor(size / TWO_32), true);
   }
+}
+
+function putRows(view, at, size, nRows) {
+  const most = { 1: 2 ** 8 - 1, 2: 2 ** 16 - 1, 4: 2 ** 31 - 1 }[size];
+  if (nRows > most) throw new Refused(`arrays: ${nRows} rows in ${size} bytes`);
+  for (let k = 0; k < size; k++) view.setUint8(at + k, Math.floor(nRows / 2 ** (8 * k)) % 256);
 }
 
 function putNumbers(view, at, { type, flags, runs }, decoded) {

@@ -87,6 +87,7 @@ for _make in (
     source_bases.c3d,
     source_bases.outputs,
     source_bases.array,
+    source_bases.long_array,
     source_bases.two_arrays,
     source_bases.one,
     source_bases.mannequin,

@@ -45,6 +45,11 @@ def array() -> Motion:
     return take_arrays(npy(floats(4, 2)), "plain.npy")
 
 
+def long_array() -> Motion:
+    """An NPY file of 256 rows."""
+    return take_arrays(npy(np.ones((256, 1), np.int8)), "long.npy")
+
+
 def two_arrays() -> Motion:
     """An NPZ file of two arrays."""
     return take_arrays(plain_npz({"a": floats(3, 2), "b": floats(3, 1)}), "many.npz")

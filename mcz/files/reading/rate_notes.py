@@ -12,7 +12,12 @@ from mcz.files.reading.source_info import contradiction, is_one_of
 from mcz.model.clock import usual_step
 from mcz.sources import FORMATS, format_by_id
 
-UNTIMED = ("bvh", "npy", "npz")  # with neither times, unless in an array, nor frame numbers
+UNTIMED = (
+    "bvh",
+    "npy",
+    "npz",
+    "pickle",
+)  # with neither times, unless in an array, nor frame numbers
 
 
 def _rate_note(clip: Clip, is_file: bool) -> str | None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from mcz.errors import SourceError
-from mcz.sources.arrays.layout import Kind
+from mcz.sources.arrays.layout import SIZES, Kind
 
 LOCAL, CENTRAL, END = b"PK\3\4", b"PK\1\2", b"PK\5\6"
 END64, LOCATOR64, DESCRIPTOR = b"PK\6\6", b"PK\6\7", b"PK\7\x08"
@@ -90,7 +90,7 @@ def read_archive(data: bytes) -> Archive:
     }
     true, wrong, taken = [], set(), 0
     for field in wanted:
-        size = 8 if field.kind == Kind.SIZE8 else 4
+        size = SIZES[field.kind]
         is_sum = field.kind == Kind.CRC
         meant = sums[field.start, field.stop] if is_sum else field.stop - field.start
         if field.at >= taken and _number(data, field.at, size) == meant:

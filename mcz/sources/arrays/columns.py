@@ -209,7 +209,7 @@ def npy_array(data: bytes) -> Array:
     """The array of an NPY file; raises SourceError where it has no numbers with rows."""
     head = read_head(data, 0, len(data))
     refuse_odd(head)
-    array = _array("array", data, head, len(data))
+    array = array_of("array", data, head, len(data))
     if array.kept:
         raise SourceError(f"the array is {array.kept}, which is no motion", offset=head.start)
     return array
@@ -230,10 +230,11 @@ def _member(data: bytes, member: Member) -> Array:
     head = read_head(data, member.start, member.stop)
     if head.odd:
         return Array(name, Head(), kept=f"no array ({head.odd})", is_loud=name != member.name)
-    return _array(name, data, head, member.stop)
+    return array_of(name, data, head, member.stop)
 
 
-def _array(name: str, data: bytes, head: Head, stop: int) -> Array:
+def array_of(name: str, data: bytes, head: Head, stop: int) -> Array:
+    """The array of a head, whose bytes end at ``stop``."""
     if head.code == "O":
         return Array(name, head, stop, "pickled, and not unpickled", is_loud=True)
     if not head.is_number:

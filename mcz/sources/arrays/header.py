@@ -36,7 +36,8 @@ class Head:
 
     ``code`` is NumPy's without byte order, such as "f8"; "O" of pickled objects. ``rows_at`` and
     ``end`` are where the length of the first axis is printed, and where the text ends that may
-    follow it, without the blanks behind. A fault of the head is ``odd``, and there is no more then.
+    follow it, without the blanks behind; unless ``is_printed``, it is an integer there. A fault of
+    the head is ``odd``, and there is no more then.
     """
 
     start: int = 0
@@ -47,6 +48,7 @@ class Head:
     rows_at: tuple[int, int] = (0, 0)
     end: int = 0
     odd: str = ""
+    is_printed: bool = True
 
     @property
     def is_number(self) -> bool:

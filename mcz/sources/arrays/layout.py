@@ -35,10 +35,13 @@ class Kind(IntEnum):
     CRC = 4  # CRC-32 of other pieces
     SIZE4 = 5  # how many bytes other pieces have, u32
     SIZE8 = 6  # the same, u64
+    ROWS = 8  # the number of rows, an integer
+    SIZE1 = 9  # how many bytes other pieces have, u8
 
 
-_OF_ROWS = (Kind.COUNT, Kind.DATA)
-_OF_PIECES = (Kind.CRC, Kind.SIZE4, Kind.SIZE8)
+SIZES = {Kind.SIZE1: 1, Kind.CRC: 4, Kind.SIZE4: 4, Kind.SIZE8: 8}  # bytes of these kinds
+_OF_ROWS = (Kind.COUNT, Kind.DATA, Kind.ROWS)
+_OF_PIECES = tuple(SIZES)
 
 
 def _if(kinds: Sequence[Kind], item: object) -> IfThenElse:
@@ -60,10 +63,13 @@ class ArrayPiece(Record):
 
     kind: int = field(one_of(Int8ul, tuple(Kind)), "what the piece is")  # ARRAY-01
     text: bytes | None = field(_if((Kind.TEXT,), SIZED), "TEXT only: the bytes")
-    signal: int | None = field(_if(_OF_ROWS, UVARINT), "COUNT and DATA only: index of the signal")
+    signal: int | None = field(
+        _if(_OF_ROWS, UVARINT), "COUNT, DATA and ROWS only: index of the signal"
+    )
     after: bytes | None = field(_if((Kind.COUNT,), SIZED), "COUNT only: what follows the number")
     size: int | None = field(
-        _if((Kind.COUNT,), UVARINT), "COUNT only: bytes, those of blanks included"
+        _if((Kind.COUNT, Kind.ROWS), UVARINT),
+        "COUNT and ROWS only: bytes, those of blanks included",
     )
     type: int | None = field(
         _if((Kind.DATA,), one_of(Int8ul, tuple(range(len(TYPES))))), "DATA only: type of a number"
@@ -210,7 +216,7 @@ def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
     """
     pieces = parse_arrays(source.template, source.detail)
     members = members_of(pieces) if source.format == "npz" else [("", pieces)]
-    return [_list_array(name, own, signals) for name, own in members]
+    return [list_pieces(name, own, signals) for name, own in members]
 
 
 def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
@@ -226,7 +232,8 @@ def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
     ]
 
 
-def _list_array(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonObject:
+def list_pieces(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> JsonObject:
+    """The array of these pieces, see ``list_arrays``."""
     listed = {"name": name} | dict.fromkeys(("type", "order", "columns", "signal"))
     for piece in pieces:
         if piece.kind == Kind.DATA:
@@ -245,8 +252,8 @@ def _name(pieces: Sequence[Piece]) -> str:
     for piece in pieces:
         if piece.kind == Kind.TEXT:
             header += piece.text
-        elif piece.kind in (Kind.CRC, Kind.SIZE4, Kind.SIZE8):
-            header += bytes(8 if piece.kind == Kind.SIZE8 else 4)
+        elif piece.kind in SIZES:
+            header += bytes(SIZES[piece.kind])
         else:
             break
     size = int.from_bytes(header[26:28], "little")

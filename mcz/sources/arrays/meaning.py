@@ -18,6 +18,16 @@ from mcz.model.clock import times_fault
 from mcz.model.motion import Channel, Joint, Skeleton
 from mcz.model.types import Items
 from mcz.sources.arrays.columns import DEFLATED, STAYS, Array
+from mcz.sources.arrays.robot_arrays import (
+    BODIES,
+    BODY_NAMES,
+    JOINTS,
+    decode_text,
+    is_robot,
+    joint_names,
+    names_of,
+    robot_channels,
+)
 from mcz.sources.arrays.skeletons import BodyTree, skeleton_of, tree
 from mcz.sources.tables.times import UNITS, rate_of_times
 
@@ -90,11 +100,14 @@ def _add_body(meaning: Meaning, body: Body) -> None:
 
 
 def _frames_of(arrays: Sequence[Array]) -> int:
-    """The number of frames: that of the times, else the longest first axis of joints."""
+    """The number of frames: of the times, of a robot's joints, else the longest first axis."""
     numbers = [array for array in arrays if not array.kept]
     times = [array.n_rows for array in numbers if array.name in TIMES and len(array.head.shape) < 2]
     if times and any(array.n_rows == times[0] for array in numbers if array.name not in TIMES):
         return times[0]
+    robots = [array.n_rows for array in numbers if is_robot(array)]
+    if robots:
+        return robots[0]
     for n_axes in (3, 2):  # a mesh or a model has rows, too, but seldom three axes
         rows = [array.n_rows for array in numbers if len(array.head.shape) >= n_axes]
         if rows:
@@ -118,7 +131,7 @@ def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> Non
     It is the first of several.
     """
     fit = [
-        (_is_robot(array), min(len(array.head.shape), 3), -index)
+        (is_robot(array), min(len(array.head.shape), 3), -index)
         for index, array in enumerate(arrays)
         if not array.kept and array.n_rows == n_frames and array.name not in TIMES
     ]
@@ -129,18 +142,14 @@ def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> Non
     meaning.parts.append(Part("motion", [array.numbers], role="motion"))
     meaning.places[index] = 0, range(array.numbers.shape[1])
     joints = plain_joints(array.head.shape[1:], array.name)
-    if _is_robot(array):
+    if is_robot(array):
         channel = Channel("", "value", JOINTS[array.name])
-        names = names_of(arrays, JOINT_NAMES)
-        if len(names) != len(joints):
-            names = tuple(joint.name for joint in joints)
+        names, robot, note = joint_names(arrays, len(joints))
+        names = names or tuple(joint.name for joint in joints)
         joints = tuple(Joint(name, channels=(channel,)) for name in names)
+        meaning.metadata |= {"x-robot": robot} if robot else {}
+        meaning.notes += [note] if note else []
     meaning.skeleton = Skeleton(joints, angle_unit="")
-
-
-def _is_robot(array: Array) -> bool:
-    """Return True for the joint angles of a robot, a column for each joint."""
-    return JOINTS.get(array.name) == "rad" and len(array.head.shape) == 2
 
 
 def plain_joints(inner: Sequence[int], name: str) -> tuple[Joint, ...]:
@@ -162,10 +171,10 @@ def labels(inner: Sequence[int]) -> list[str]:
 def _channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...]:
     """The channels of a signal of its own, named by the joints or bodies that ``arrays`` list."""
     inner = array.head.shape[1:]
-    joints, bodies = (names_of(arrays, keys) for keys in (JOINT_NAMES, BODY_NAMES))
-    if array.name in JOINTS and inner == (len(joints),):
-        return tuple(Channel("", name, JOINTS[array.name]) for name in joints)
-    if array.name.startswith("body_") and inner[:1] == (len(bodies),):
+    if (channels := robot_channels(array, arrays)) is not None:
+        return channels
+    bodies = names_of(arrays, BODY_NAMES)
+    if array.name.startswith(BODIES) and inner[:1] == (len(bodies),):
         ends = [f" {label}".rstrip() for label in labels(inner[1:])]
         return tuple(Channel("", name + end) for name in bodies for end in ends)
     if not inner:
@@ -176,15 +185,6 @@ def _channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...]:
 
 TIMES = ("time", "times", "timestamp", "timestamps")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
-JOINT_NAMES = ("joint_names", "dof_names")
-BODY_NAMES = ("body_names", "link_names")
-JOINTS = {  # arrays of robots that have a column for each joint, and their units
-    "joint_pos": "rad",
-    "dof_pos": "rad",
-    "dof": "rad",
-    "joint_vel": "rad/s",
-    "dof_vel": "rad/s",
-}
 SHAPE = "betas"  # numbers of a body, of which it is said how many there are
 LONGEST = 200  # characters of a word
 EVEN = 1e-6  # of a step: times that are off by less are uniform
@@ -249,31 +249,6 @@ def facts_of(arrays: Sequence[Array]) -> dict[str, str]:
     return facts
 
 
-def names_of(arrays: Sequence[Array], keys: Sequence[str]) -> tuple[str, ...]:
-    """The texts of the first array that has one of the names ``keys``, () where there is none."""
-    for array in arrays:
-        if array.name in keys and array.words is None and len(array.head.shape) == 1:
-            code = array.head.code
-            size = int(code[1:]) * (4 if code[0] == "U" else 1) if code[:1] in ("U", "S") else 0
-            if size and size * array.head.shape[0] <= len(array.text):
-                parts = [array.text[k : k + size] for k in range(0, len(array.text), size)]
-                texts = [_decoded(part, array) for part in parts[: array.head.shape[0]]]
-                return tuple(text for text in texts if text) if all(texts) else ()
-    return ()
-
-
-def _decoded(data: bytes, array: Array) -> str | None:
-    """A text of an array of texts, None where it is empty or not printable."""
-    encoding = "utf-8"
-    if array.head.code[0] == "U":
-        encoding = "utf-32-be" if array.head.big_endian else "utf-32-le"
-    try:
-        text = data.decode(encoding).rstrip("\0")
-    except UnicodeDecodeError:
-        return None
-    return text if text.isprintable() and text else None
-
-
 def _text(array: Array) -> str | None:
     """A single word or number as text, None of all else."""
     if array.words is not None:
@@ -282,7 +257,7 @@ def _text(array: Array) -> str | None:
         return str(array.words.ravel()[0].item())
     if array.head.code[:1] not in ("U", "S") or np.prod(array.head.shape, dtype=np.float64) != 1:
         return None
-    text = _decoded(array.text[: 4 * LONGEST], array)
+    text = decode_text(array.text[: 4 * LONGEST], array)
     return text if text and len(text) <= LONGEST else None
 
 

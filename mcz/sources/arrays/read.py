@@ -1,4 +1,4 @@
-"""NPY and NPZ: bytes -> Motion, and back.
+"""NPY, NPZ and pickles: bytes -> Motion, and back.
 
 SPEC.md, "Template of arrays", is normative for the way back. ``meaning.py`` says which array is the
 motion, ``restore.py`` what a file is made of.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 
 from mcz.errors import MotionError, SourceError
 from mcz.model.motion import Motion, Signal, Source
@@ -15,17 +16,37 @@ from mcz.sources.arrays.archive import Archive
 from mcz.sources.arrays.columns import Array, columns_of, npy_array, npz_arrays, signal_of
 from mcz.sources.arrays.layout import MAX_PIECES, MAX_RUNS, Piece, build_arrays
 from mcz.sources.arrays.meaning import Meaning, meaning_of
+from mcz.sources.arrays.pickles import Pickle, npy_objects, read_pickle
 from mcz.sources.arrays.restore import Placed, pieces_of, restore_arrays
 
+CLIP = "x-clip"  # the key of the only clip in a pickle
 NO_ARCHIVE = Archive((), (), ())
 
 
 def read_npy(data: bytes, name: str = "motion") -> Motion:
     """The motion in an NPY file; ``name`` becomes its name.
 
-    Raises SourceError, with the offset at fault or the reason why it is no motion.
+    An array of objects is a pickle, which is read as one. Raises SourceError, with the offset at
+    fault or the reason why it is no motion.
     """
+    pickle = npy_objects(data)
+    if pickle is not None:
+        return _pickled("npy", data, name, pickle)
     return _motion("npy", data, name, [npy_array(data)], NO_ARCHIVE)
+
+
+def read_pickle_file(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a pickle, also of joblib, which is never run; ``name`` becomes its name.
+
+    Raises SourceError, with the offset at fault, for one that has anything else than data.
+    """
+    return _pickled("pickle", data, name, read_pickle(data))
+
+
+def _pickled(format_name: str, data: bytes, name: str, pickle: Pickle) -> Motion:
+    motion = _motion(format_name, data, name, pickle.arrays, pickle.archive, pickle.notes)
+    clip = {CLIP: pickle.clip} if pickle.clip else {}
+    return replace(motion, metadata=clip | dict(motion.metadata))
 
 
 def read_npz(data: bytes, name: str = "motion") -> Motion:
@@ -38,9 +59,15 @@ def read_npz(data: bytes, name: str = "motion") -> Motion:
 
 
 def _motion(
-    format_name: str, data: bytes, name: str, arrays: Sequence[Array], archive: Archive
+    format_name: str,
+    data: bytes,
+    name: str,
+    arrays: Sequence[Array],
+    archive: Archive,
+    notes: Sequence[str] = (),
 ) -> Motion:
     meaning = meaning_of(arrays)
+    meaning.notes += notes
     pieces = _pieces(data, arrays, archive, meaning)
     n_runs = sum(len(piece.runs) for piece in pieces)
     if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
@@ -99,7 +126,7 @@ def write_arrays(motion: Motion) -> bytes:
 
     Raises MotionError for a motion of another source: ``mcz.to_npz`` writes that one.
     """
-    if motion.source is None or motion.source.format not in ("npy", "npz"):
+    if motion.source is None or motion.source.format not in ("npy", "npz", "pickle"):
         raise MotionError(
             f"motion {motion.name!r} was not made of arrays; to_npz writes it as some"
         )

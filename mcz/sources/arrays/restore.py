@@ -25,6 +25,7 @@ from mcz.sources.arrays.header import Head
 from mcz.sources.arrays.layout import (
     BIG_ENDIAN,
     BY_COLUMNS,
+    SIZES,
     TYPES,
     Kind,
     Piece,
@@ -35,6 +36,7 @@ from mcz.sources.arrays.layout import (
 SIZE_LIMIT = 2**26  # a file may always be that large,
 SIZE_PER_VALUE = 64  # or that large for each value of the clip
 MAX_COLUMNS = 2**22  # of all arrays
+ROW_SIZES = (1, 2, 4)  # bytes of ROWS
 WIDEST = 2**53  # integers beyond it are on no grid
 BINARY = {4: Grid(GridKind.BINARY32), 8: Grid(GridKind.BINARY64)}
 
@@ -77,8 +79,10 @@ def _size(piece: Piece, signals: Sequence[Signal]) -> int:
     match piece.kind:
         case Kind.TEXT | Kind.OWN:
             return len(piece.text)
-        case Kind.COUNT:
+        case Kind.COUNT | Kind.ROWS:
             _signal(piece, signals)
+            if piece.kind == Kind.ROWS and piece.size not in ROW_SIZES:  # ARRAY-30
+                raise FormatError(f"source template: rows in {piece.size} bytes")
             return piece.size
         case Kind.DATA:
             signal = _signal(piece, signals)
@@ -88,7 +92,7 @@ def _size(piece: Piece, signals: Sequence[Signal]) -> int:
                     f"{signal.name!r}"
                 )
             return signal.n_rows * piece.n_columns * int(TYPES[piece.type][1])
-    return 8 if piece.kind == Kind.SIZE8 else 4
+    return SIZES[piece.kind]
 
 
 def _signal(piece: Piece, signals: Sequence[Signal]) -> Signal:
@@ -99,12 +103,17 @@ def _signal(piece: Piece, signals: Sequence[Signal]) -> Signal:
 
 def _bytes(piece: Piece, signals: Sequence[Signal], starts: Sequence[int]) -> Any:
     """The bytes of a piece of any kind but CRC."""
-    if piece.kind in (Kind.SIZE4, Kind.SIZE8):
-        size = 8 if piece.kind == Kind.SIZE8 else 4
+    if piece.kind in SIZES:
+        size = SIZES[piece.kind]
         number = starts[piece.stop] - starts[piece.start]
-        if number >= 256**size:  # ARRAY-12
+        if number >= 256**size:  # ARRAY-12, ARRAY-32
             raise FormatError(f"source template: a size of {number} in {size} bytes")
-        return number.to_bytes(size, "little")
+        return number.to_bytes(8, "little")[:size]
+    if piece.kind == Kind.ROWS:
+        number = signals[piece.signal].n_rows
+        if number >= 2 ** (8 * piece.size - (piece.size == 4)):  # ARRAY-31
+            raise FormatError(f"source template: {number} rows in {piece.size} bytes")
+        return number.to_bytes(8, "little")[: piece.size]
     if piece.kind == Kind.COUNT:  # ARRAY-13
         text = b"%d" % signals[piece.signal].n_rows + piece.after
         if len(text) > piece.size:  # ARRAY-11
@@ -194,15 +203,14 @@ def pieces_of(
         if stop - start <= MAX_OWN:
             spans.append((start, stop, Piece(Kind.OWN, data[start:stop])))
     for field in archive.fields:
-        size = 8 if field.kind == Kind.SIZE8 else 4
         piece = Piece(field.kind, start=field.start, stop=field.stop)
-        spans.append((field.at, field.at + size, piece))
+        spans.append((field.at, field.at + SIZES[field.kind], piece))
     spans.sort(key=lambda span: span[:2])
     cuts = {0, len(data), *(cut for field in archive.fields for cut in (field.start, field.stop))}
     starts, pieces = _cut_pieces(data, spans, sorted(cuts))
     return [
         replace(piece, start=bisect_left(starts, piece.start), stop=bisect_left(starts, piece.stop))
-        if piece.kind in (Kind.CRC, Kind.SIZE4, Kind.SIZE8)
+        if piece.kind in SIZES
         else piece
         for piece in pieces
     ]
@@ -231,12 +239,14 @@ def _cut_pieces(
 def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
     """The count in the head of an array, and its numbers."""
     head = array.head
-    low = head.rows_at[0]
-    high = head.end
-    while high < head.start and data[high : high + 1] == b" ":
-        high += 1
-    after = data[head.rows_at[1] : head.end]
-    count = Piece(Kind.COUNT, signal=array.signal, after=after, size=high - low)
+    low, high = head.rows_at
+    count = Piece(Kind.ROWS, signal=array.signal, size=high - low)
+    if head.is_printed:
+        high = head.end
+        while high < head.start and data[high : high + 1] == b" ":
+            high += 1
+        after = data[head.rows_at[1] : head.end]
+        count = Piece(Kind.COUNT, signal=array.signal, after=after, size=high - low)
     flags = BIG_ENDIAN * head.big_endian + BY_COLUMNS * head.by_columns
     order = file_columns(head)
     channels = [array.channels[column] for column in order.tolist()]

@@ -1,0 +1,296 @@
+"""Arrays, texts and numbers of a pickle, by their keys; nothing of it is ever run.
+
+SPEC.md, "The bytes of arrays", says what a template has of one; ``pickle_machine`` reads opcodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+
+from mcz.errors import SourceError
+from mcz.model.motion import Source
+from mcz.model.types import JsonObject
+from mcz.sources.arrays.archive import Archive, Field
+from mcz.sources.arrays.columns import MAX_TEXT, Array, array_of
+from mcz.sources.arrays.header import MAGIC, Head, read_head
+from mcz.sources.arrays.layout import (
+    SIZES,
+    TYPES,
+    Kind,
+    Piece,
+    list_pieces,
+    parse_arrays,
+)
+from mcz.sources.arrays.layout import list_arrays as list_plain
+from mcz.sources.arrays.meaning import LONGEST
+from mcz.sources.arrays.pickle_machine import Machine
+from mcz.sources.arrays.pickle_values import (
+    Dict,
+    Number,
+    PickledArray,
+    Raw,
+    integer_of,
+    size_of,
+)
+
+COMPRESSED = {
+    b"x": "zlib",
+    b"\x1f\x8b": "gzip",
+    b"BZ": "bz2",
+    b"\xfd7zXZ": "xz",
+    b"\x5d\0": "lzma",
+    b"\x04\x22\x4d\x18": "lz4",
+}
+MAX_DEPTH, MAX_NAME = 32, 512  # of a place in a pickle: keys, characters
+MAX_ARRAYS, MAX_FACTS = 2**14, 256
+SEPARATOR = "/"
+
+
+SEVERAL = (
+    "{n} clips in one file, such as {one!r} and {two!r}, and a motion has one; where you trust the "
+    "file, split it in Python: for name, clip in joblib.load(path).items(): "
+    "joblib.dump({{name: clip}}, name.replace('/', '_') + '.pkl')"
+)
+NESTS = (Dict, list, tuple, PickledArray)
+
+
+@dataclass(frozen=True, slots=True)
+class Pickle:
+    """``arrays`` have the numbers and texts, too; ``clip`` is the key of a single clip."""
+
+    arrays: list[Array]
+    archive: Archive
+    clip: str = ""
+    notes: tuple[str, ...] = ()
+
+
+def read_pickle(data: bytes, at: int = 0) -> Pickle:
+    """The arrays of the pickle from offset ``at`` on; raises SourceError with the offset."""
+    for magic, name in COMPRESSED.items():
+        if data.startswith(magic, at):
+            raise SourceError(
+                f"compressed by {name}; where you trust the file, write it plain in Python: "
+                "joblib.dump(joblib.load(path), path)",
+                offset=at,
+            )
+    machine = Machine(data, at)
+    root, clip = _single_clip(machine, machine.run())
+    _refuse_clips(machine, root)
+    arrays, fields = _Reader(machine).read(root)
+    fields += [Field(field, Kind.SIZE8, start, stop) for field, start, stop in machine.frames]
+    rest = len(data) - machine.at
+    notes = (f"{rest} bytes follow the pickle",) if rest else ()
+    fields.sort(key=lambda field: field.at)
+    return Pickle(arrays, Archive((), tuple(fields), ()), clip, notes)
+
+
+def _children(machine: Machine, node: Any) -> list[tuple[str, Any]]:
+    """The values of a dictionary by their keys; what a list or an array of objects nests."""
+    if isinstance(node, Dict):
+        named = ((machine.text_of(key), value) for key, value in node.pairs)
+        return [*{key: value for key, value in named if key}.items()]
+    if isinstance(node, PickledArray):
+        node = node.content if isinstance(node.content, list) else ()
+    return [(str(n), value) for n, value in enumerate(node) if isinstance(value, NESTS)]
+
+
+def _single_clip(machine: Machine, root: Any) -> tuple[Any, str]:
+    """The dictionary of the motion within others that hold nothing else, and its key."""
+    clip = ""
+    for _ in range(MAX_DEPTH):
+        children = _children(machine, root) if isinstance(root, NESTS) else []
+        if len(children) != 1 or not isinstance(children[0][1], Dict):
+            break
+        clip = children[0][0] if isinstance(root, Dict) else clip
+        root = children[0][1]
+    return root, clip
+
+
+def _refuse_clips(machine: Machine, root: Any) -> None:
+    """Raise SourceError for several clips: dictionaries that have arrays of the same keys."""
+    if not isinstance(root, NESTS):
+        return
+    children = _children(machine, root)
+    clips = {id(child): (name, child) for name, child in children if isinstance(child, Dict)}
+    owners: dict[str, str] = {}
+    for name, clip in clips.values():
+        for key, value in _children(machine, clip):
+            if not isinstance(value, PickledArray) or len(value.shape) < 2:
+                continue
+            other = owners.setdefault(key, name)
+            if other != name:
+                raise SourceError(SEVERAL.format(n=len(clips), one=other[:80], two=name[:80]))
+
+
+class _Reader:
+    """The arrays below a value, each once and with the bytes that are its own."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.data = machine.data
+        self.arrays: list[Array] = []
+        self.fields: list[Field] = []
+        self.n_facts = 0
+        self.used: set[int] = set()  # offsets that an array has
+        self.names: set[str] = set()
+
+    def read(self, root: Any) -> tuple[list[Array], list[Field]]:
+        """The arrays in order, and the lengths of their bytes."""
+        seen: set[int] = set()
+        waiting: list[tuple[str, str, int, Any]] = [("", "", 0, root)]
+        while waiting:
+            prefix, key, depth, node = waiting.pop()
+            name = prefix + key
+            if len(name) > MAX_NAME or depth > MAX_DEPTH or id(node) in seen:
+                continue
+            if not isinstance(node, NESTS):
+                self._add_fact(name, node)
+                continue
+            seen.add(id(node))
+            if isinstance(node, PickledArray) and not isinstance(node.content, list):
+                self._add_array(name or "array", node)
+            elif not self._add_words(name, node):
+                below = _children(self.machine, node)[::-1]
+                prefix = name + SEPARATOR if name else ""
+                waiting += [(prefix, key, depth + 1, value) for key, value in below]
+        return self.arrays, self.fields
+
+    def _add(self, array: Array) -> None:
+        if array.name in self.names:
+            return
+        if len(self.arrays) >= MAX_ARRAYS:
+            raise SourceError(f"more than {MAX_ARRAYS} arrays")
+        self.names.add(array.name)
+        self.arrays.append(array)
+
+    def _add_array(self, name: str, node: PickledArray) -> None:
+        head, fault = self._head(node)
+        raw = node.content
+        if fault or not isinstance(raw, Raw):
+            self._add(Array(name, head, kept=fault, is_loud=bool(head.shape)))
+            return
+        self._add(array_of(name, self.data, head, raw.stop))
+        if raw.count_size:
+            kind = {1: Kind.SIZE1, 4: Kind.SIZE4, 8: Kind.SIZE8}[raw.count_size]
+            self.fields.append(Field(raw.start - raw.count_size, kind, raw.start, raw.stop))
+
+    def _head(self, node: PickledArray) -> tuple[Head, str]:
+        """The head of an array, and the reason why its bytes are not read, if any."""
+        dtype, raw, shape = node.dtype, node.content, node.lengths
+        if dtype is None or size_of(shape, 1) is None:
+            return Head(), "an array without type or shape"
+        code, order = dtype.code, dtype.order
+        if not isinstance(raw, Raw):
+            return Head(shape=shape), node.fault
+        if code in TYPES and code[1:] != "1" and order not in ("<", ">"):
+            return Head(shape=shape), "of a byte order that is not stated"
+        rows = node.shape[0] if shape else None
+        places = {raw.start} | ({rows.at} if isinstance(rows, Number) else set())
+        if (shape and not isinstance(rows, Number)) or places & self.used:
+            return Head(shape=shape), "an array that shares its bytes or its shape with another"
+        if code in TYPES and size_of(shape, int(code[1:])) != raw.stop - raw.start:
+            raise SourceError(
+                f"{raw.stop - raw.start} bytes of numbers, but shape {shape} of {code} has "
+                f"{size_of(shape, int(code[1:]))}",
+                offset=raw.start,
+            )
+        self.used |= places
+        rows_at = (rows.at, rows.at + rows.size) if isinstance(rows, Number) else (0, 0)
+        is_big = order == ">"
+        head = Head(raw.start, shape, code, is_big, node.by_columns, rows_at, is_printed=False)
+        return head, ""
+
+    def _add_words(self, name: str, node: Any) -> bool:
+        """Add a list of texts, such as names of joints; returns False for anything else."""
+        if not name or not isinstance(node, list | tuple) or not node:
+            return False
+        texts = [self.machine.text_of(value) for value in node]
+        words = [text for text in texts if text]
+        if len(words) != len(texts) or self.n_facts >= MAX_FACTS:
+            return False
+        if max(map(len, words)) > min(LONGEST, MAX_TEXT // 4 // len(words)):
+            return False
+        self.n_facts += 1
+        self._add(_array_of_texts(name, words, (len(words),)))
+        return True
+
+    def _add_fact(self, name: str, value: Any) -> None:
+        """Add a single text or number."""
+        if not name or self.n_facts >= MAX_FACTS:
+            return
+        text = self.machine.text_of(value)
+        number = integer_of(value) if not isinstance(value, float) else value
+        is_number = isinstance(value, Number | float) or (type(value) is int)
+        if text and len(text) <= LONGEST:
+            self._add(_array_of_texts(name, [text], ()))
+        elif is_number and abs(number) <= 2**53:
+            self._add(Array(name, Head(), kept="a single number", words=np.array([[number]])))
+        else:
+            return
+        self.n_facts += 1
+
+
+def _array_of_texts(name: str, words: Sequence[str], shape: tuple[int, ...]) -> Array:
+    """The array of texts that NumPy would make; its bytes are no part of the file."""
+    longest = max(map(len, words))
+    encoded = [word.ljust(longest, "\0").encode("utf-32-le", "surrogatepass") for word in words]
+    return Array(name, Head(code=f"U{longest}", shape=shape), kept="text", text=b"".join(encoded))
+
+
+def npy_objects(data: bytes) -> Pickle | None:
+    """The pickle in an NPY file of objects, None of a file of anything else."""
+    head = read_head(data, 0, len(data)) if data.startswith(MAGIC) else Head()
+    return read_pickle(data, head.start) if head.code == "O" else None
+
+
+def list_arrays(source: Source, signals: Sequence[str]) -> list[JsonObject]:
+    """The arrays of a pickle or an NPY, see ``layout.list_arrays``; raises FormatError.
+
+    Names are those in the pickle of no rows that the template makes.
+    """
+    pieces = parse_arrays(source.template, source.detail)
+    if source.format == "npy" and all(piece.kind != Kind.ROWS for piece in pieces):
+        return list_plain(source, signals)
+    sizes = [
+        piece.size if piece.kind == Kind.ROWS else SIZES.get(piece.kind, len(piece.text))
+        for piece in pieces
+    ]
+    starts = [0, *accumulate(sizes)]
+    data = b"".join(_empty(piece, starts, size) for piece, size in zip(pieces, sizes, strict=True))
+    try:
+        pickle = (npy_objects(data) if source.format == "npy" else None) or read_pickle(data)
+        names = {a.head.start: a.name for a in pickle.arrays if a.head.start}
+    except SourceError:
+        names = {}  # a template that no pickle made
+    listed = []
+    for at, piece in zip(starts, pieces, strict=False):
+        if piece.kind == Kind.DATA:
+            listed.append(list_pieces(names.get(at, ""), [piece], signals))
+    placed = {array["name"] for array in listed}
+    kept = [name for name in names.values() if name not in placed]
+    return listed + [list_pieces(name, [], signals) for name in kept]
+
+
+def _empty(piece: Piece, starts: Sequence[int], size: int) -> bytes:
+    """The bytes of a piece of a file without rows."""
+    if piece.kind in SIZES:
+        last = len(starts) - 1
+        number = starts[min(piece.stop, last)] - starts[min(piece.start, last)]
+        return max(0, number).to_bytes(8, "little")[:size]
+    return piece.text or bytes(size)
+
+
+def is_motion(data: bytes) -> bool:
+    """Return True if a pickle that begins with ``data`` may have arrays of NumPy."""
+    if any(data.startswith(magic) for magic in COMPRESSED):
+        return True
+    machine = Machine(data)
+    with suppress(SourceError):
+        machine.run()
+    return b"numpy" in data and not machine.is_foreign

@@ -1,0 +1,351 @@
+"""Pickles as sources: restored byte for byte, cut to frames, and never run."""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import struct
+import subprocess
+import tracemalloc
+from collections import OrderedDict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.errors import SourceError
+from mcz.model.motion import Motion
+from mcz.sources import FORMATS, arrays_of, format_of, likely_formats
+from tests.formats.saved_arrays import arrays
+from tools.vectors.build.array_files import floats
+from tools.vectors.build.pickle_files import joblib_file
+
+PLAIN = (3, 4, 5)  # protocols that write bytes as they are
+BODIES = ["pelvis", "left_hip_link", "right_hip_link"]
+LIMIT = 2**26  # bytes that reading a small file may take
+
+
+def robot(n_frames: int = 60, n_joints: int = 5) -> dict[str, Any]:
+    """A clip as programs of retargeting save it."""
+    return {
+        "fps": 30,
+        "root_pos": floats(n_frames, 3),
+        "root_rot": np.tile([0.0, 0.0, 0.0, 1.0], (n_frames, 1)),
+        "dof_pos": floats(n_frames, n_joints, seed=2),
+        "local_body_pos": floats(n_frames, 3, 3, seed=3).astype(np.float32),
+        "link_body_list": BODIES,
+    }
+
+
+def read(data: bytes) -> Motion:
+    motion: Motion = FORMATS["pickle"].read(data, "walk")
+    assert FORMATS["pickle"].write(motion) == data
+    return motion
+
+
+def back_or_refused(data: bytes) -> Motion | None:
+    try:
+        return read(data)
+    except (mcz.SourceError, mcz.LimitError) as error:
+        assert "\n" not in str(error)
+        return None
+
+
+def part_of(motion: Motion, first: int, stop: int) -> Any:
+    """The object in the file that a range of frames makes."""
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        return pickle.loads(file.only_clip().source_bytes((first, stop)))
+
+
+@pytest.mark.parametrize("protocol", PLAIN)
+def test_a_clip_of_a_robot(protocol: int) -> None:
+    motion = read(pickle.dumps(robot(), protocol))
+    assert motion.frame_rate == 30
+    names = [signal.name for signal in motion.signals]
+    assert names == ["motion", "root_pos", "root_rot", "local_body_pos"]
+    np.testing.assert_array_equal(motion.values, robot()["dof_pos"])
+    assert motion.skeleton.channels[0].unit == "rad"
+    labels = [[channel.name for channel in signal.channels or ()] for signal in motion.signals]
+    assert labels[1:3] == [["x", "y", "z"], ["qx", "qy", "qz", "qw"]]
+    assert labels[3][:4] == ["pelvis 0", "pelvis 1", "pelvis 2", "left_hip_link 0"]
+
+
+@pytest.mark.parametrize("protocol", PLAIN)
+@pytest.mark.parametrize("n_frames", [40, 300, 70_000])
+def test_frames_of_a_pickle_are_a_pickle(protocol: int, n_frames: int) -> None:
+    clip = robot(n_frames) | {"contact": floats(n_frames, 1) > 0, "who": np.array("A")}
+    clip["dof_pos"] = np.asfortranarray(clip["dof_pos"])
+    clip["root_pos"] = clip["root_pos"].astype(">f8")
+    part = part_of(read(pickle.dumps(clip, protocol)), 3, 33)
+    assert part["fps"] == 30 and part["link_body_list"] == BODIES and part["who"] == "A"
+    for name in ("root_pos", "root_rot", "dof_pos", "local_body_pos", "contact"):
+        assert part[name].dtype.kind == clip[name].dtype.kind
+        np.testing.assert_array_equal(part[name], clip[name][3:33])
+
+
+def test_names_of_a_known_robot() -> None:
+    from mcz.sources.robots import robot_layouts
+
+    joints = robot_layouts()["unitree-g1-29"].joints
+    bodies = [joint.replace("_joint", "_link") for joint in joints]
+    clip = robot(n_joints=29) | {"link_body_list": ["pelvis", *bodies, "head"]}
+    motion = read(pickle.dumps(clip))
+    assert motion.skeleton.joint_names == joints
+    assert motion.metadata["x-robot"] == "unitree-g1-29"
+    note = read(pickle.dumps(robot(n_joints=29))).metadata["source-note"]
+    assert note == "the joints may be those of unitree-g1-29, if arrays names it"
+    clip["link_body_list"] = ["pelvis", *bodies[::-1]]  # the order of another robot
+    assert "x-robot" not in read(pickle.dumps(clip)).metadata
+
+
+def test_a_single_clip_and_several() -> None:
+    clip = robot()
+    motion = read(pickle.dumps({"day/walk": clip}))
+    assert motion.metadata["x-clip"] == "day/walk" and motion.n_frames == 60
+    assert read(pickle.dumps([[clip]])).n_frames == 60
+    with pytest.raises(SourceError, match="2 clips.*'a' and 'b'.*split it in Python"):
+        read(pickle.dumps({"a": clip, "b": robot(20)}))
+    with pytest.raises(SourceError, match="2 clips"):
+        read(pickle.dumps([clip, robot(20)]))
+
+
+def test_array_of_objects() -> None:
+    buffer = io.BytesIO()
+    np.save(buffer, np.array(robot(), object), allow_pickle=True)
+    motion = FORMATS["npy"].read(buffer.getvalue(), "walk")
+    assert FORMATS["npy"].write(motion) == buffer.getvalue()
+    assert [signal.name for signal in motion.signals][1] == "root_pos"
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        part = file.only_clip().source_bytes((5, 9))
+    again = np.load(io.BytesIO(part), allow_pickle=True).item()
+    np.testing.assert_array_equal(again["dof_pos"], robot()["dof_pos"][5:9])
+    listed = arrays_of(motion.source, [signal.name for signal in motion.signals]) or []
+    assert [row["name"] for row in listed][:2] == ["root_pos", "root_rot"]
+
+
+def test_listed_arrays() -> None:
+    motion = read(pickle.dumps({"walk": robot() | {"table": np.arange(3), "k": np.float64(2)}}))
+    listed = arrays_of(motion.source, [signal.name for signal in motion.signals])
+    assert listed is not None
+    by_name = {str(row["name"]): row for row in listed}
+    assert by_name["dof_pos"]["signal"] == "motion" and by_name["dof_pos"]["columns"] == 5
+    assert by_name["local_body_pos"]["type"] == "<f4"
+    assert by_name["table"]["signal"] is None and by_name["k"]["signal"] is None
+
+
+def test_joblib_by_hand_and_by_joblib(tmp_path: Any) -> None:
+    clip = {name: value for name, value in robot().items() if isinstance(value, np.ndarray)}
+    data = joblib_file({"walk": clip})
+    motion = read(data)
+    assert motion.n_frames == 60 and motion.metadata["x-clip"] == "walk"
+    joblib = pytest.importorskip("joblib")
+    np.testing.assert_array_equal(joblib.load(io.BytesIO(data))["walk"]["dof_pos"], motion.values)
+    path = tmp_path / "walk.pkl"
+    joblib.dump({"walk": robot()}, path)
+    motion = read(path.read_bytes())
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        path.write_bytes(file.only_clip().source_bytes((5, 9)))
+    again = joblib.load(path)["walk"]
+    np.testing.assert_array_equal(again["local_body_pos"], robot()["local_body_pos"][5:9])
+    for method in ("zlib", "gzip", "bz2", "xz", "lzma"):
+        joblib.dump(robot(), path, compress=(method, 3))
+        with pytest.raises(SourceError, match=f"compressed by {method}; .* write it plain"):
+            read(path.read_bytes())
+        assert FORMATS["pickle"].is_motion is not None
+        assert FORMATS["pickle"].is_motion(path.read_bytes())
+
+
+def test_bytes_as_text_are_refused_by_name() -> None:
+    for protocol in (0, 1, 2):
+        with pytest.raises(SourceError, match="written as text, as protocols 0 to 2"):
+            read(pickle.dumps(robot(), protocol))
+
+
+def test_formats_of_pickles() -> None:
+    data = pickle.dumps(robot())
+    assert likely_formats(data) == ("pickle",)
+    assert format_of("a.PKL").name == format_of("a.joblib").name == "pickle"
+    is_motion = FORMATS["pickle"].is_motion
+    assert is_motion is not None
+    assert is_motion(data) and is_motion(data[:300])
+    assert not is_motion(pickle.dumps({"a": 1}))
+    assert not is_motion(pickle.dumps((np.zeros((3, 3)), subprocess.Popen)))
+
+
+def test_bytes_of_two_arrays_and_other_oddities() -> None:
+    """Arrays that share bytes, other orders of axes, structures and texts stay as they are."""
+    a = floats(9, 4)
+    odd = {
+        "dof_pos": a,
+        "same": a,
+        "turned": floats(3, 4, 9).transpose(1, 2, 0),
+        "words": np.array(["a", "bc"]),
+        "pairs": np.zeros(9, [("a", "f4"), ("b", "i2")]),
+        "complex": np.zeros(9, complex),
+        "empty": np.zeros((0, 4)),
+        "none": None,
+        "deep": [[[{"x": OrderedDict(y=(1, 2))}]]],
+        "large": 10**400,
+        "set": {1, 2},
+        "frozen": frozenset("ab"),
+        "bytes": b"abc",
+        "nan": float("nan"),
+        "times": np.arange(9) / 10,
+    }
+    motion = read(pickle.dumps(odd))
+    assert [signal.name for signal in motion.signals] == ["motion", "times"]
+    assert motion.frame_rate == 10
+    assert read(pickle.dumps(odd, 5)).n_frames == 9
+    loop: list[Any] = [{"dof_pos": a}]
+    loop.append(loop)
+    assert read(pickle.dumps(loop)).n_frames == 9
+    assert (
+        read(pickle.dumps(odd) + b"more")
+        .metadata["source-note"]
+        .endswith("bytes follow the pickle")
+    )
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | arrays(),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.text(max_size=3), inner, max_size=4)
+        | st.tuples(inner, inner)
+    ),
+    max_leaves=8,
+)
+
+
+@given(st.dictionaries(st.text(max_size=6), VALUES, max_size=5), st.integers(0, 5), st.booleans())
+def test_any_structure_comes_back_or_is_refused(
+    given_: dict[str, Any], protocol: int, has_motion: bool
+) -> None:
+    if has_motion and protocol in PLAIN:
+        motion = read(pickle.dumps({"rest": given_, "dof_pos": floats(4, 2)}, protocol))
+        assert motion.n_frames >= 1
+    else:
+        back_or_refused(pickle.dumps(given_, protocol))
+
+
+class Call:
+    """An object that a pickle makes by a call."""
+
+    def __init__(self, function: Any, *arguments: Any) -> None:
+        self.call = function, arguments
+
+    def __reduce__(self) -> Any:
+        return self.call
+
+
+FUNCTIONS = [os.system, eval, exec, compile, open, getattr, __import__, print, subprocess.call]
+FUNCTIONS += [np.load, np.frombuffer, np.asarray, pickle.loads, bytearray, complex, range]
+MODULES = "os posix subprocess builtins __builtin__ sys importlib shutil socket ctypes pty "
+MODULES += (
+    "torch._utils torch.storage numpy.testing numpy.lib.npyio numpy scipy.sparse chumpy pathlib"
+)
+WORDS = "system popen Popen eval exec load loads _rebuild_tensor_v2 matrix core.multiarray x"
+TEXTS = [f"c{module}\n{word}\n" for module in MODULES.split() for word in WORDS.split()]
+HEAD = pickle.dumps({"dof_pos": floats(4, 2)}, 4)
+
+
+@pytest.mark.parametrize("function", FUNCTIONS, ids=str)
+def test_calls_are_refused_by_name(function: Any) -> None:
+    for protocol in range(6):
+        for value in (
+            Call(function, "echo pwned > pwned"),
+            {"a": floats(4, 2), "b": Call(function)},
+        ):
+            with pytest.raises(SourceError, match="is never called|written as text") as error:
+                read(pickle.dumps(value, protocol))
+            assert function.__name__ in str(error.value) or protocol < 3
+    assert not Path("pwned").exists()
+
+
+def test_names_are_refused() -> None:
+    for text in TEXTS:
+        for tail in (b".", b"(S'echo'\ntR.", b")R.", b")\x81.", b")}\x92.", b"(o.", b"N."):
+            with pytest.raises(SourceError):
+                read(text.encode() + tail)
+        with pytest.raises(SourceError):
+            read(b"\x80\x04(" + text.encode() + b"l.")
+    for opcode in (b"ios\nsystem\n", b"\x82\1", b"\x83\1\0", b"\x84\1\0\0\0", b"Pid\n", b"NQ"):
+        with pytest.raises(SourceError, match="is never obeyed"):
+            read(b"(" + opcode + b".")
+    for opcode in (b"\x97", b"N\x98"):
+        with pytest.raises(SourceError, match="is never obeyed"):
+            read(b"\x80\5" + opcode + b".")
+
+
+NEST = 40_000
+BOMBS = {
+    "deep lists": b"]" * NEST + b"a" * (NEST - 1) + b".",
+    "deep tuples": b")" + b"\x85" * NEST + b".",
+    "deep dictionaries": b"}" + b"X\1\0\0\0a}" * NEST + b"s" * NEST + b".",
+    "tuple as a key": b"}" + b")" + b"\x85" * NEST + b"Ns.",
+    "doubled lists": b"]q\0" + b"]h\0ah\0aq\0" * NEST + b".",
+    "doubled memos": b")q\0" + b"h\0h\0\x86q\0" * NEST + b".",
+    "doubled tuples": b")" + b"2\x86" * NEST + b".",
+    "list in itself": b"]q\0h\0ah\0ah\0a.",
+    "a large length": b"\x80\4\x8e\xff\xff\xff\xff\xff\xff\xff\x7f.",
+    "a large frame": b"\x80\4\x95\xff\xff\xff\xff\xff\xff\xff\x7f.",
+    "a negative length": b"T\xff\xff\xff\xff.",
+    "a long integer": b"\x8b" + struct.pack("<i", 2**20) + b"\x7f" * 2**20 + b".",
+    "a printed integer": b"L" + b"9" * 2**20 + b"L\n.",
+    "a printed float": b"F" + b"9" * 2**20 + b"\n.",
+    "a place of the memo": b"Np" + b"9" * 2**20 + b"\n.",
+    "marks": b"(" * 2**20 + b".",
+    "numbers": b"K\1" * 2**17 + b".",
+    "many names": b"}(" + b"X\2\0\0\0ab]" * 50_000 + b"u.",
+    "shared names": b"](" + b"X\xc8\0\0\0" + b"a" * 200 + b"q\0" + b"h\0" * 50_000 + b"e.",
+    "shared shapes": (b"(" + b"K\1" * 50_000 + b"tq\0(" + b"h\0" * 50_000 + b"l."),
+    "no text": b"X\2\0\0\0\xff\xff.",
+    "an escape": b"V\\u00\n.",
+    "no quotes": b"Sabc\n.",
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_bombs_take_what_their_bytes_earn(name: str) -> None:
+    tracemalloc.start()
+    try:
+        with pytest.raises(SourceError):
+            read(BOMBS[name])
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < LIMIT + 150 * len(BOMBS[name])
+
+
+def test_damaged_files_are_restored_or_refused() -> None:
+    """Every prefix, every byte changed in turn, and every byte left out."""
+    clip = {"fps": 30, "dof_pos": floats(4, 2), "root_pos": floats(4, 3), "dof_names": ["a", "b"]}
+    files = [pickle.dumps(clip, protocol) for protocol in range(6)] + [joblib_file({"a": clip})]
+    n_tried = 0
+    for data in files:
+        for at in range(len(data)):
+            back_or_refused(data[:at])
+            back_or_refused(data[:at] + data[at + 1 :])
+            for bit in (0, 7):
+                back_or_refused(data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :])
+            n_tried += 4
+    assert n_tried > 700
+
+
+@given(st.data())
+def test_spliced_files_are_restored_or_refused(data: st.DataObject) -> None:
+    file = data.draw(st.sampled_from([HEAD, pickle.dumps(robot(4), 5), joblib_file(robot(4))]))
+    other = data.draw(st.sampled_from([HEAD, file]) | st.binary(max_size=40))
+    at, to = (data.draw(st.integers(0, len(file))) for _ in range(2))
+    back_or_refused(file[:at] + other + file[to:])
