@@ -77,8 +77,9 @@ def test_a_clip_of_a_robot(protocol: int) -> None:
     assert labels[3][:4] == ["pelvis 0", "pelvis 1", "pelvis 2", "left_hip_link 0"]
 
 
-@pytest.mark.parametrize("protocol", PLAIN)
-@pytest.mark.parametrize("n_frames", [40, 300, 70_000])
+@pytest.mark.parametrize(
+    ("protocol", "n_frames"), [(3, 40), (4, 40), (5, 40), (3, 300), (4, 300), (5, 300), (4, 70_000)]
+)
 def test_frames_of_a_pickle_are_a_pickle(protocol: int, n_frames: int) -> None:
     clip = robot(n_frames) | {"contact": floats(n_frames, 1) > 0, "who": np.array("A")}
     clip["dof_pos"] = np.asfortranarray(clip["dof_pos"])
@@ -100,7 +101,7 @@ def test_names_of_a_known_robot() -> None:
     assert motion.skeleton.joint_names == joints
     assert motion.metadata["x-robot"] == "unitree-g1-29"
     note = read(pickle.dumps(robot(n_joints=29))).metadata["source-note"]
-    assert note == "the joints may be those of unitree-g1-29, if arrays names it"
+    assert note == "the columns may be those of unitree-g1-29, if arrays names it"
     clip["link_body_list"] = ["pelvis", *bodies[::-1]]  # the order of another robot
     assert "x-robot" not in read(pickle.dumps(clip)).metadata
 
@@ -288,7 +289,7 @@ def test_names_are_refused() -> None:
             read(b"\x80\5" + opcode + b".")
 
 
-NEST = 40_000
+NEST = 20_000
 BOMBS = {
     "deep lists": b"]" * NEST + b"a" * (NEST - 1) + b".",
     "deep tuples": b")" + b"\x85" * NEST + b".",
@@ -305,8 +306,8 @@ BOMBS = {
     "a printed integer": b"L" + b"9" * 2**20 + b"L\n.",
     "a printed float": b"F" + b"9" * 2**20 + b"\n.",
     "a place of the memo": b"Np" + b"9" * 2**20 + b"\n.",
-    "marks": b"(" * 2**20 + b".",
-    "numbers": b"K\1" * 2**17 + b".",
+    "marks": b"(" * 2**16 + b".",
+    "numbers": b"K\1" * 2**15 + b".",
     "many names": b"}(" + b"X\2\0\0\0ab]" * 50_000 + b"u.",
     "shared names": b"](" + b"X\xc8\0\0\0" + b"a" * 200 + b"q\0" + b"h\0" * 50_000 + b"e.",
     "shared shapes": (b"(" + b"K\1" * 50_000 + b"tq\0(" + b"h\0" * 50_000 + b"l."),
@@ -331,7 +332,8 @@ def test_bombs_take_what_their_bytes_earn(name: str) -> None:
 def test_damaged_files_are_restored_or_refused() -> None:
     """Every prefix, every byte changed in turn, and every byte left out."""
     clip = {"fps": 30, "dof_pos": floats(4, 2), "root_pos": floats(4, 3), "dof_names": ["a", "b"]}
-    files = [pickle.dumps(clip, protocol) for protocol in range(6)] + [joblib_file({"a": clip})]
+    files = [pickle.dumps(clip, protocol) for protocol in (0, 2, 4, 5)]
+    files.append(joblib_file({"a": clip}))
     n_tried = 0
     for data in files:
         for at in range(len(data)):
@@ -349,3 +351,8 @@ def test_spliced_files_are_restored_or_refused(data: st.DataObject) -> None:
     other = data.draw(st.sampled_from([HEAD, file]) | st.binary(max_size=40))
     at, to = (data.draw(st.integers(0, len(file))) for _ in range(2))
     back_or_refused(file[:at] + other + file[to:])
+
+
+def test_opcodes_are_bounded() -> None:
+    with pytest.raises(SourceError, match="more than 1048576 opcodes"):
+        read(b"N" * 2**21 + b".")

@@ -32,7 +32,7 @@ from mcz.hints import Hint, Remark
 from mcz.kinematics.rest_pose import height_note
 from mcz.model import threads
 from mcz.model.clock import SAME_RATE
-from mcz.model.motion import Skeleton
+from mcz.model.motion import Motion, Skeleton
 from mcz.model.types import Params, Progress
 from mcz.model.units import in_unit
 from mcz.sources import Format, format_of, wants_skeleton
@@ -146,8 +146,8 @@ class SourceEncoder:
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
         taken = read_motion(self.path, given, self.options.unit, data, flat=self.options.flat)
-        self._keep_notes(taken)
         motion = self.options.applied_to(taken.motion)
+        self._keep_notes(taken, motion)
         notes = rate_notes(taken.motion.frame_rate, self.options)
         self.notes += tuple(filter(None, [*notes, height_note(motion.skeleton)]))
         if motion.source is not None:
@@ -161,10 +161,11 @@ class SourceEncoder:
         self.quality = write_motion(writer, prepared, codec, params, progress)
         return "parsed"
 
-    def _keep_notes(self, taken: ReadMotion) -> None:
+    def _keep_notes(self, taken: ReadMotion, motion: Motion) -> None:
+        """Keep what is odd about a file once the options have told what it left open."""
         self.remark = taken.remark
         keys = ("source-note", *(() if taken.skeleton is not None else (NOTE,)))
-        found = (taken.motion.metadata.get(key, "") for key in keys)
+        found = (motion.metadata.get(key, "") for key in keys)
         self.notes = tuple(filter(None, found))
         if taken.chosen is not None and taken.chosen.path is not None:
             self.inputs.append(taken.chosen.path)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mcz.model.motion import Channel
 from mcz.sources.arrays.columns import Array
-from mcz.sources.robots import quaternion_order, robot_layouts
+from mcz.sources.robots import NOTE, quaternion_order, robot_layouts
 
 JOINT_NAMES = ("joint_names", "dof_names")
 BODY_NAMES = ("body_names", "link_names", "link_body_list")
@@ -66,9 +66,9 @@ def joint_names(arrays: Sequence[Array], n_joints: int) -> tuple[tuple[str, ...]
         stems = [joint.removesuffix("_joint") for joint in layout.joints]
         common = [body for body in bodies if body in stems]
         if len(common) >= ALIKE * n_joints and common == [s for s in stems if s in common]:
-            return layout.joints, name, f"the joints are those of {name}, which has these bodies"
+            return layout.joints, name, ""
     robots = " or ".join(layouts)
-    return (), "", f"the joints may be those of {robots}, if arrays names it" if robots else ""
+    return (), "", f"{NOTE}may be those of {robots}, if arrays names it" if robots else ""
 
 
 def robot_channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...] | None:
