@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from mcz.files.writing.file import Written
 
 
+FORMAT_NAMES = ("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "mvnx")
+FORMAT_NAMES += ("npy", "npz", "pickle")
+
+
 @click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npz or .pkl.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.argument("more", metavar="", nargs=-1, type=click.Path(readable=False))
@@ -58,9 +62,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(
-        ("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "npy", "npz", "pickle")
-    ),
+    type=click.Choice(FORMAT_NAMES),
     help="Set the format of standard input. Default: detect it from the content; for live input "
     "BVH, or AMC with --skeleton.",
 )
@@ -80,9 +82,10 @@ def encode_command(
     format_name: str | None,
     **options: Any,
 ) -> Exit:
-    """Encode SRC (.bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npy, .npz, .pkl) into OUT.mcz.
+    """Encode SRC into OUT.mcz.
 
-    An ASF gives an .mcz with only a skeleton.
+    SRC is a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .mvnx, .npy, .npz or .pkl. An ASF gives
+    an .mcz with only a skeleton.
 
     Use - as SRC to read standard input. Codecs that work frame by frame (lsdt-frame, or posewave
     with levels=0) then write each frame of a BVH or AMC before reading the next. Their default

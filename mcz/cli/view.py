@@ -120,8 +120,8 @@ LOOPBACK = "127.0.0.1"
 def view_command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
     """Show motions in the browser: files, folders of them, URLs of an .mcz.
 
-    Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot, .sto, .npy, .npz and .pkl. Files without
-    points appear as curves.
+    Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot, .sto, .mvnx, .npy, .npz and .pkl.
+    Files without points appear as curves.
 
     A local server serves the page and the files to this machine only, at an unguessable address. It
     ends some seconds after the last page is closed, or at Ctrl-C.

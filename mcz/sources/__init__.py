@@ -159,6 +159,16 @@ FORMATS: dict[str, Format] = {
                 (10, "vicon", "tables.csv_files", ""),
             )
         ),
+        Format(
+            "mvnx",
+            16,
+            (".mvnx",),
+            _of("tables.mvnx", "read"),
+            _of("tables.mvnx", "write"),
+            _of("tables.source", "join_table_notes"),
+            states_rate=True,
+            restate=_of("stated_rates", "restate_table"),
+        ),
         *(
             Format(
                 name,
@@ -244,6 +254,8 @@ def likely_formats(data: bytes) -> tuple[str, ...]:
         return ("c3d",)
     if re.match(rb"PATHFILETYPE[ \t]", start):
         return ("trc",)
+    if start.startswith(b"<") and _of("tables.mvnx_header", "is_mvnx")(head):
+        return ("mvnx",)
     small = head.lower()
     # words first: an expression anchored to lines is far slower
     if b"endheader" in small and re.search(rb"(?m)^[ \t]*endheader[ \t]*\r?$", small):

@@ -44,6 +44,7 @@ _MOTIVE = re.compile(rb'(?i),"?(?:Capture|Export) Frame Rate"?,"?([0-9.]+)')
 _VICON = re.compile(  # two lines above that of the axes
     rb'(?im)^"?([0-9.]+)[^\r\n]*\r?\n[^\n]*\n[ \t]*"?Frame"?[,;\t][ \t]*"?Sub Frame'
 )
+_MVNX = re.compile(rb"<subject\s[^<>]*?\bframeRate\s*=\s*[\"']([0-9.]+)[\"']")
 _PHRASE_MARKS = re.compile(b"[" + re.escape(bytes(PHRASES)) + b"]")
 _WORDS = re.compile(rb"[^\t ]+")
 
@@ -121,7 +122,7 @@ def restate_table(template: bytes, rate: Fraction) -> Restated | None:
     if first is None:
         return None
     clock = parsed_clock(first)
-    stated = _vicon_rate(first) if clock is None else clock.frames_a_second(rate)
+    stated = _header_rate(first) if clock is None else clock.frames_a_second(rate)
     if stated is None:
         return None
     factor = rate / stated
@@ -145,14 +146,17 @@ def _text(section: SectionFields) -> bytes:
     return _PHRASE_MARKS.sub(lambda mark: PHRASES[mark[0][0]], header)
 
 
-def _vicon_rate(section: SectionFields) -> Fraction | None:
-    match = _VICON.search(_text(section))
+def _header_rate(section: SectionFields) -> Fraction | None:
+    """The rate that the header of a Vicon or MVNX file states."""
+    text = _text(section)
+    match = _VICON.search(text) or _MVNX.search(text)
     return stated_rate(match[1].decode("latin-1")) if match else None
 
 
 def _in_header(header: bytes, factor: Fraction) -> bytes:
     """``header`` with all rates of the recording that it states multiplied."""
-    places = [found.span(1) for found in (*_MOTIVE.finditer(header), *_VICON.finditer(header))]
+    patterns = _MOTIVE, _VICON, _MVNX
+    places = [found.span(1) for pattern in patterns for found in pattern.finditer(header)]
     keys = _TRC_KEYS.search(header)
     if keys is not None:
         values = [match.span() for match in _WORDS.finditer(header, *keys.span(2))]

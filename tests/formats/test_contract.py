@@ -19,10 +19,12 @@ from mcz.sources import FORMATS, likely_formats
 from mcz.sources.tables.source import join_table_notes
 from tests.formats.c3d_files import c3d_files, make_c3d
 from tests.formats.csv_files import column_files, motive_files, vicon_files
+from tests.formats.mvnx_files import mvnx_files
 from tests.formats.saved_arrays import archives, arrays, save_npz
 from tests.formats.tab_files import storage_files, trc_files
 from tests.formats.text_files import AMC, ASF, ASF_OF_ALL_KINDS, BVH, amc_texts, bvh_texts
 from tools.vectors.build.array_files import floats, npy, plain_npz
+from tools.vectors.build.mvnx_files import MvnxFile
 from tools.vectors.build.table_files import (
     COLUMNS,
     DEVICES,
@@ -36,6 +38,7 @@ from tools.vectors.build.table_files import (
 )
 
 SKELETON = FORMATS["asf"].read(ASF, "small")
+MVNX = MvnxFile(n_frames=3).text()
 C3D = make_c3d(2, 1, 1, size=2, tail=b"\1").build()
 
 
@@ -95,6 +98,7 @@ CASES = {
     "sto": Case("sto", (QUATERNIONS,), storage_files(), step=5),
     "mot": Case("mot", (FORCES,), storage_files(), step=5),
     "csv": Case("csv", TABLES, motive_files() | vicon_files() | column_files(), step=17),
+    "mvnx": Case("mvnx", (MVNX,), mvnx_files(), step=29),
     "npy": Case("npy", (npy(floats(4, 3)),), arrays().map(saved_array)),
     "pickle": Case("pickle", (pickled(floats(4, 3)),), arrays().map(pickled)),
     "npz": Case("npz", (plain_npz({"a": floats(3, 2)}), save_npz(a=floats(2, 2))), archives()),

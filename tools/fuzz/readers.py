@@ -23,6 +23,7 @@ from mcz.sources.text.source import Floats
 from tools.fuzz.guard import hold
 from tools.fuzz.seeds import sources
 from tools.vectors.build import table_files
+from tools.vectors.build.mvnx_files import MvnxFile
 
 FRAMES = 3  # of a sample, as a seed
 STORED = 3  # one of so many motions that are read is stored, too, which takes long
@@ -60,6 +61,12 @@ WORDS = {
         "POINT ANALOG USED SCALE RATE DATA_START FRAMES LABELS LABELS2 DESCRIPTIONS UNITS OFFSET "
         "GEN_SCALE FORMAT UNSIGNED SIGNED TRIAL ACTUAL_START_FIELD ACTUAL_END_FIELD EVENT "
         "\\x02\\x50 \\x54 \\x55 \\x56 \\xff\\xff \\x00\\x80 \\x00\\x00\\x80\\x3f"
+    ),
+    "mvnx": (
+        "<!DOCTYPE|mvnx|[<!ENTITY|a|'b'>]> <mvnx> <subject|frameRate='60'> <segments> <frames> "
+        "</frames> <frame|type='normal'> </frame> <orientation> </orientation> <position> "
+        "</position> <![CDATA[ ]]> <!-- --> <?a?> &a; &#48; index='7' time='17' tc='10:00:00;01' "
+        "label='Pelvis' nan \\x0d\\x0a"
     ),
     "trc": (
         "PathFileType DataRate CameraRate NumFrames NumMarkers Units Frame# Time X1 Y1 Z1 mm m "
@@ -99,6 +106,8 @@ def _sample(name: str) -> bytes:
         return asf.write(acclaim_walk().skeleton)
     if name == "csv":
         return table_files.VICON
+    if name == "mvnx":
+        return MvnxFile(n_frames=FRAMES).text()
     walk = {"amc": acclaim_walk, "c3d": marker_walk, "trc": marker_walk}.get(name, bvh_walk)()
     signal = walk.signals[0]
     mask = None if signal.mask is None else signal.mask[:FRAMES]
@@ -148,6 +157,10 @@ def check_mot(data: bytes) -> bool:
 
 def check_sto(data: bytes) -> bool:
     return _check("sto", data)
+
+
+def check_mvnx(data: bytes) -> bool:
+    return _check("mvnx", data)
 
 
 def check_csv(data: bytes) -> bool:

@@ -81,6 +81,7 @@ TARGETS: dict[str, Target] = {
         _reader("mot", readers.check_mot),
         _reader("sto", readers.check_sto),
         _reader("csv", readers.check_csv),
+        _reader("mvnx", readers.check_mvnx),
         _reader("npy", readers.check_npy),
         _reader("npz", readers.check_npz),
         _reader("pickle", readers.check_pickle),

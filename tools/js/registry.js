@@ -29,6 +29,7 @@ const SOURCE_FORMATS = new Map([
   [12, { name: "npy", of: "clip", kind: "arrays" }],
   [13, { name: "npz", of: "clip", kind: "arrays" }],
   [14, { name: "pickle", of: "clip", kind: "arrays" }],
+  [16, { name: "mvnx", of: "clip", kind: "table" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

@@ -8,7 +8,13 @@ from typing import NamedTuple
 
 from mcz.kernels.types import Bytes, Ints
 
-WORDS, FULL, BLANKS, FREE = -1, 0, 1, 2  # kinds of tokens in a row, see text_kernels.match_rows
+MARKUP, WORDS, FULL, BLANKS, FREE = (
+    -2,
+    -1,
+    0,
+    1,
+    2,
+)  # kinds of tokens in a row, see text_kernels.match_rows
 
 
 class Items(NamedTuple):

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from mcz.kernels import eight_bytes, kernel, put_eight_bytes
 from mcz.kernels.types import Bytes, Ints, Ints2
-from mcz.sources.text import BLANKS, FREE, WORDS, Items
+from mcz.sources.text import BLANKS, FREE, MARKUP, WORDS, Items
 
-BLANK, QUOTE, COMMA, SEMICOLON = 0x20, 0x22, 0x2C, 0x3B
+BLANK, QUOTE, COMMA, SEMICOLON, LESS = 0x20, 0x22, 0x2C, 0x3B, 0x3C
 MINUS, PLUS, HASH, ZERO, NINE, LF = 0x2D, 0x2B, 0x23, 0x30, 0x39, 0x0A
 
 
@@ -26,6 +26,10 @@ def _is_at(text: Bytes, at: int, gaps: Bytes, start: int, stop: int) -> bool:
 def _token_end(text: Bytes, at: int, cells: int) -> int:
     if cells == WORDS:
         while at < len(text) and text[at] > BLANK:
+            at += 1
+        return at
+    if cells == MARKUP:
+        while at < len(text) and text[at] > BLANK and text[at] != QUOTE and text[at] != LESS:
             at += 1
         return at
     while at < len(text):
@@ -140,9 +144,9 @@ def match_rows(
 
     ``cells``: what a token is. One of ``WORDS`` ends at a blank. Those of tables end at separators
     and quotes, too: none is empty where ``FULL``, all but the first may be where ``BLANKS``, and
-    all where ``FREE``. Fills ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,).
-    Returns the row and the offset of the first row that does not match, or for which there is no
-    room.
+    all where ``FREE``. One of ``MARKUP`` ends at a blank, quote or tag, and is not empty. Fills
+    ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,). Returns the row and the
+    offset of the first row that does not match, or for which there is no room.
     """
     columns = items.columns
     numbered = cells == WORDS and len(columns) > 0 and columns[0] == -1

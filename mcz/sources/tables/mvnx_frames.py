@@ -1,0 +1,242 @@
+"""The frames of an MVNX file: where their numbers are, and the columns that these become.
+
+A frame is a tag with attributes, elements of text, and nothing else: no comment, no element in
+another, no CDATA. The tags and blanks between the numbers are gaps of a row.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from mcz.errors import SourceError
+from mcz.model.skeleton import POSITION_KINDS, QUATERNION_KINDS
+from mcz.sources.tables.csv_files import MAX_COLUMNS
+from mcz.sources.text import MARKUP
+from mcz.sources.text.layout import FRAME_NUMBER
+from mcz.sources.text.notes import FRAME_NUMBER_TEXT
+from mcz.sources.text.rows import DENSE, Rows, Token, line_of, read_rows
+
+POSITION, ORIENTATION = "position", "orientation"
+INDEX, TIME, TYPE = "@index", "@time", "@type"  # @: an attribute of frames
+NORMAL = (b"normal", b"")  # types of frames of motion
+END = b"</frame>"
+MOST_PARTS = 64  # elements and attributes of a frame
+
+_NAME = rb"[A-Za-z_][\w.-]*"
+_VALUE = rb"\s*=\s*(?:\"(?P<double>[^\"<]*)\"|'(?P<single>[^'<]*)')"
+_ATTRIBUTE = re.compile(rb"\s+(?P<name>" + _NAME + rb")" + _VALUE)
+_FRAME = re.compile(rb"<frame((?:\s+" + _NAME + rb"\s*=\s*(?:\"[^\"<]*\"|'[^'<]*'))*)\s*>")
+_FRAMES = re.compile(rb"<frames(?:\s[^<>]*)?>\s*")
+_ELEMENT = re.compile(rb"\s*<(" + _NAME + rb")(?:\s[^<>]*)?(?:/>|>([^<]*)</\1\s*>)")
+_CONTENT = re.compile(rb"<(" + _NAME + rb")(?:\s[^<>]*)?>([^<]*)</")
+_CLOSED = re.compile(rb"\s*</frame>\s*")
+_BLANKS = re.compile(rb"\s*")
+_WORDS = re.compile(rb"\S+")
+_NUMBERS = re.compile(rb"(?i)\s*[-+]?(?:\.?[0-9]|nan|inf)")
+
+Part = tuple[str, list[tuple[int, int]]]  # an element or attribute, and where its tokens are
+
+
+class _WiderError(Exception):
+    """A frame has other elements than the first, or more numbers in one."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameColumns:
+    """The columns of each part of a frame: of the motion, other elements, attributes, the time.
+
+    ``kinds``: of the channels of each of ``n_segments`` segments.
+    """
+
+    columns: Mapping[str, Sequence[int]]
+    kinds: tuple[str, ...]
+    n_segments: int
+    n_columns: int
+
+    @property
+    def n_motion(self) -> int:
+        """Columns of the motion, which are the first ones."""
+        return self.n_segments * len(self.kinds)
+
+    @property
+    def elements(self) -> list[str]:
+        """The elements that are no part of the motion."""
+        return [name for name in self.columns if name[0] != "@" and name not in _KINDS]
+
+    @property
+    def attributes(self) -> list[str]:
+        """The attributes but for the time and the number of the frame."""
+        names = [name for name in self.columns if name[0] == "@" and name != TIME]
+        return [name for name in names if self.column(name) != FRAME_NUMBER]
+
+    @property
+    def first_attribute(self) -> int:
+        """The column of the first of these."""
+        return self.n_motion + sum(len(self.columns[name]) for name in self.elements)
+
+    def column(self, name: str) -> int:
+        """The column of an attribute."""
+        return self.columns[name][0]
+
+
+_KINDS = {POSITION: POSITION_KINDS, ORIENTATION: QUATERNION_KINDS}
+
+
+def first_frame(data: bytes, at: int) -> int:
+    """The offset of the first frame of motion, after those of calibration; SourceError for none.
+
+    ``at``: the offset of the element ``frames``.
+    """
+    opened = _FRAMES.match(data, at)
+    if opened is None:
+        raise SourceError("no plain tag of the element 'frames'", line=line_of(data, at))
+    at = opened.end()
+    while True:
+        frame = _FRAME.match(data, at)
+        if frame is None:
+            raise SourceError(f"no frame of motion: {data[at : at + 40]!r}", line=line_of(data, at))
+        span = _attributes(data, *frame.span(1)).get(TYPE, (0, 0))
+        if data[slice(*span)] in NORMAL:
+            return at
+        end = data.find(END, at)
+        if end < 0:
+            raise SourceError("cut off in a frame of calibration", line=line_of(data, at))
+        at = _BLANKS.match(data, end + len(END)).end()  # type: ignore[union-attr]  # nothing, too
+
+
+def read_frames(data: bytes, at: int) -> tuple[Rows, FrameColumns]:
+    """Read the frames from offset ``at`` to the end of ``data``; SourceError for anything else."""
+    first, _ = _parts(data, at)
+    sizes = {name: len(tokens) for name, tokens in first if tokens}
+    numbered = any(
+        name == INDEX and FRAME_NUMBER_TEXT.fullmatch(data, *tokens[0]) for name, tokens in first
+    )
+    try:
+        return _read(data, at, columns_of(sizes, numbered))
+    except _WiderError:
+        sizes = _all_sizes(data, at)
+        return _read(data, at, columns_of(sizes, numbered))
+
+
+def _read(data: bytes, at: int, columns: FrameColumns) -> tuple[Rows, FrameColumns]:
+    return read_rows(
+        data, at, columns.n_columns, _frames(data, columns), MARKUP, room=DENSE
+    ), columns
+
+
+def _frames(data: bytes, columns: FrameColumns) -> Callable[[int], tuple[list[Token], int] | None]:
+    """The tokens of the frame at an offset; see ``rows.Frames``."""
+
+    def read_frame(at: int) -> tuple[list[Token], int] | None:
+        if at >= len(data):
+            return None
+        parts, end = _parts(data, at)
+        tokens: list[Token] = []
+        for name, spans in parts:
+            places = columns.columns.get(name, ())
+            if len(places) < len(spans):
+                raise _WiderError
+            if places and not spans:
+                raise SourceError(f"words in {name!r}, not numbers", line=line_of(data, at))
+            tokens += [(*span, place) for span, place in zip(spans, places, strict=False)]
+        return tokens, end
+
+    return read_frame
+
+
+def _parts(data: bytes, at: int) -> tuple[list[Part], int]:
+    """The parts of the frame at an offset that are not blank, and where it ends.
+
+    An element of words has no tokens.
+    """
+    opened = _FRAME.match(data, at)
+    if opened is None:
+        raise SourceError(f"no frame: {data[at : at + 40]!r}", line=line_of(data, at))
+    parts: list[Part] = [
+        (name, [span])
+        for name, span in _attributes(data, *opened.span(1)).items()
+        if name != TYPE and span[0] < span[1]
+    ]
+    at = opened.end()
+    while (element := _ELEMENT.match(data, at)) is not None:
+        span = element.span(2)
+        if _NUMBERS.match(data, *span):
+            words = islice(_WORDS.finditer(data, *span), MAX_COLUMNS + 1)
+            parts.append((element[1].decode(), [word.span() for word in words]))
+        elif span[0] < span[1] and not data[slice(*span)].isspace():
+            parts.append((element[1].decode(), []))
+        if len(parts) > MOST_PARTS:
+            raise SourceError(
+                f"a frame has more than {MOST_PARTS} elements and attributes",
+                line=line_of(data, at),
+            )
+        at = element.end()
+    closed = _CLOSED.match(data, at)
+    if closed is None:
+        what = f"{data[at : at + 40].lstrip()!r}"
+        raise SourceError(f"a frame is elements of text, and not {what}", line=line_of(data, at))
+    if len({name for name, _ in parts}) < len(parts):
+        raise SourceError("a frame has two elements of one name", line=line_of(data, at))
+    return parts, closed.end()
+
+
+def _attributes(data: bytes, start: int, stop: int) -> dict[str, tuple[int, int]]:
+    """The attributes of a frame, as ``@name``, and the place of each value."""
+    found: dict[str, tuple[int, int]] = {}
+    for match in _ATTRIBUTE.finditer(data, start, stop):
+        name = "@" + match["name"].decode()
+        if name in found:
+            raise SourceError("a frame has an attribute twice", line=line_of(data, start))
+        found[name] = match.span("single" if match["double"] is None else "double")
+    return found
+
+
+def _all_sizes(data: bytes, at: int) -> dict[str, int]:
+    """The most numbers of each part of any frame from offset ``at`` on."""
+    sizes: dict[str, int] = {}
+    for name, text in _all_parts(data, at):
+        sizes[name] = max(sizes.get(name, 0), len(text.split()) if name[0] != "@" else 1)
+        if len(sizes) > MOST_PARTS:
+            raise SourceError(f"frames have more than {MOST_PARTS} elements and attributes")
+    return sizes
+
+
+def _all_parts(data: bytes, at: int) -> Iterable[tuple[str, bytes]]:
+    for frame in _FRAME.finditer(data, at):
+        for name, span in _attributes(data, *frame.span(1)).items():
+            if name != TYPE and span[0] < span[1]:
+                yield name, b""
+    for element in _CONTENT.finditer(data, at):
+        if _NUMBERS.match(element[2]):
+            yield element[1].decode(), element[2]
+
+
+def columns_of(sizes: Mapping[str, int], numbered: bool) -> FrameColumns:
+    """The columns of parts of such sizes; ``numbered``: the index is the number of the frame."""
+    present = [name for name in _KINDS if name in sizes]
+    counts = {sizes[name] / len(_KINDS[name]) for name in present}
+    if len(counts) != 1 or (n_segments := counts.pop()) % 1:
+        found = ", ".join(f"{sizes[name]} numbers of {name}" for name in present) or "neither"
+        raise SourceError(f"positions and orientations of segments expected, found {found}")
+    kinds = tuple(kind for name in present for kind in _KINDS[name])
+    columns: dict[str, Sequence[int]] = {}
+    first = 0
+    for name in present:
+        own = range(first, first + len(_KINDS[name]))
+        columns[name] = [s * len(kinds) + k for s in range(int(n_segments)) for k in own]
+        first = own.stop
+    at = int(n_segments) * len(kinds)
+    elements = [name for name in sizes if name[0] != "@" and name not in _KINDS]
+    attributes = [name for name in sizes if name[0] == "@" and name != TIME]
+    for name in (*elements, *attributes, *([TIME] if TIME in sizes else [])):
+        if name == INDEX and numbered:
+            columns[name] = [FRAME_NUMBER]
+            continue
+        columns[name] = range(at, at + sizes[name])
+        at += sizes[name]
+    if at > MAX_COLUMNS:
+        raise SourceError(f"{at} numbers a frame, limit {MAX_COLUMNS}")
+    return FrameColumns(columns, kinds, int(n_segments), at)
