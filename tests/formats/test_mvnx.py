@@ -183,6 +183,26 @@ def test_every_prefix() -> None:
         assert bool(back_or_refused(text[:size])) == (size < last), size
 
 
+def test_a_frame_that_is_cut_off_is_kept_as_text() -> None:
+    motion = back(TEXT[: TEXT.rindex(b"<centerOfMass>")])
+    assert motion.n_frames == FILE.n_frames - 1
+    assert motion.metadata["source-note"] == "cut off in a frame, which is kept as text"
+    ended = back(replace(FILE, ending="").text())
+    assert ended.metadata["source-note"] == "no end of 'frames'"
+
+
+def test_encodings() -> None:
+    """The declared one is not asked for: Python has encodings that are none of bytes."""
+    text = replace(FILE, segments=("Füße", "Arm")).text()
+    old = text.decode().encode("latin-1")
+    cases = (text, None), (b"\xef\xbb\xbf" + text, None), (old, "latin-1")
+    for data, encoding in cases:
+        for declared in (b"UTF-8", b"ISO-8859-1", b"klingon", b"idna"):
+            motion = back(data.replace(b"UTF-8", declared))
+            assert motion.skeleton.joints[0].name == "Füße"
+            assert motion.metadata.get("name-encoding") == encoding
+
+
 DOCTYPE = b"<!DOCTYPE mvnx ["
 LAUGHS = b"".join(
     b"<!ENTITY l%d '%s'>" % (k, b"&l%d;" % (k - 1) * 10 if k else b"lol") for k in range(12)

@@ -86,7 +86,8 @@ def read(data: bytes, name: str = "motion") -> Motion:
     more += read_text(data, rows, list(texts.values()), labels, (first, 1))
     times = _times(data, rows, header, columns, texts)
     if not _ENDED.match(rest):
-        odd.append("the element 'frames' does not end")
+        is_cut = b"<frame" in rest
+        odd.append("cut off in a frame, which is kept as text" if is_cut else "no end of 'frames'")
     encoding, notes = text_encoding(data), [*odd, times.note]
     names = [joint.name for joint in joints]
     section = section_of(

@@ -95,14 +95,17 @@ def is_mvnx(head: bytes) -> bool:
 
 
 def read_header(data: bytes) -> Header:
-    """The header of an MVNX file; SourceError, with the number of the line, where it has none."""
+    """The header of an MVNX file; SourceError, with the number of the line, where it has none.
+
+    It is read as UTF-8, or else as Latin-1, whatever it declares.
+    """
     start = data[:MOST_BYTES]
     try:
-        return _Reader(start).read(None)
+        return _Reader(start).read("utf-8")
     except expat.ExpatError as error:
         if error.code != _INVALID:
             raise _refused(error) from None
-    try:  # bytes of a code page, though the declaration says UTF-8
+    try:
         return _Reader(start).read("iso-8859-1")
     except expat.ExpatError as error:
         raise _refused(error) from None
@@ -130,7 +133,7 @@ class _Reader:
         self._text: list[str] = []
         self._near: Place = ("", "")
 
-    def read(self, encoding: str | None) -> Header:
+    def read(self, encoding: str) -> Header:
         parser = expat.ParserCreate(encoding)
         parser.StartElementHandler = self._start
         parser.EndElementHandler = self._end
