@@ -42,10 +42,6 @@ if TYPE_CHECKING:
     from mcz.files.writing.file import Written
 
 
-FORMAT_NAMES = ("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "mvnx")
-FORMAT_NAMES += ("npy", "npz", "pickle")
-
-
 @click.command(short_help="Encode a .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npz or .pkl.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.argument("more", metavar="", nargs=-1, type=click.Path(readable=False))
@@ -62,7 +58,9 @@ FORMAT_NAMES += ("npy", "npz", "pickle")
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(FORMAT_NAMES),
+    type=click.Choice(
+        ("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "mvnx", "npy", "npz", "pickle")
+    ),
     help="Set the format of standard input. Default: detect it from the content; for live input "
     "BVH, or AMC with --skeleton.",
 )
