@@ -177,10 +177,13 @@ FORMATS: dict[str, Format] = {
                 _of("arrays.read", f"read_{name}"),
                 _of("arrays.read", "write_arrays"),
                 states_rate=name == "npz",
-                is_motion=_of("arrays.header", "is_motion"),
+                is_motion=_of(*is_motion),
                 arrays=_of("arrays.pickles" if name == "npy" else "arrays.layout", "list_arrays"),
             )
-            for format_id, name in ((12, "npy"), (13, "npz"))
+            for format_id, name, is_motion in (
+                (12, "npy", ("arrays.pickles", "is_npy_motion")),
+                (13, "npz", ("arrays.header", "is_motion")),
+            )
         ),
         Format(
             "pickle",

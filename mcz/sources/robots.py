@@ -86,15 +86,11 @@ def recognize_robot(motion: Motion) -> Motion:
 
 
 def _quaternion_order(values: Values) -> str:
-    """Order of the quaternion in the columns of the root, "xyzw" or "wxyz"; "" without one."""
-    return quaternion_order(values[:, N_POSITION:N_ROOT])
-
-
-def quaternion_order(parts: Values) -> str:
-    """Order of unit quaternions of a root, (rows, 4), "xyzw" or "wxyz"; "" of other numbers.
+    """Order of the quaternion in the columns of the root, "xyzw" or "wxyz"; "" without one.
 
     A robot mostly stands upright, and then two of x, y, z and w are near 0: x and y.
     """
+    parts = values[:, N_POSITION:N_ROOT]
     if parts.shape[1] < N_ROOT - N_POSITION or not len(parts):
         return ""
     if not (np.abs(np.linalg.norm(parts, axis=1) - 1) <= NORM_ERROR).all():  # NaN is none

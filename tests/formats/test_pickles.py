@@ -106,6 +106,18 @@ def test_names_of_a_known_robot() -> None:
     assert "x-robot" not in read(pickle.dumps(clip)).metadata
 
 
+def test_order_of_the_quaternion() -> None:
+    """x y z w, as programs of retargeting write it, unless the numbers show another order."""
+    for quaternion, is_named in (
+        ([0, 0, 0.6, 0.8], True),
+        ([0, 0.7, 0, 0.7], True),
+        ([1, 0, 0, 0], False),
+    ):
+        clip = robot() | {"root_rot": np.tile(np.array(quaternion, np.float64), (60, 1))}
+        channels = read(pickle.dumps(clip)).signals[2].channels or ()
+        assert (channels[0].name == "qx") == is_named
+
+
 def test_a_single_clip_and_several() -> None:
     clip = robot()
     motion = read(pickle.dumps({"day/walk": clip}))
@@ -129,6 +141,8 @@ def test_array_of_objects() -> None:
         part = file.only_clip().source_bytes((5, 9))
     again = np.load(io.BytesIO(part), allow_pickle=True).item()
     np.testing.assert_array_equal(again["dof_pos"], robot()["dof_pos"][5:9])
+    is_motion = FORMATS["npy"].is_motion
+    assert is_motion is not None and is_motion(buffer.getvalue()) and is_motion(part[:300])
     listed = arrays_of(motion.source, [signal.name for signal in motion.signals]) or []
     assert [row["name"] for row in listed][:2] == ["root_pos", "root_rot"]
 

@@ -19,6 +19,7 @@ from mcz.model.types import JsonObject
 from mcz.sources.arrays.archive import Archive, Field
 from mcz.sources.arrays.columns import MAX_TEXT, Array, array_of
 from mcz.sources.arrays.header import MAGIC, Head, read_head
+from mcz.sources.arrays.header import is_motion as is_array_motion
 from mcz.sources.arrays.layout import (
     SIZES,
     TYPES,
@@ -286,11 +287,17 @@ def _empty(piece: Piece, starts: Sequence[int], size: int) -> bytes:
     return piece.text or bytes(size)
 
 
-def is_motion(data: bytes) -> bool:
-    """Return True if a pickle that begins with ``data`` may have arrays of NumPy."""
-    if any(data.startswith(magic) for magic in COMPRESSED):
+def is_npy_motion(data: bytes) -> bool:
+    """Return True if an NPY that begins with ``data`` may be a motion, also one of objects."""
+    head = read_head(data, 0, len(data))
+    return is_motion(data, head.start) if head.code == "O" else is_array_motion(data)
+
+
+def is_motion(data: bytes, at: int = 0) -> bool:
+    """Return True if a pickle that begins at ``at`` may have arrays of NumPy."""
+    if any(data.startswith(magic, at) for magic in COMPRESSED):
         return True
-    machine = Machine(data)
+    machine = Machine(data, at)
     with suppress(SourceError):
         machine.run()
     return b"numpy" in data and not machine.is_foreign

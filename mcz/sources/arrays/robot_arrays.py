@@ -8,7 +8,7 @@ import numpy as np
 
 from mcz.model.motion import Channel
 from mcz.sources.arrays.columns import Array
-from mcz.sources.robots import NOTE, quaternion_order, robot_layouts
+from mcz.sources.robots import NOTE, robot_layouts
 
 JOINT_NAMES = ("joint_names", "dof_names")
 BODY_NAMES = ("body_names", "link_names", "link_body_list")
@@ -22,6 +22,7 @@ JOINTS = {  # arrays that have a column for each joint, and their units
 ROOT_POSITIONS = ("root_pos", "root_trans", "root_trans_offset")
 ROOT_ROTATION = "root_rot"
 BODIES = ("body_", "local_body_")  # begin the names of arrays with a row for each body
+LARGE_PART, SMALL_PART = 0.25, 0.02  # of the squares of a quaternion
 ALIKE = 0.9  # of the joints of a robot that are named like bodies
 
 
@@ -81,6 +82,16 @@ def robot_channels(array: Array, arrays: Sequence[Array]) -> tuple[Channel, ...]
     if array.name in ROOT_POSITIONS and inner == (3,):
         return tuple(Channel("", axis, "m") for axis in "xyz")
     if array.name == ROOT_ROTATION and inner == (4,):
-        order = quaternion_order(array.numbers.astype(np.float64))
-        return tuple(Channel("", f"q{part}") for part in order) if order == "xyzw" else None
+        return None if _has_w_first(array) else tuple(Channel("", f"q{part}") for part in "xyzw")
     return None
+
+
+def _has_w_first(array: Array) -> bool:
+    """Return True for quaternions that contradict the order x y z w of root rotations.
+
+    A robot mostly stands: then x and y are small, and large numbers before two small ones are w.
+    """
+    with np.errstate(all="ignore"):  # of infinities
+        squares = np.square(array.numbers.astype(np.float64)).sum(axis=0)
+        total = squares.sum()
+    return bool(squares[0] > LARGE_PART * total and squares[1:3].sum() < SMALL_PART * total)
