@@ -147,6 +147,32 @@ def test_array_of_objects() -> None:
     assert [row["name"] for row in listed][:2] == ["root_pos", "root_rot"]
 
 
+def test_a_motion_of_poselib(tmp_path: Path) -> None:
+    """As AMP and ASE save it: each array in a dictionary of its own, names in the tree."""
+
+    def tensor(array: Any) -> Any:
+        return OrderedDict(arr=array, context={"dtype": array.dtype.name})
+
+    names = ["pelvis", "torso", "head"]
+    saved = OrderedDict(
+        rotation=tensor(floats(8, 3, 4)),
+        root_translation=tensor(floats(8, 3)),
+        global_velocity=tensor(floats(8, 3, 3)),
+        skeleton_tree=OrderedDict(node_names=names, parent_indices=tensor(np.array([-1, 0, 1]))),
+        is_local=True,
+        fps=60,
+    )
+    buffer = io.BytesIO()
+    np.save(buffer, np.array(saved, object), allow_pickle=True)
+    motion = FORMATS["npy"].read(buffer.getvalue(), "walk")
+    assert FORMATS["npy"].write(motion) == buffer.getvalue()
+    assert [signal.name for signal in motion.signals][1:] == ["root_translation", "global_velocity"]
+    assert motion.frame_rate == 60 and motion.skeleton.joint_names == tuple(names)
+    (tmp_path / "walk.npy").write_bytes(buffer.getvalue())
+    motion = mcz.read(tmp_path / "walk.npy", arrays="quaternions-xyzw")
+    assert [channel.kind for channel in motion.skeleton.channels][:4] == ["qx", "qy", "qz", "qw"]
+
+
 def test_listed_arrays() -> None:
     motion = read(pickle.dumps({"walk": robot() | {"table": np.arange(3), "k": np.float64(2)}}))
     listed = arrays_of(motion.source, [signal.name for signal in motion.signals])

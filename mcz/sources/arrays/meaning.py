@@ -21,6 +21,7 @@ from mcz.sources.arrays.columns import DEFLATED, STAYS, Array
 from mcz.sources.arrays.robot_arrays import (
     BODIES,
     BODY_NAMES,
+    JOINT_NAMES,
     JOINTS,
     decode_text,
     is_robot,
@@ -149,6 +150,9 @@ def _add_motion(meaning: Meaning, arrays: Sequence[Array], n_frames: int) -> Non
         joints = tuple(Joint(name, channels=(channel,)) for name in names)
         meaning.metadata |= {"x-robot": robot} if robot else {}
         meaning.notes += [note] if note else []
+    elif len(names := names_of(arrays, JOINT_NAMES)) == len(joints) and len(array.head.shape) > 2:
+        pairs = zip(joints, names, strict=True)
+        joints = tuple(replace(joint, name=name) for joint, name in pairs)
     meaning.skeleton = Skeleton(joints, angle_unit="")
 
 

@@ -94,11 +94,20 @@ def read_pickle(data: bytes, at: int = 0) -> Pickle:
 def _children(machine: Machine, node: Any) -> list[tuple[str, Any]]:
     """The values of a dictionary by their keys; what a list or an array of objects nests."""
     if isinstance(node, Dict):
-        named = ((machine.text_of(key), value) for key, value in node.pairs)
+        named = ((machine.text_of(key), _unwrapped(machine, value)) for key, value in node.pairs)
         return [*{key: value for key, value in named if key}.items()]
     if isinstance(node, PickledArray):
         node = node.content if isinstance(node.content, list) else ()
     return [(str(n), value) for n, value in enumerate(node) if isinstance(value, NESTS)]
+
+
+def _unwrapped(machine: Machine, value: Any) -> Any:
+    """The array in a dictionary that poselib makes of it, any other value as it is."""
+    if isinstance(value, Dict) and len(value.pairs) == 2:
+        parts = {machine.text_of(key): part for key, part in value.pairs}
+        if parts.keys() == {"arr", "context"} and isinstance(parts["arr"], PickledArray):
+            return parts["arr"]
+    return value
 
 
 def _single_clip(machine: Machine, root: Any) -> tuple[Any, str]:

@@ -10,7 +10,7 @@ from mcz.model.motion import Channel
 from mcz.sources.arrays.columns import Array
 from mcz.sources.robots import NOTE, robot_layouts
 
-JOINT_NAMES = ("joint_names", "dof_names")
+JOINT_NAMES = ("joint_names", "dof_names", "skeleton_tree/node_names")
 BODY_NAMES = ("body_names", "link_names", "link_body_list")
 JOINTS = {  # arrays that have a column for each joint, and their units
     "joint_pos": "rad",
