@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import pickletools
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from mcz.errors import SourceError
 from mcz.sources.arrays.pickle_values import (
@@ -58,15 +58,15 @@ class Machine:
 
     def __init__(self, data: bytes, at: int = 0) -> None:
         self.data, self.at = data, at
-        self.stack: list[Any] = []
+        self.stack: list[object] = []
         self.marks: list[int] = []
-        self.memo: dict[int, Any] = {}
+        self.memo: dict[int, object] = {}
         self.frames: list[tuple[int, int, int]] = []
         self.opcode_at = at
         self.is_foreign = False  # there is a name that is no part of an array
         self._frame = (0, 0, 0)
 
-    def run(self) -> Any:
+    def run(self) -> object:
         """The value of the pickle; raises SourceError with the offset at fault."""
         n_opcodes = 0
         while True:
@@ -95,17 +95,17 @@ class Machine:
     def refuse(self, reason: str) -> NoReturn:
         raise SourceError(reason, offset=self.opcode_at)
 
-    def pop(self) -> Any:
+    def pop(self) -> object:
         if len(self.stack) <= (self.marks[-1] if self.marks else 0):
             self.refuse("the pickle takes what is not on its stack")
         return self.stack.pop()
 
-    def top(self) -> Any:
+    def top(self) -> object:
         """The value on top, which stays there."""
         self.stack.append(self.pop())
         return self.stack[-1]
 
-    def pop_items(self) -> list[Any]:
+    def pop_items(self) -> list[object]:
         """The values from the last mark on."""
         if not self.marks:
             self.refuse("the pickle has no mark")
@@ -114,7 +114,7 @@ class Machine:
         del self.stack[at:]
         return items
 
-    def text_of(self, value: Any) -> str | None:
+    def text_of(self, value: object) -> str | None:
         """A short text, None of anything else."""
         if isinstance(value, Raw) and value.is_text and value.stop - value.start <= MAX_WORD:
             return self.data[value.start : value.stop].decode("latin-1")
@@ -166,7 +166,7 @@ class Machine:
             self.refuse(f"nothing is at place {index} of the memo")
         self.stack.append(self.memo[index])
 
-    def extend(self, kind: type[Dict] | type[list[Any]], items: Sequence[Any]) -> None:
+    def extend(self, kind: type[Dict] | type[list[object]], items: Sequence[object]) -> None:
         """Put items into the list or the Dict on top."""
         target = self.top()
         if not isinstance(target, kind) or (kind is Dict and len(items) % 2):
@@ -176,7 +176,7 @@ class Machine:
         else:
             target.extend(items)
 
-    def push_name(self, module: Any, name: Any) -> None:
+    def push_name(self, module: object, name: object) -> None:
         full = f"{self.text_of(module)}.{self.text_of(name)}"
         if full not in NAMES:
             self.is_foreign = True
@@ -190,7 +190,7 @@ class Machine:
             self.refuse("a call of something that is no function")
         match function.name, arguments:
             case "_reconstruct", (Name("ndarray"), *_):
-                made: Any = PickledArray()
+                made: object = PickledArray()
             case "scalar", (DType() as dtype, Raw() as content):
                 made = PickledArray((), dtype, False, content)
             case "scalar", (DType() as dtype, _):

@@ -6,7 +6,6 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import prod
-from typing import Any
 
 MAX_AXES, MAX_LENGTH = 64, 2**48  # of a shape
 
@@ -37,7 +36,7 @@ class Raw:
 class Dict:
     """A dictionary; a key may come again, and the last one counts."""
 
-    pairs: list[tuple[Any, Any]] = field(default_factory=list)
+    pairs: list[tuple[object, object]] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -52,10 +51,10 @@ class DType:
 class PickledArray:
     """An array: ``content`` is Raw, the list of its objects, or None with a ``fault``."""
 
-    shape: tuple[Any, ...] = ()
+    shape: tuple[object, ...] = ()
     dtype: DType | None = None
     by_columns: bool = False
-    content: Raw | list[Any] | None = None
+    content: Raw | list[object] | None = None
     fault: str = ""
 
     @property
@@ -75,7 +74,7 @@ class Wrapper:
     """The object of joblib before the bytes of an array."""
 
 
-def integer_of(value: Any) -> int:
+def integer_of(value: object) -> int:
     """The integer of an opcode, -1 of anything else."""
     if isinstance(value, Number):
         return value.value
@@ -88,7 +87,7 @@ def size_of(shape: Sequence[int], itemsize: int) -> int | None:
     return prod(shape) * itemsize if is_shape else None
 
 
-def _plain_int(data: bytes, start: int, stop: int) -> Any:
+def _plain_int(data: bytes, start: int, stop: int) -> object:
     line = data[start:stop]
     return {b"00": False, b"01": True}.get(line) if line in (b"00", b"01") else int(line)
 
@@ -118,7 +117,7 @@ def _raw(is_text: bool) -> Callable[..., Raw]:
     return lambda _, start, stop, size: Raw(start, stop, size, is_text)
 
 
-LITERALS: dict[str, Callable[[bytes, int, int, int], Any]] = {
+LITERALS: dict[str, Callable[[bytes, int, int, int], object]] = {
     "INT": lambda d, a, b, _: _plain_int(d, a, b),
     "LONG": lambda d, a, b, _: int(d[a:b].removesuffix(b"L")),
     "FLOAT": lambda d, a, b, _: float(d[a:b]),

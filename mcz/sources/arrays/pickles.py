@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Any
 
 import numpy as np
 
@@ -91,17 +90,18 @@ def read_pickle(data: bytes, at: int = 0) -> Pickle:
     return Pickle(arrays, Archive((), tuple(fields), ()), clip, notes)
 
 
-def _children(machine: Machine, node: Any) -> list[tuple[str, Any]]:
+def _children(machine: Machine, node: object) -> list[tuple[str, object]]:
     """The values of a dictionary by their keys; what a list or an array of objects nests."""
     if isinstance(node, Dict):
         named = ((machine.text_of(key), _unwrapped(machine, value)) for key, value in node.pairs)
         return [*{key: value for key, value in named if key}.items()]
-    if isinstance(node, PickledArray):
-        node = node.content if isinstance(node.content, list) else ()
-    return [(str(n), value) for n, value in enumerate(node) if isinstance(value, NESTS)]
+    items = node.content if isinstance(node, PickledArray) else node
+    if not isinstance(items, list | tuple):
+        return []
+    return [(str(n), value) for n, value in enumerate(items) if isinstance(value, NESTS)]
 
 
-def _unwrapped(machine: Machine, value: Any) -> Any:
+def _unwrapped(machine: Machine, value: object) -> object:
     """The array in a dictionary that poselib makes of it, any other value as it is."""
     if isinstance(value, Dict) and len(value.pairs) == 2:
         parts = {machine.text_of(key): part for key, part in value.pairs}
@@ -110,11 +110,11 @@ def _unwrapped(machine: Machine, value: Any) -> Any:
     return value
 
 
-def _single_clip(machine: Machine, root: Any) -> tuple[Any, str]:
+def _single_clip(machine: Machine, root: object) -> tuple[object, str]:
     """The dictionary of the motion within others that hold nothing else, and its key."""
     clip = ""
     for _ in range(MAX_DEPTH):
-        children = _children(machine, root) if isinstance(root, NESTS) else []
+        children = _children(machine, root)
         if len(children) != 1 or not isinstance(children[0][1], Dict):
             break
         clip = children[0][0] if isinstance(root, Dict) else clip
@@ -122,10 +122,8 @@ def _single_clip(machine: Machine, root: Any) -> tuple[Any, str]:
     return root, clip
 
 
-def _refuse_clips(machine: Machine, root: Any) -> None:
+def _refuse_clips(machine: Machine, root: object) -> None:
     """Raise SourceError for several clips: dictionaries that have arrays of the same keys."""
-    if not isinstance(root, NESTS):
-        return
     children = _children(machine, root)
     clips = {id(child): (name, child) for name, child in children if isinstance(child, Dict)}
     owners: dict[str, str] = {}
@@ -150,10 +148,10 @@ class _Reader:
         self.used: set[int] = set()  # offsets that an array has
         self.names: set[str] = set()
 
-    def read(self, root: Any) -> tuple[list[Array], list[Field]]:
+    def read(self, root: object) -> tuple[list[Array], list[Field]]:
         """The arrays in order, and the lengths of their bytes."""
         seen: set[int] = set()
-        waiting: list[tuple[str, str, int, Any]] = [("", "", 0, root)]
+        waiting: list[tuple[str, str, int, object]] = [("", "", 0, root)]
         while waiting:
             prefix, key, depth, node = waiting.pop()
             name = prefix + key
@@ -216,7 +214,7 @@ class _Reader:
         head = Head(raw.start, shape, code, is_big, node.by_columns, rows_at, is_printed=False)
         return head, ""
 
-    def _add_words(self, name: str, node: Any) -> bool:
+    def _add_words(self, name: str, node: object) -> bool:
         """Add a list of texts, such as names of joints; returns False for anything else."""
         if not name or not isinstance(node, list | tuple) or not node:
             return False
@@ -230,7 +228,7 @@ class _Reader:
         self._add(_array_of_texts(name, words, (len(words),)))
         return True
 
-    def _add_fact(self, name: str, value: Any) -> None:
+    def _add_fact(self, name: str, value: object) -> None:
         """Add a single text or number."""
         if not name or self.n_facts >= MAX_FACTS:
             return
