@@ -3,10 +3,12 @@
     python tools/dataset_speed.py FOLDER [--copies N] [--windows N]
 
 FOLDER has BVH or AMC files of one skeleton (by names). They are packed N times over with the
-default codec, and written as .npy (memory-mapped), .npz (compressed, a clip a file), HDF5 (gzip)
-and Zarr (its default), the last two in chunks of 64 frames, each with float64 channels and with
-float32 features. Windows of 64 frames, on one core unless it says workers; cold is a new data set,
-warm the second time round. Needs h5py and zarr; without PyTorch no workers are measured.
+default codec, and written as .npy (memory-mapped), .npz (compressed, a clip a file), HDF5 (gzip),
+Zarr and Parquet (their defaults), the last three in chunks of 64 frames, each with float64 channels
+and with float32 features. Windows of 64 frames, on one core unless it says workers; cold is a new
+data set, warm the second time round. CPU: windows for each second of processor time, which other
+programs on the machine change less. Needs h5py, pyarrow and zarr; without PyTorch no workers are
+measured.
 """
 
 from __future__ import annotations
@@ -18,13 +20,14 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import mcz
 
 WINDOW = 64
+BATCH = 64
 FIELDS = "rot6d,positions,root"
 
 
@@ -37,17 +40,25 @@ def pack_copies(folder: Path, target: Path, copies: int) -> None:
         (target / f"{copy}.mcz").write_bytes((target / "0.mcz").read_bytes())
 
 
+class Rate(NamedTuple):
+    """Windows a second, by the clock and by the processor."""
+
+    wall: float
+    cpu: float
+
+
 def windows_a_second(
-    get: Callable[[int], Any], numbers: np.ndarray[Any, Any], seconds: float = 20
-) -> float:
-    start = time.perf_counter()
+    get: Callable[[Any], Any], numbers: np.ndarray[Any, Any], seconds: float = 20, size: int = 1
+) -> Rate:
+    """The rate of ``get`` for each number or, with a size, for batches of numbers."""
+    start, used = time.perf_counter(), time.process_time()
     done = 0
-    for number in numbers:
-        get(int(number))
-        done += 1
+    for at in range(0, len(numbers), size):
+        get(numbers[at : at + size] if size > 1 else int(numbers[at]))
+        done += min(size, len(numbers) - at)
         if time.perf_counter() - start > seconds:
             break
-    return done / (time.perf_counter() - start)
+    return Rate(done / (time.perf_counter() - start), done / (time.process_time() - used))
 
 
 def count_decoded(count: list[int]) -> Callable[[], None]:
@@ -68,8 +79,9 @@ def count_decoded(count: list[int]) -> Callable[[], None]:
     return stop
 
 
-def say(what: str, rate: float, size: int = 0, more: str = "") -> None:
-    print(f"{what:52} {rate:9,.0f}/s {size / 1e6:10,.1f} MB  {more}", flush=True)
+def say(what: str, rate: Rate, size: int = 0, more: str = "") -> None:
+    cpu = f"{rate.cpu:9,.0f}/s CPU" if rate.cpu else " " * 15
+    print(f"{what:56} {rate.wall:9,.0f}/s {cpu} {size / 1e6:10,.1f} MB  {more}", flush=True)
 
 
 def of_mcz(folder: Path, n_windows: int) -> None:
@@ -90,28 +102,41 @@ def of_mcz(folder: Path, n_windows: int) -> None:
             count = [0]
             stop = count_decoded(count)
             numbers = numbers[:n_windows]
-            rate = windows_a_second(data.__getitem__, numbers)
+            rate = windows_a_second(data.__getitem__, numbers, 1000, BATCH)
             stop()
-            each = count[0] / min(len(numbers), max(1, n_windows))
-            say(f"mcz, {fields}, cold, {name}, cache 64 MB", rate, size, f"{each:.0f} decoded")
+            say(
+                f"mcz, {fields}, cold, {name}", rate, size, f"{count[0] / len(numbers):.0f} decoded"
+            )
         few = random.integers(0, min(len(data), 500), n_windows)
         windows_a_second(data.__getitem__, few)
         say(f"mcz, {fields}, warm, at random", windows_a_second(data.__getitem__, few), size)
-        try:
-            from torch.utils.data import DataLoader
-        except ImportError:
-            continue
+        at_random = np.array_split(orders["at random"], n_windows // BATCH)
         for workers in (0, 1, 2):
-            data = mcz.dataset(folder, fields, **arguments)
-            tensors = data.torch()
-            loader = DataLoader(
-                tensors, batch_size=64, sampler=tensors.sampler(2)[:n_windows], num_workers=workers
-            )
-            start, seen = time.perf_counter(), 0
-            for batch in loader:
-                seen += len(next(iter(batch.values())))
-            rate = seen / (time.perf_counter() - start)
-            say(f"mcz, {fields}, cold, order(seed), {workers} workers", rate, size)
+            tensors = mcz.dataset(folder, fields, **arguments)
+            order = list(tensors.batch_sampler(BATCH, 2, max(1, workers)))[: n_windows // BATCH]
+            for name, batches in {"order(seed)": order, "at random": at_random}.items():
+                rate = loader_rate(folder, fields, arguments, batches, workers)
+                if rate is not None:
+                    say(f"mcz, {fields}, cold, {name}, {workers} workers", rate, size)
+
+
+def loader_rate(
+    folder: Path, fields: str, arguments: dict[str, Any], batches: list[Any], workers: int
+) -> Rate | None:
+    """The rate of a DataLoader from its first batch on; None without PyTorch."""
+    try:
+        from torch.utils.data import DataLoader
+    except ImportError:
+        return None
+    numbers = [list(map(int, batch)) for batch in batches]
+    tensors = mcz.dataset(folder, fields, **arguments).torch()
+    seen, start = 0, 0.0
+    for batch in DataLoader(tensors, batch_sampler=numbers, num_workers=workers):
+        if not start:
+            start = time.perf_counter()
+            continue
+        seen += len(next(iter(batch.values())))
+    return Rate(seen / (time.perf_counter() - start), 0)
 
 
 Clips = list[dict[str, np.ndarray[Any, Any]]]
@@ -171,7 +196,42 @@ def as_zarr(clips: Clips, folder: Path) -> Reader:
     return lambda c, a: {name: array[a : a + WINDOW] for name, array in arrays[c].items()}
 
 
-PEERS = {"npy, memory-mapped": as_npy, "npz": as_npz, "HDF5, gzip": as_hdf5, "Zarr": as_zarr}
+def as_parquet(clips: Clips, folder: Path) -> Reader:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    files = []
+    for number, clip in enumerate(clips):
+        columns = {
+            name: pa.FixedSizeListArray.from_arrays(
+                pa.array(array.ravel()), int(np.prod(array.shape[1:]))
+            )
+            for name, array in clip.items()
+        }
+        path = folder / f"{number}.parquet"
+        pq.write_table(pa.table(columns), path, row_group_size=WINDOW)
+        files.append(pq.ParquetFile(path))
+    shapes = {name: array.shape[1:] for name, array in clips[0].items()}
+
+    def read(c: int, a: int) -> Any:
+        first, last = a // WINDOW, (a + WINDOW - 1) // WINDOW
+        table = files[c].read_row_groups(list(range(first, last + 1)), use_threads=False)
+        a -= first * WINDOW
+        return {
+            name: table[name].combine_chunks().flatten().to_numpy().reshape(-1, *shape)[a:][:WINDOW]
+            for name, shape in shapes.items()
+        }
+
+    return read
+
+
+PEERS = {
+    "npy, memory-mapped": as_npy,
+    "npz": as_npz,
+    "HDF5, gzip": as_hdf5,
+    "Zarr": as_zarr,
+    "Parquet": as_parquet,
+}
 
 
 def of_arrays(source: Path, folder: Path, n_windows: int) -> None:

@@ -25,6 +25,15 @@ PART = (
     "import sys, mcz; file = mcz.open(sys.argv[1]); clip = list(file)[len(file) // 2]; "
     "print(clip.read((0, min(100, clip.n_frames))).shape)"
 )
+DATASET = (
+    "import sys, mcz; data = mcz.dataset(sys.argv[1], 'channels', window=64, where=sys.argv[2]); "
+    "print(len(data)); "
+)
+PICKLED = "import pickle; pickle.dump(data, open(sys.argv[3], 'wb'))"
+SHUFFLED = (
+    "import itertools, pickle, sys; data = pickle.load(open(sys.argv[1], 'rb')); "
+    "print(sum(len(b['channels']) for b in itertools.islice(data.batches(64, seed=1), 32)))"
+)
 MCZ = [sys.executable, "-c", "from mcz.cli.main import main; main()"]
 PYTHON = [sys.executable, "-c"]
 
@@ -77,6 +86,10 @@ def local(folder: Path, work: Path, jobs: int, options: list[str]) -> None:
     measure(f"list --columns {columns}", [*MCZ, "list", file, "--columns", columns], 3)
     query = "subject == '003' and duration > 2"
     measure("list --where, of subject and duration", [*MCZ, "list", file, "--where", query], 3)
+    chosen = "format == 'bvh' and n_channels == 96"
+    pickled = str(work / "dataset.pickle")
+    measure("mcz.dataset, of all BVH", [*PYTHON, DATASET + PICKLED, file, chosen, pickled])
+    measure("the same from a pickle, 2,048 windows", [*PYTHON, SHUFFLED, pickled])
     measure("append of one", [*MCZ, "append", str(one_more(folder, work)), file])
     some = ["--where", "subject == '003'", "--force"]
     measure("unpack of 100", [*MCZ, "unpack", file, str(work / "some"), *some])

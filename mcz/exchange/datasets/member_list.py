@@ -48,7 +48,7 @@ def dataset(
     up: str | None = None,
     dtype: DTypeLike = "float32",
     source_rate: Fraction | float | None = None,
-    cache: int | str = "64 MB",
+    cache: int | str = "256 MB",
     folder: str | os.PathLike[str] | None = None,
     across_gaps: bool = False,
     normalize: bool = False,
@@ -64,7 +64,7 @@ def dataset(
     chooses clips: an expression as of ``File.find``, or a function of a Clip. ``joints`` and
     ``unit`` as of ``positions``; ``up`` is the axis that points up where skeletons do not say it.
     ``normalize``: see ``Dataset.normalized``.
-    ``cache``: bytes to keep in memory, or in ``folder``, across runs: "64 MB".
+    ``cache``: bytes to keep in memory, or in ``folder``, across runs: "256 MB".
 
     Where frames are missing, the parts between are clips of their own, so that no window spans a
     gap, unless ``across_gaps``. Clips too short for a window are listed in ``Dataset.skipped``.

@@ -23,7 +23,7 @@ from mcz.model.indexing import row_numbers
 from mcz.model.text_format import counted
 from mcz.model.types import JsonObject, Reals
 
-RUN_BLOCKS = 6  # of windows that stay together until a pool is shuffled
+RUN_BLOCKS = 12  # of windows that stay together until a pool is shuffled
 
 
 @dataclass(frozen=True, slots=True)
