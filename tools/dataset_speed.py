@@ -14,6 +14,7 @@ measured.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 import time
@@ -80,8 +81,8 @@ def count_decoded(count: list[int]) -> Callable[[], None]:
 
 
 def say(what: str, rate: Rate, size: int = 0, more: str = "") -> None:
-    cpu = f"{rate.cpu:9,.0f}/s CPU" if rate.cpu else " " * 15
-    print(f"{what:56} {rate.wall:9,.0f}/s {cpu} {size / 1e6:10,.1f} MB  {more}", flush=True)
+    both = f"{rate.wall:9,.0f}/s {rate.cpu:9,.0f}/s CPU"
+    print(f"{what:56} {both} {size / 1e6:10,.1f} MB  {more}", flush=True)
 
 
 def of_mcz(folder: Path, n_windows: int) -> None:
@@ -112,8 +113,8 @@ def of_mcz(folder: Path, n_windows: int) -> None:
         say(f"mcz, {fields}, warm, at random", windows_a_second(data.__getitem__, few), size)
         at_random = np.array_split(orders["at random"], n_windows // BATCH)
         for workers in (0, 1, 2):
-            tensors = mcz.dataset(folder, fields, **arguments)
-            order = list(tensors.batch_sampler(BATCH, 2, max(1, workers)))[: n_windows // BATCH]
+            data = mcz.dataset(folder, fields, **arguments)
+            order = list(data.batch_sampler(BATCH, 2, max(1, workers)))[: n_windows // BATCH]
             for name, batches in {"order(seed)": order, "at random": at_random}.items():
                 rate = loader_rate(folder, fields, arguments, batches, workers)
                 if rate is not None:
@@ -123,20 +124,23 @@ def of_mcz(folder: Path, n_windows: int) -> None:
 def loader_rate(
     folder: Path, fields: str, arguments: dict[str, Any], batches: list[Any], workers: int
 ) -> Rate | None:
-    """The rate of a DataLoader from its first batch on; None without PyTorch."""
+    """The rate of a DataLoader, of all its processes together; None without PyTorch."""
     try:
         from torch.utils.data import DataLoader
     except ImportError:
         return None
     numbers = [list(map(int, batch)) for batch in batches]
     tensors = mcz.dataset(folder, fields, **arguments).torch()
-    seen, start = 0, 0.0
+    seen, start, used = 0, time.perf_counter(), processor_time()
     for batch in DataLoader(tensors, batch_sampler=numbers, num_workers=workers):
-        if not start:
-            start = time.perf_counter()
-            continue
         seen += len(next(iter(batch.values())))
-    return Rate(seen / (time.perf_counter() - start), 0)
+    return Rate(seen / (time.perf_counter() - start), seen / (processor_time() - used))
+
+
+def processor_time() -> float:
+    """Seconds of this process and of its children that have ended."""
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
 
 
 Clips = list[dict[str, np.ndarray[Any, Any]]]

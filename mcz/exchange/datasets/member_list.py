@@ -7,7 +7,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
+from itertools import chain, zip_longest
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -205,8 +207,8 @@ class _Agreement:
         for what, advice in ADVICE.items():
             if facts[what] != found[what]:
                 raise OptionError(
-                    f"{member.label} has {_short(found[what])}, {first.label} has "
-                    f"{_short(facts[what])}: {what} differ; {advice}"
+                    f"{member.label} has {_short(found[what], facts[what])}, {first.label} has "
+                    f"{_short(facts[what], found[what])}: {what} differ; {advice}"
                 )
 
     def _facts(self, clip: Clip, member: Member) -> JsonObject:
@@ -233,9 +235,16 @@ ADVICE = {
 }
 
 
-def _short(fact: object) -> str:
-    if isinstance(fact, list):
-        parts = [each.channels if isinstance(each, SignalShape) else each for each in fact]
-        names = [name for part in parts for name in part]
-        return f"{len(names)} names ({', '.join(names[:3])} ...)"
+def _short(fact: object, other: object) -> str:
+    """A fact in words; of names, the first three that ``other`` has not in their places."""
+    if isinstance(fact, list) and isinstance(other, list):
+        names, others = _names(fact), _names(other)
+        pairs = zip_longest(names, others)
+        differing = [name for name, there in pairs if name not in (None, there)]
+        return f"{len(names)} names ({', '.join((differing or names)[:3])} ...)"
     return "none" if fact is None else str(fact)
+
+
+def _names(parts: list[Any]) -> list[str]:
+    names = [part.channels if isinstance(part, SignalShape) else part for part in parts]
+    return list(chain.from_iterable(names))

@@ -57,13 +57,14 @@ class Dataset:
         members: Sequence[Member],
         given: Mapping[str, File],
         skipped: Sequence[Member] = (),
+        blocks: Blocks | None = None,
     ) -> None:
         self._settings, self._given = settings, dict(given)
         self.members, self.skipped = tuple(members), tuple(skipped)
         counts = [self._count(member) for member in self.members]
         self._ends = np.cumsum(counts, dtype=np.int64)
         self._scales: dict[str, FieldStatistics] | None = None  # of windows that are normalized
-        self._blocks = Blocks(settings, self.members, self._given)
+        self._blocks = blocks or Blocks(settings, self.members, self._given)
 
     def adopt(self, files: Mapping[str, File]) -> None:
         """Read from these files, by target, which are open, and close them with the rest."""
@@ -228,9 +229,9 @@ class Dataset:
         missing = [name for name in self.fields if name not in scales]
         if missing:
             raise OptionError(f"statistics of no {', '.join(missing)}")
-        made = self.part(self.members)
-        made.skipped, made._scales = self.skipped, scales
-        return made
+        normalized = self.part(self.members)
+        normalized.skipped, normalized._scales = self.skipped, scales
+        return normalized
 
     def order(self, seed: int, epoch: int = 0) -> NDArray[np.int64]:
         """All windows in an order that follows from ``seed`` and ``epoch`` and is quick to read.
@@ -320,9 +321,9 @@ class Dataset:
 
     def part(self, members: Sequence[Member]) -> Dataset:
         """The same of some of its ``members`` alone; files and cache are shared."""
-        made = Dataset(self._settings, members, self._given)
-        made._blocks, made._scales = self._blocks, self._scales
-        return made
+        part = Dataset(self._settings, members, self._given, blocks=self._blocks)
+        part._scales = self._scales
+        return part
 
     def split(
         self,
