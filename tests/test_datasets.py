@@ -177,6 +177,7 @@ def test_each_epoch_has_an_order_of_its_own(
         assert sorted(number for batch in epoch for number in batch) == list(range(len(data)))
     assert epochs[0] != epochs[1] != epochs[2] != epochs[0]
     sampler.set_epoch(1)
+    iter(sampler)  # as a DataLoader with workers does, without a use of it
     assert list(sampler) == epochs[1] and list(sampler) == epochs[2]
     assert list(data.batch_sampler(size, seed, workers)) == epochs[0]
     singles = data.sampler(seed)

@@ -41,9 +41,10 @@ class EpochSampler(Generic[Item]):
         self.epoch = EPOCH(epoch)
 
     def __iter__(self) -> Iterator[Item]:
-        items = self.items(self.epoch)
+        # A generator: a DataLoader with workers makes two iterators an epoch, and uses one.
+        epoch = self.epoch
         self.epoch += 1
-        return iter(items)
+        yield from self.items(epoch)
 
     def items(self, epoch: int) -> Sequence[Item]:
         """The items of an epoch, in their order."""
